@@ -1,0 +1,1 @@
+//! From any mesh to a texture atlas: clean, cut into charts, flatten, pack.

@@ -1,0 +1,59 @@
+//! Files that are written whole or not at all.
+
+use crate::error::{Error, Result};
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// Writes a file under a temporary name beside its place, flushes it to the disk and renames it.
+///
+/// Whatever was at `path` before stays until the new file is complete: a full disk or a killed process loses nothing.
+/// `fill` writes the content through a buffer.
+pub fn write_atomically(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>) -> Result<()> {
+    let temporary = temporary_beside(path);
+    let outcome = (|| {
+        if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
+            std::fs::create_dir_all(parent)?;
+        }
+        let mut writer = BufWriter::new(File::create(&temporary)?);
+        fill(&mut writer)?;
+        writer.flush()?;
+        writer.get_ref().sync_all()?;
+        std::fs::rename(&temporary, path)
+    })();
+    outcome.map_err(|source| {
+        let _ = std::fs::remove_file(&temporary);
+        Error::writing(path, source)
+    })
+}
+
+/// Writes bytes with [`write_atomically`].
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_atomically(path, |writer| writer.write_all(bytes))
+}
+
+/// The temporary name of a file that is being written: same folder, so that the rename is atomic.
+pub fn temporary_beside(path: &Path) -> PathBuf {
+    let mut name = path.file_name().unwrap_or_default().to_os_string();
+    name.push(format!(".{}.tmp", std::process::id()));
+    path.with_file_name(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_write_keeps_the_old_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        write_bytes(&path, b"old").unwrap();
+        let error = write_atomically(&path, |writer| {
+            writer.write_all(b"half")?;
+            Err(std::io::Error::other("disk full"))
+        });
+        assert!(error.is_err());
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "the temporary file is gone");
+    }
+}

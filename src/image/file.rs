@@ -1,0 +1,1 @@
+//! Image files: PNG, JPEG, OpenEXR, Radiance HDR, PFM.

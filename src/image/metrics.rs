@@ -1,0 +1,1 @@
+//! Differences between images: RMSE, PSNR, SSIM and their scale-aligned twins.

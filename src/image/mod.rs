@@ -1,0 +1,10 @@
+//! Linear images, image files, metrics and the mip chain.
+//!
+//! Read [`raster`] first: an image is a row-major table of pixels, row 0 at the top. Values are linear; transfer
+//! curves are applied by [`file`] at the file border and nowhere else.
+
+pub mod file;
+pub mod metrics;
+pub mod raster;
+
+pub use raster::{GreyImage, Image, RgbImage};

@@ -1,0 +1,1 @@
+//! The only door between a fit and whoever watches it.

@@ -1,0 +1,18 @@
+//! Numbers: random, with derivatives, on the sphere, in sums.
+//!
+//! Read [`random`] first: every random number of the program is a pure function of its key. Then [`sphere`], the one
+//! place where a direction and a place on a latitude-longitude map meet. [`real`] lets the reflection lobe and the
+//! path sums run in `f32`, in `f64` for audits, and with derivatives for Hessian-vector products.
+//! What is not here: linear algebra (that is glam's and faer's).
+
+pub mod distribution;
+pub mod frame;
+pub mod random;
+pub mod real;
+pub mod sphere;
+pub mod statistics;
+
+/// Luminance of a linear RGB value by the weights of Rec. 709.
+pub fn luminance(rgb: glam::Vec3) -> f32 {
+    rgb.dot(glam::Vec3::new(0.2126, 0.7152, 0.0722))
+}

@@ -1,0 +1,164 @@
+//! Random numbers as a pure function of (seed, step, view, pixel, sample, dimension).
+//!
+//! Samples of one pixel form an Owen-scrambled Sobol sequence in each pair of dimensions, so that 4, 16 or 64 samples
+//! cover the square evenly; pixels are independent of each other. No state is shared: any thread may ask for any
+//! number in any order.
+//!
+//! Source: Burley 2020, "Practical Hash-based Owen Scrambling", JCGT 9(4), listings 1 to 4.
+
+/// What a stream of random numbers belongs to, except for the sample index.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StreamKey(u64);
+
+impl StreamKey {
+    /// The stream of one pixel of one view in one step under a seed.
+    pub fn new(seed: u64, step: u32, view: u32, pixel: u32) -> Self {
+        let mut key = mix(seed ^ 0x9e37_79b9_7f4a_7c15);
+        key = mix(key ^ (u64::from(step) << 32 | u64::from(view)));
+        StreamKey(mix(key ^ (u64::from(pixel) << 1)))
+    }
+}
+
+/// The random numbers of one sample: dimension after dimension.
+#[derive(Clone, Copy, Debug)]
+pub struct SampleStream {
+    key: u64,
+    sample: u32,
+    dimension: u32,
+}
+
+impl SampleStream {
+    /// The numbers of sample `sample` in the stream of `key`.
+    pub fn new(key: StreamKey, sample: u32) -> Self {
+        SampleStream { key: key.0, sample, dimension: 0 }
+    }
+
+    /// The next number, uniform in [0, 1).
+    pub fn next(&mut self) -> f32 {
+        self.next_pair()[0]
+    }
+
+    /// The next pair, uniform in [0, 1)^2.
+    pub fn next_pair(&mut self) -> [f32; 2] {
+        let hash = mix(self.key ^ u64::from(self.dimension).wrapping_mul(0xd134_2543_de82_ef95));
+        self.dimension += 1;
+        let (low, high) = (hash as u32, (hash >> 32) as u32);
+        // Shuffle the order of samples, then scramble each coordinate of the Sobol point.
+        let index = nested_uniform_scramble(self.sample, low);
+        let x = nested_uniform_scramble(index.reverse_bits(), high);
+        let y = nested_uniform_scramble(sobol_second(index), low.rotate_left(16) ^ high);
+        [unit_float(x), unit_float(y)]
+    }
+}
+
+/// A number in [0, 1) from the upper 24 bits.
+fn unit_float(bits: u32) -> f32 {
+    (bits >> 8) as f32 * (1.0 / 16_777_216.0)
+}
+
+/// Second dimension of the Sobol sequence; the first is the bit reversal of the index.
+fn sobol_second(mut index: u32) -> u32 {
+    let mut direction = 1u32 << 31;
+    let mut result = 0;
+    while index != 0 {
+        if index & 1 == 1 {
+            result ^= direction;
+        }
+        index >>= 1;
+        direction ^= direction >> 1;
+    }
+    result
+}
+
+/// Owen scrambling by a hash in which each bit depends on the bits above it only (Burley 2020, listing 3).
+fn nested_uniform_scramble(value: u32, seed: u32) -> u32 {
+    let mut bits = value.reverse_bits();
+    bits = bits.wrapping_add(seed);
+    bits ^= bits.wrapping_mul(0x6c50_b47c);
+    bits ^= bits.wrapping_mul(0xb82f_1e52);
+    bits ^= bits.wrapping_mul(0xc7af_e638);
+    bits ^= bits.wrapping_mul(0x8d22_f6e6);
+    bits.reverse_bits()
+}
+
+/// The finaliser of SplitMix64 (Steele, Lea and Flood 2014): a bijection that spreads every bit.
+pub fn mix(mut bits: u64) -> u64 {
+    bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    bits ^ (bits >> 31)
+}
+
+/// A small sequential generator for shuffles and tests: SplitMix64.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct SequentialRandom(u64);
+
+impl SequentialRandom {
+    /// A generator that starts at `seed`.
+    pub fn new(seed: u64) -> Self {
+        SequentialRandom(mix(seed.wrapping_add(0x1234_5678_9abc_def1)))
+    }
+
+    /// The next 64 bits.
+    pub fn next_bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        mix(self.0)
+    }
+
+    /// The next number, uniform in [0, 1).
+    pub fn next(&mut self) -> f32 {
+        unit_float((self.next_bits() >> 32) as u32)
+    }
+
+    /// The next whole number in `0..bound`; `bound` must not be 0.
+    pub fn below(&mut self, bound: usize) -> usize {
+        ((u128::from(self.next_bits()) * bound as u128) >> 64) as usize
+    }
+
+    /// Shuffles in place (Fisher and Yates).
+    pub fn shuffle<T>(&mut self, items: &mut [T]) {
+        for last in (1..items.len()).rev() {
+            items.swap(last, self.below(last + 1));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sixteen_samples_are_stratified_in_both_axes_and_in_four_by_four_cells() {
+        for pixel in 0..50 {
+            let key = StreamKey::new(7, 3, 1, pixel);
+            let mut rows = [0; 16];
+            let mut columns = [0; 16];
+            let mut cells = [0; 16];
+            for sample in 0..16 {
+                let mut stream = SampleStream::new(key, sample);
+                stream.next_pair();
+                let [x, y] = stream.next_pair();
+                assert!((0.0..1.0).contains(&x) && (0.0..1.0).contains(&y));
+                columns[(x * 16.0) as usize] += 1;
+                rows[(y * 16.0) as usize] += 1;
+                cells[(x * 4.0) as usize * 4 + (y * 4.0) as usize] += 1;
+            }
+            assert_eq!((rows, columns, cells), ([1; 16], [1; 16], [1; 16]));
+        }
+    }
+
+    #[test]
+    fn dimensions_and_pixels_are_uncorrelated() {
+        let number = |pixel, dimension: usize| {
+            let mut stream = SampleStream::new(StreamKey::new(1, 0, 0, pixel), 0);
+            (0..dimension).for_each(|_| drop(stream.next()));
+            f64::from(stream.next()) - 0.5
+        };
+        let count = 20_000;
+        for (other_pixel, other_dimension) in [(0, 1), (1, 0), (0, 2)] {
+            let sum: f64 =
+                (0..count).map(|pixel| number(pixel, 0) * number(pixel + other_pixel, other_dimension)).sum();
+            let standard_error = (f64::from(count)).sqrt() / 12.0;
+            assert!(sum.abs() < 4.0 * standard_error, "correlation {sum} against {standard_error}");
+        }
+    }
+}

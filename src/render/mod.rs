@@ -1,0 +1,1 @@
+//! Where light is added up.

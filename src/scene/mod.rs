@@ -1,0 +1,103 @@
+//! What a fit is given: mesh, cameras, photographs; their readers and the pre-flight check.
+//!
+//! [`mesh`] and [`camera`] hold the geometry, [`photo`] the pixels, [`view`](View) joins them.
+
+pub mod camera;
+pub mod mesh;
+pub mod photo;
+
+pub use camera::Camera;
+pub use mesh::Mesh;
+pub use photo::{Photo, PixelState};
+
+use crate::error::Finding;
+use crate::image::Image;
+use crate::light::Environment;
+use crate::material::MaterialMaps;
+use glam::{DMat3, DVec3};
+use std::path::PathBuf;
+
+/// A calibrated photograph.
+#[derive(Clone, Debug)]
+pub struct View {
+    /// Short name, unique in the scene: the stem of the photo's file name.
+    pub name: String,
+    /// The camera, in the world of the scene.
+    pub camera: Camera,
+    /// The photograph, of the camera's size.
+    pub photo: Photo,
+    /// What each pixel is evidence for, of the camera's size.
+    pub states: Image<PixelState>,
+    /// Kept out of the fit, to judge it.
+    pub held_out: bool,
+}
+
+/// A scene in Patina's world: +y up, right-handed.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Name of the scene: its folder's name.
+    pub name: String,
+    /// Folder it was read from; `None` for a scene made in code.
+    pub folder: Option<PathBuf>,
+    /// The surface.
+    pub mesh: Mesh,
+    /// The photographs, in the order of their names.
+    pub views: Vec<View>,
+    /// How the data set's world was turned into this one.
+    pub world_from_source: WorldFromSource,
+    /// What the background pixels show.
+    pub background: Background,
+    /// The truth, where it is known.
+    pub truth: Option<Truth>,
+    /// What the reader noticed.
+    pub findings: Vec<Finding>,
+}
+
+/// `point_in_world = rotation * (point_in_source - origin_in_source)`. Units are kept.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct WorldFromSource {
+    /// Proper rotation.
+    pub rotation: DMat3,
+    /// The point of the source that becomes the origin: zero unless coordinates are too large for `f32`.
+    pub origin_in_source: DVec3,
+}
+
+impl Default for WorldFromSource {
+    fn default() -> Self {
+        WorldFromSource { rotation: DMat3::IDENTITY, origin_in_source: DVec3::ZERO }
+    }
+}
+
+/// What pixels show where no surface is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Background {
+    /// The environment itself, as in a photograph.
+    Environment,
+    /// Black, as in many synthetic data sets: background pixels say nothing.
+    Black,
+}
+
+/// The truth of a synthetic scene.
+#[derive(Clone, Debug)]
+pub struct Truth {
+    /// The maps, on the UVs the mesh came with.
+    pub maps: MaterialMaps,
+    /// Texels to compare, of the maps' size: seen by a view.
+    pub texels_seen: Image<bool>,
+    /// The light of the photographs.
+    pub environment: Environment,
+    /// A light never seen in the photographs, with pictures under it.
+    pub relight: Option<TruthRelight>,
+    /// Number of surface hits on the longest path of the pictures: 1 is direct light only.
+    pub max_bounces: usize,
+}
+
+/// Pictures under a light that was not in the photographs.
+#[derive(Clone, Debug)]
+pub struct TruthRelight {
+    /// The light.
+    pub environment: Environment,
+    /// (index of the view, linear picture).
+    pub pictures: Vec<(usize, crate::image::RgbImage)>,
+}
