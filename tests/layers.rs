@@ -1,5 +1,7 @@
 //! Dependencies point one way: a lower layer never imports a higher one.
 
+#![allow(clippy::unwrap_used)]
+
 use std::path::Path;
 
 /// Rank of each top-level module. A module may use modules of lower rank, and of its own rank only where listed.

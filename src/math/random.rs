@@ -34,7 +34,7 @@ impl SampleStream {
     }
 
     /// The next number, uniform in [0, 1).
-    pub fn next(&mut self) -> f32 {
+    pub fn next_number(&mut self) -> f32 {
         self.next_pair()[0]
     }
 
@@ -105,7 +105,7 @@ impl SequentialRandom {
     }
 
     /// The next number, uniform in [0, 1).
-    pub fn next(&mut self) -> f32 {
+    pub fn next_number(&mut self) -> f32 {
         unit_float((self.next_bits() >> 32) as u32)
     }
 
@@ -150,8 +150,10 @@ mod tests {
     fn dimensions_and_pixels_are_uncorrelated() {
         let number = |pixel, dimension: usize| {
             let mut stream = SampleStream::new(StreamKey::new(1, 0, 0, pixel), 0);
-            (0..dimension).for_each(|_| drop(stream.next()));
-            f64::from(stream.next()) - 0.5
+            for _ in 0..dimension {
+                stream.next_number();
+            }
+            f64::from(stream.next_number()) - 0.5
         };
         let count = 20_000;
         for (other_pixel, other_dimension) in [(0, 1), (1, 0), (0, 2)] {
