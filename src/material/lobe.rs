@@ -1,0 +1,224 @@
+//! The modified Cook-Torrance lobe: Lambert plus Blinn-Phong microfacets.
+//!
+//! `f = rho_d / pi + D F G / (4 (n.i)(n.o))` with
+//! * `D(h) = (e+2)/(2 pi) (n.h)^e`, the normalised Blinn-Phong distribution (Blinn 1977; normalisation as in Walter,
+//!   Marschner, Li and Torrance 2007), `e = 2/a^2 - 2` for the microfacet width `a`;
+//! * `F = F0 + (1 - F0)(1 - h.o)^5` (Schlick 1994, eq. 15);
+//! * `G = G1(n.i) G1(n.o)`, `G1(c) = c / (c (1-k) + k)`, `k = a/2` (Smith shadowing with Schlick's G1 fitted to GGX,
+//!   Schlick 1994 eq. 19, `k` after Karis 2013 without the remapping of roughness).
+//!
+//! The cosines of the denominator cancel against those of `G`, so nothing is divided by a grazing cosine:
+//! `G / (4 (n.i)(n.o)) = 1 / (4 q(n.i) q(n.o))`, `q(c) = c (1-k) + k`.
+//!
+//! `F0 = 0` still leaves a grazing lobe; a surface without one is drawn with a [`Material`] evaluated at
+//! `lobe_strength` 0.
+
+use crate::math::frame::{Frame, sample_cosine_hemisphere};
+use crate::math::luminance;
+use crate::math::real::Real;
+use glam::Vec3;
+use std::f32::consts::PI;
+
+/// Smallest microfacet width: a mirror for every purpose of a 32x64 environment, yet far from overflow in `f32`.
+pub const MIN_WIDTH: f32 = 0.005;
+/// Smallest roughness `r = a^2`.
+pub const MIN_ROUGHNESS: f32 = MIN_WIDTH * MIN_WIDTH;
+
+/// What a texel says of the surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Material<R> {
+    /// Diffuse reflectance, linear RGB in [0, 1].
+    pub diffuse: [R; 3],
+    /// Reflectance at normal incidence F0, linear RGB in [0, 1].
+    pub specular: [R; 3],
+    /// Natural logarithm of the microfacet width `a`, in `[ln MIN_WIDTH, 0]`.
+    pub log_width: R,
+}
+
+/// Everything about two directions and a normal that the lobe needs; fixed while materials change.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LobeGeometry {
+    /// `n.i`, cosine of the incident direction, in (0, 1].
+    pub cos_in: f32,
+    /// `n.o`, cosine of the outgoing direction, in (0, 1].
+    pub cos_out: f32,
+    /// `ln(n.h)`, at most 0. From the sine of the angle, so that `(n.h)^e` keeps its digits for `e` of 10^4 and more.
+    pub ln_cos_half: f32,
+    /// `h.o`, cosine between half vector and outgoing direction, in (0, 1].
+    pub half_dot_out: f32,
+}
+
+impl LobeGeometry {
+    /// The geometry of unit directions towards the light and towards the viewer about a unit normal.
+    /// `None` below the horizon of the normal, where the lobe is zero.
+    pub fn new(normal: Vec3, towards_light: Vec3, towards_viewer: Vec3) -> Option<Self> {
+        let cos_in = normal.dot(towards_light);
+        let cos_out = normal.dot(towards_viewer);
+        // Written so that NaN fails too.
+        if !(cos_in > 0.0 && cos_out > 0.0) {
+            return None;
+        }
+        let half = towards_light + towards_viewer;
+        let length_squared = half.length_squared();
+        if !(length_squared > 1e-12) {
+            return None;
+        }
+        let sin_squared = (normal.cross(half).length_squared() / length_squared).min(1.0 - 1e-7);
+        Some(LobeGeometry {
+            cos_in: cos_in.min(1.0),
+            cos_out: cos_out.min(1.0),
+            ln_cos_half: 0.5 * (-sin_squared).ln_1p(),
+            half_dot_out: (0.5 * length_squared.sqrt()).min(1.0),
+        })
+    }
+
+    /// `(1 - h.o)^5` of Schlick's approximation.
+    #[inline(always)]
+    fn schlick(&self) -> f32 {
+        let base = 1.0 - self.half_dot_out;
+        let squared = base * base;
+        squared * squared * base
+    }
+
+    /// `D G / (4 (n.i)(n.o)) (n.i)` without the Fresnel factor.
+    #[inline(always)]
+    fn specular_base<R: Real>(&self, log_width: R) -> R {
+        let one = R::from_f32(1.0);
+        let two = R::from_f32(2.0);
+        let width = log_width.exp();
+        let inverse_width_squared = one / (width * width);
+        // D = (e+2)/(2 pi) (n.h)^e with e + 2 = 2/a^2.
+        let distribution = inverse_width_squared
+            * R::from_f32(1.0 / PI)
+            * ((two * inverse_width_squared - two) * R::from_f32(self.ln_cos_half)).exp();
+        let k = width * R::from_f32(0.5);
+        let q_in = R::from_f32(self.cos_in) * (one - k) + k;
+        let q_out = R::from_f32(self.cos_out) * (one - k) + k;
+        distribution * R::from_f32(0.25 * self.cos_in) / (q_in * q_out)
+    }
+}
+
+impl<R: Real> Material<R> {
+    /// The seven numbers in the order diffuse RGB, specular RGB, log width.
+    #[inline(always)]
+    pub fn to_array(self) -> [R; 7] {
+        let ([a, b, c], [d, e, f]) = (self.diffuse, self.specular);
+        [a, b, c, d, e, f, self.log_width]
+    }
+
+    /// The material of [`Material::to_array`].
+    #[inline(always)]
+    pub fn from_array([a, b, c, d, e, f, log_width]: [R; 7]) -> Self {
+        Material { diffuse: [a, b, c], specular: [d, e, f], log_width }
+    }
+
+    /// `f(i, o) (n.i)` in 1/sr per channel. `lobe_strength` in [0, 1] scales the specular lobe as a whole.
+    #[inline(always)]
+    pub fn reflect(&self, geometry: &LobeGeometry, lobe_strength: f32) -> [R; 3] {
+        let diffuse = R::from_f32(geometry.cos_in * (1.0 / PI));
+        if lobe_strength == 0.0 {
+            return self.diffuse.map(|value| value * diffuse);
+        }
+        let base = geometry.specular_base(self.log_width) * R::from_f32(lobe_strength);
+        let schlick = geometry.schlick();
+        let (rest, schlick) = (R::from_f32(1.0 - schlick), R::from_f32(schlick));
+        std::array::from_fn(|channel| {
+            // F = F0 + (1 - F0) s = F0 (1 - s) + s.
+            let fresnel = self.specular[channel] * rest + schlick;
+            self.diffuse[channel] * diffuse + fresnel * base
+        })
+    }
+
+    /// The derivative of the loss by this material, from that by the value of [`Material::reflect`].
+    #[inline(always)]
+    pub fn reflect_backward(&self, geometry: &LobeGeometry, lobe_strength: f32, d_value: [R; 3]) -> Material<R> {
+        let diffuse = R::from_f32(geometry.cos_in * (1.0 / PI));
+        let mut d_material = Material { diffuse: d_value.map(|d| d * diffuse), ..Default::default() };
+        if lobe_strength == 0.0 {
+            return d_material;
+        }
+        let base = geometry.specular_base(self.log_width) * R::from_f32(lobe_strength);
+        let schlick = geometry.schlick();
+        let (rest, schlick) = (R::from_f32(1.0 - schlick), R::from_f32(schlick));
+        let mut d_base = R::zero();
+        for channel in 0..3 {
+            let fresnel = self.specular[channel] * rest + schlick;
+            d_material.specular[channel] = d_value[channel] * rest * base;
+            d_base += d_value[channel] * fresnel;
+        }
+        // d ln D / d ln a = -2 - 4 ln(n.h) / a^2;  d ln q(c) / d ln a = k (1 - c) / q(c).
+        let one = R::from_f32(1.0);
+        let width = self.log_width.exp();
+        let k = width * R::from_f32(0.5);
+        let (cos_in, cos_out) = (R::from_f32(geometry.cos_in), R::from_f32(geometry.cos_out));
+        let shadowing = (one - cos_in) / (cos_in * (one - k) + k) + (one - cos_out) / (cos_out * (one - k) + k);
+        let slope = R::from_f32(-2.0) - R::from_f32(4.0 * geometry.ln_cos_half) / (width * width) - k * shadowing;
+        d_material.log_width = d_base * base * slope;
+        d_material
+    }
+}
+
+impl Material<f32> {
+    /// The material of file values: reflectances clamped to [0, 1], roughness to `[MIN_ROUGHNESS, 1]`.
+    pub fn from_maps(diffuse: Vec3, specular: Vec3, roughness: f32) -> Self {
+        Material {
+            diffuse: diffuse.clamp(Vec3::ZERO, Vec3::ONE).to_array(),
+            specular: specular.clamp(Vec3::ZERO, Vec3::ONE).to_array(),
+            log_width: 0.5 * roughness.clamp(MIN_ROUGHNESS, 1.0).ln(),
+        }
+    }
+
+    /// Probability of sampling the specular lobe, by the luminance of both parts, kept off 0 and 1.
+    fn specular_share(&self, cos_out: f32, lobe_strength: f32) -> f32 {
+        if lobe_strength == 0.0 {
+            return 0.0;
+        }
+        let grazing = (1.0 - cos_out).clamp(0.0, 1.0).powi(5);
+        let fresnel = Vec3::from_array(self.specular) * (1.0 - grazing) + Vec3::splat(grazing);
+        let specular = luminance(fresnel) * lobe_strength;
+        let diffuse = luminance(Vec3::from_array(self.diffuse));
+        (specular / (specular + diffuse).max(1e-6)).clamp(0.1, 0.9)
+    }
+
+    /// A direction towards the light for a unit direction towards the viewer; `None` when it falls below the horizon.
+    /// Its density is [`Material::density`].
+    pub fn sample(
+        &self,
+        frame: &Frame,
+        towards_viewer: Vec3,
+        lobe_strength: f32,
+        choice: f32,
+        u: [f32; 2],
+    ) -> Option<Vec3> {
+        let viewer = frame.local_from_outer(towards_viewer);
+        let light = if choice < self.specular_share(viewer.z, lobe_strength) {
+            // Half vectors with density (e+2)/(2 pi) cos^(e+1): ln cos = a^2/2 ln u.
+            let width = self.log_width.exp();
+            let ln_cos = 0.5 * width * width * (1.0 - u[0]).max(1e-30).ln();
+            let (sin_phi, cos_phi) = (std::f32::consts::TAU * u[1]).sin_cos();
+            let sin = (-(2.0 * ln_cos).exp_m1()).max(0.0).sqrt();
+            let half = Vec3::new(sin * cos_phi, sin * sin_phi, ln_cos.exp());
+            half * (2.0 * viewer.dot(half)) - viewer
+        } else {
+            sample_cosine_hemisphere(u)
+        };
+        (light.z > 0.0).then(|| frame.outer_from_local(light))
+    }
+
+    /// Density of [`Material::sample`] per steradian.
+    pub fn density(&self, geometry: &LobeGeometry, lobe_strength: f32) -> f32 {
+        let share = self.specular_share(geometry.cos_out, lobe_strength);
+        let diffuse = geometry.cos_in * (1.0 / PI);
+        if share == 0.0 {
+            return diffuse;
+        }
+        let inverse_width_squared = (-2.0 * self.log_width).exp();
+        // p(h) = D(h) (n.h), p(i) = p(h) / (4 h.o).
+        let half =
+            inverse_width_squared * (1.0 / PI) * ((2.0 * inverse_width_squared - 1.0) * geometry.ln_cos_half).exp();
+        share * half / (4.0 * geometry.half_dot_out) + (1.0 - share) * diffuse
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,321 @@
+//! The maps as the tracer fetches them: seven numbers a texel side by side, with a mip chain and its transpose.
+//!
+//! Coarse levels are coverage-weighted means of their children, so that texels outside every chart never leak into a
+//! footprint. The weights are fixed, hence each level is a linear function of the base, and a gradient gathered on any
+//! level is pulled down to the base exactly.
+
+use super::lobe::{MIN_WIDTH, Material};
+use super::maps::MaterialMaps;
+use crate::image::Image;
+use crate::math::real::Real;
+use glam::{Vec2, Vec3};
+
+/// Numbers a texel holds: diffuse RGB, specular RGB, log width, and one of padding that keeps texels aligned.
+pub const TEXEL_NUMBERS: usize = 8;
+/// One texel: diffuse RGB, specular RGB, log width, unused.
+pub type Texel<R> = [R; TEXEL_NUMBERS];
+
+/// One level of the chain.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Level<R> {
+    /// Width in texels.
+    pub width: usize,
+    /// Height in texels.
+    pub height: usize,
+    /// Row-major texels.
+    pub texels: Vec<Texel<R>>,
+}
+
+/// A mip chain of materials; level 0 is the base.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TexelPyramid<R> {
+    /// Levels from fine to coarse.
+    pub levels: Vec<Level<R>>,
+}
+
+/// The fixed weights of the chain: which share of a parent each child has.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PyramidWeights {
+    /// Coverage of each texel, level by level, in [0, 1].
+    coverage: Vec<Vec<f32>>,
+    sizes: Vec<(usize, usize)>,
+}
+
+/// Four texels of one level and their bilinear weights.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TextureTap {
+    /// Level of the chain.
+    pub level: u32,
+    /// Row-major indices on that level.
+    pub index: [u32; 4],
+    /// Weights, summing to 1.
+    pub weight: [f32; 4],
+}
+
+impl TextureTap {
+    /// The tap at a texture coordinate (v up) on a level of `width x height`; clamped at the border.
+    #[inline]
+    pub fn at(uv: Vec2, level: u32, width: usize, height: usize) -> Self {
+        let x = uv.x * width as f32 - 0.5;
+        let y = (1.0 - uv.y) * height as f32 - 0.5;
+        let (x_floor, y_floor) = (x.floor(), y.floor());
+        let (x_fraction, y_fraction) = (x - x_floor, y - y_floor);
+        // A float outside the integers saturates, NaN becomes 0: clamping makes any coordinate a valid texel.
+        let column = |x: f32| (x as i64).clamp(0, width as i64 - 1) as u32;
+        let row = |y: f32| (y as i64).clamp(0, height as i64 - 1) as u32 * width as u32;
+        let (left, right) = (column(x_floor), column(x_floor + 1.0));
+        let (upper, lower) = (row(y_floor), row(y_floor + 1.0));
+        TextureTap {
+            level,
+            index: [upper + left, upper + right, lower + left, lower + right],
+            weight: [
+                (1.0 - x_fraction) * (1.0 - y_fraction),
+                x_fraction * (1.0 - y_fraction),
+                (1.0 - x_fraction) * y_fraction,
+                x_fraction * y_fraction,
+            ],
+        }
+    }
+}
+
+impl PyramidWeights {
+    /// Weights for maps of this coverage, with at most `max_levels` levels. The chain ends at an odd size.
+    pub fn new(covered: &Image<bool>, max_levels: usize) -> Self {
+        let mut sizes = vec![(covered.width(), covered.height())];
+        let mut coverage: Vec<Vec<f32>> =
+            vec![covered.pixels().iter().map(|&covered| if covered { 1.0 } else { 0.0 }).collect()];
+        while sizes.len() < max_levels.max(1) {
+            let (width, height) = sizes[sizes.len() - 1];
+            if width % 2 == 1 || height % 2 == 1 {
+                break;
+            }
+            let fine = &coverage[coverage.len() - 1];
+            let coarse = (0..width * height / 4)
+                .map(|index| children(index, width).iter().map(|&child| fine[child]).sum::<f32>() * 0.25)
+                .collect();
+            coverage.push(coarse);
+            sizes.push((width / 2, height / 2));
+        }
+        PyramidWeights { coverage, sizes }
+    }
+
+    /// Weights of a single level of this size.
+    pub fn flat(width: usize, height: usize) -> Self {
+        PyramidWeights { coverage: vec![vec![1.0; width * height]], sizes: vec![(width, height)] }
+    }
+
+    /// Number of levels.
+    pub fn level_count(&self) -> usize {
+        self.sizes.len()
+    }
+
+    /// Width and height of a level in texels.
+    pub fn size(&self, level: usize) -> (usize, usize) {
+        self.sizes[level]
+    }
+
+    /// Whether a texel of the base lies in a chart.
+    pub fn is_covered(&self, index: usize) -> bool {
+        self.coverage[0][index] > 0.0
+    }
+
+    /// The share each of a parent's four children has in it. A parent without coverage averages its children evenly.
+    fn shares(&self, level: usize, parent: usize) -> [(usize, f32); 4] {
+        let own = children(parent, self.sizes[level].0);
+        let coverage = own.map(|child| self.coverage[level][child]);
+        let sum: f32 = coverage.iter().sum();
+        std::array::from_fn(|k| (own[k], if sum > 0.0 { coverage[k] / sum } else { 0.25 }))
+    }
+}
+
+/// Indices of the four children of texel `parent`; `width` is that of the finer level.
+fn children(parent: usize, width: usize) -> [usize; 4] {
+    let half = width / 2;
+    let first = parent / half * 2 * width + parent % half * 2;
+    [first, first + 1, first + width, first + width + 1]
+}
+
+impl<R: Real> TexelPyramid<R> {
+    /// A chain with every number zero, of the sizes of `weights`.
+    pub fn zeros(weights: &PyramidWeights) -> Self {
+        let level = |&(width, height): &(usize, usize)| Level {
+            width,
+            height,
+            texels: vec![[R::zero(); TEXEL_NUMBERS]; width * height],
+        };
+        TexelPyramid { levels: weights.sizes.iter().map(level).collect() }
+    }
+
+    /// A chain over base texels of the size of `weights`.
+    pub fn from_base(texels: Vec<Texel<R>>, weights: &PyramidWeights) -> Self {
+        let mut pyramid = TexelPyramid::zeros(weights);
+        pyramid.levels[0].texels = texels;
+        pyramid.rebuild(weights);
+        pyramid
+    }
+
+    /// Recomputes every coarse level from the base.
+    pub fn rebuild(&mut self, weights: &PyramidWeights) {
+        for level in 1..self.levels.len() {
+            let (fine, coarse) = self.levels.split_at_mut(level);
+            let fine = &fine[level - 1].texels;
+            for (parent, texel) in coarse[0].texels.iter_mut().enumerate() {
+                let mut sum = [R::zero(); TEXEL_NUMBERS];
+                for (child, share) in weights.shares(level - 1, parent) {
+                    let share = R::from_f32(share);
+                    for (total, &value) in sum.iter_mut().zip(&fine[child]) {
+                        *total += value * share;
+                    }
+                }
+                *texel = sum;
+            }
+        }
+    }
+
+    /// The exact transpose of [`TexelPyramid::rebuild`]: adds each coarse level to the finer ones and clears it, so
+    /// that a gradient gathered on all levels ends on the base. Numbers beyond the seventh are pulled unweighted by
+    /// share, so that a count of evidence reaches every child.
+    pub fn pull_down(&mut self, weights: &PyramidWeights) {
+        for level in (1..self.levels.len()).rev() {
+            let (fine, coarse) = self.levels.split_at_mut(level);
+            let fine = &mut fine[level - 1].texels;
+            for (parent, texel) in coarse[0].texels.iter_mut().enumerate() {
+                if texel.iter().all(|value| value.is_zero()) {
+                    continue;
+                }
+                for (child, share) in weights.shares(level - 1, parent) {
+                    let share = R::from_f32(share);
+                    for number in 0..7 {
+                        fine[child][number] += texel[number] * share;
+                    }
+                    if !share.is_zero() {
+                        fine[child][7] += texel[7];
+                    }
+                }
+                *texel = [R::zero(); TEXEL_NUMBERS];
+            }
+        }
+    }
+
+    /// The material at a tap.
+    #[inline(always)]
+    pub fn fetch(&self, tap: &TextureTap) -> Material<R> {
+        let texels = &self.levels[tap.level as usize].texels;
+        let mut sum = [R::zero(); 7];
+        for k in 0..4 {
+            let weight = R::from_f32(tap.weight[k]);
+            let texel = &texels[tap.index[k] as usize];
+            for (total, &value) in sum.iter_mut().zip(texel) {
+                *total += value * weight;
+            }
+        }
+        Material::from_array(sum)
+    }
+
+    /// The tap at a texture coordinate on a level; the level is clamped to those there are.
+    #[inline]
+    pub fn tap(&self, uv: Vec2, level: u32) -> TextureTap {
+        let level = level.min(self.levels.len() as u32 - 1);
+        let Level { width, height, .. } = self.levels[level as usize];
+        TextureTap::at(uv, level, width, height)
+    }
+
+    /// The chain in another number type, without derivatives.
+    pub fn convert<S: Real>(&self, convert: impl Fn(R) -> S) -> TexelPyramid<S> {
+        let level = |level: &Level<R>| Level {
+            width: level.width,
+            height: level.height,
+            texels: level.texels.iter().map(|texel| texel.map(&convert)).collect(),
+        };
+        TexelPyramid { levels: self.levels.iter().map(level).collect() }
+    }
+}
+
+/// Base texels of maps as files hold them.
+pub fn texels_from_maps(maps: &MaterialMaps) -> Vec<Texel<f32>> {
+    let pixels = maps.diffuse.pixels().iter().zip(maps.specular.pixels()).zip(maps.roughness.pixels());
+    pixels
+        .map(|((&diffuse, &specular), &roughness)| {
+            let [a, b, c, d, e, f, g] = Material::from_maps(diffuse, specular, roughness).to_array();
+            [a, b, c, d, e, f, g, 0.0]
+        })
+        .collect()
+}
+
+/// Maps as files hold them, of base texels.
+pub fn maps_from_texels(texels: &[Texel<f32>], width: usize, height: usize) -> MaterialMaps {
+    let image = |number: usize| {
+        Image::from_pixels(
+            width,
+            height,
+            texels.iter().map(|texel| Vec3::new(texel[number], texel[number + 1], texel[number + 2])).collect(),
+        )
+    };
+    let roughness = texels.iter().map(|texel| (2.0 * texel[6].clamp(MIN_WIDTH.ln(), 0.0)).exp()).collect();
+    MaterialMaps { diffuse: image(0), specular: image(3), roughness: Image::from_pixels(width, height, roughness) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::SequentialRandom;
+
+    fn random_texels(count: usize, seed: u64) -> Vec<Texel<f64>> {
+        let mut random = SequentialRandom::new(seed);
+        (0..count).map(|_| std::array::from_fn(|_| f64::from(random.next_number()) - 0.4)).collect()
+    }
+
+    #[test]
+    fn pulling_down_is_the_transpose_of_building() {
+        let covered = Image::from_fn(16, 8, |row, column| (row * 7 + column * 3) % 5 != 0 && row != 3);
+        let weights = PyramidWeights::new(&covered, 4);
+        assert_eq!(weights.level_count(), 4);
+        let base = random_texels(128, 1);
+        let built = TexelPyramid::from_base(base.clone(), &weights);
+        let mut probe = TexelPyramid::<f64>::zeros(&weights);
+        for (level, texels) in probe.levels.iter_mut().enumerate() {
+            texels.texels = random_texels(texels.texels.len(), 10 + level as u64);
+        }
+        let dot = |a: &[Texel<f64>], b: &[Texel<f64>]| -> f64 {
+            a.iter().zip(b).flat_map(|(a, b)| (0..7).map(move |number| a[number] * b[number])).sum()
+        };
+        let forward: f64 = built.levels.iter().zip(&probe.levels).map(|(a, b)| dot(&a.texels, &b.texels)).sum();
+        probe.pull_down(&weights);
+        let backward = dot(&base, &probe.levels[0].texels);
+        assert!((forward - backward).abs() < 1e-10 * forward.abs(), "{forward} {backward}");
+    }
+
+    #[test]
+    fn uncovered_texels_do_not_leak_into_coarse_levels() {
+        let covered = Image::from_fn(8, 8, |_, column| column < 5);
+        let weights = PyramidWeights::new(&covered, 3);
+        let texels = (0..64).map(|index| if index % 8 < 5 { [1.0f32; 8] } else { [100.0; 8] }).collect();
+        let pyramid = TexelPyramid::from_base(texels, &weights);
+        assert!((pyramid.levels[1].texels[2][0] - 1.0).abs() < 1e-6, "the parent across the border");
+        assert!((pyramid.levels[2].texels[1][3] - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn taps_follow_the_texture_convention() {
+        let tap = TextureTap::at(Vec2::new(2.5 / 8.0, 1.0 - 1.5 / 4.0), 0, 8, 4);
+        let own: f32 = (0..4).filter(|&k| tap.index[k] == 10).map(|k| tap.weight[k]).sum();
+        assert!((own - 1.0).abs() < 1e-5, "centre of row 1, column 2");
+        for uv in [Vec2::NAN, Vec2::splat(f32::INFINITY), Vec2::splat(-1e30)] {
+            assert!(TextureTap::at(uv, 0, 8, 4).index.iter().all(|&index| index < 32));
+        }
+    }
+
+    #[test]
+    fn maps_round_trip() {
+        let maps = MaterialMaps {
+            diffuse: Image::from_fn(4, 2, |row, column| Vec3::new(0.1 * row as f32, 0.2 * column as f32, 1.0)),
+            specular: Image::filled(4, 2, Vec3::splat(0.04)),
+            roughness: Image::from_fn(4, 2, |row, column| 0.1 + 0.2 * row as f32 + 0.1 * column as f32),
+        };
+        let again = maps_from_texels(&texels_from_maps(&maps), 4, 2);
+        assert_eq!(again.diffuse, maps.diffuse);
+        for (a, b) in again.roughness.pixels().iter().zip(maps.roughness.pixels()) {
+            assert!((a - b).abs() < 1e-6);
+        }
+    }
+}
