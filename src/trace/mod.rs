@@ -1,8 +1,31 @@
 //! Rays and the bounding volume hierarchy.
 //!
-//! This folder knows positions and triangles, nothing of materials or scenes.
+//! Read [`Bvh`] first: it is built once from positions and triangles and then answers two questions, which triangle a
+//! ray meets first ([`Bvh::closest_hit`]) and whether it meets any ([`Bvh::is_occluded`]).
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `prepare` | which triangles take part: checks, zero areas, copies |
+//! | `binary` | the binary tree, built by obvhs; a balanced one where that would grow too deep |
+//! | `wide` | nodes of eight children and blocks of triangles, and how the binary tree becomes them |
+//! | `query` | what one ray needs over and over: inverse direction, padding, shear |
+//! | `plain` | the walk through the tree in portable Rust |
+//!
+//! Two triangles that share an edge
+//! leave no gap for a ray to pass. Where several triangles are hit at the same `t`, the one of lowest index is given.
+//!
+//! This folder knows positions and triangles, nothing of materials or scenes; it culls no backfaces, moves no
+//! triangles after the build and holds no instances.
 
+mod binary;
+mod plain;
+mod prepare;
+mod query;
+mod wide;
+
+use crate::error::Result;
 use glam::Vec3;
+use query::Query;
 
 /// A ray: points `origin + t direction` for `t` in `(0, t_max)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,4 +49,77 @@ pub struct Hit {
     pub u: f32,
     /// Barycentric weight of the triangle's third corner; the first has `1 - u - v`.
     pub v: f32,
+}
+
+/// A bounding volume hierarchy over triangles: eight children a node, blocks of triangles in its leaves.
+///
+/// It keeps its own copy of the positions. Triangles without area and exact copies of an earlier triangle (same three
+/// positions in any order) are left out; hits name triangles by their index in the list the hierarchy was built from.
+#[derive(Clone, Debug)]
+pub struct Bvh {
+    tree: wide::WideTree,
+    /// Lower and upper corner of the box around all triangles that take part.
+    bounds: (Vec3, Vec3),
+    /// Largest absolute coordinate; rounding errors of points on the surface are a multiple of it.
+    largest_coordinate: f32,
+    /// How many triangles take part.
+    triangle_count: usize,
+}
+
+impl Bvh {
+    /// Builds the hierarchy.
+    ///
+    /// # Errors
+    /// `InvalidScene` when a triangle names a vertex that is not there, or when no triangle has an area; `NonFinite`
+    /// when a triangle's vertex is not finite. The place is the first such triangle.
+    pub fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Bvh> {
+        let prepared = prepare::prepare(positions, triangles)?;
+        let tree = wide::build(&prepared);
+        let bounds = prepared.bounds();
+        let largest_coordinate = bounds.0.abs().max(bounds.1.abs()).max_element();
+        Ok(Bvh { tree, bounds, largest_coordinate, triangle_count: prepared.triangles.len() })
+    }
+
+    /// The nearest hit with `t` in `(0, t_max)`, from either side of a triangle.
+    ///
+    /// `None` for a ray that meets nothing and for one that is none: a number that is not finite in origin or
+    /// direction, a direction of zero, or a `t_max` that is not above zero.
+    pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        let query = Query::new(ray, self.bounds)?;
+        plain::closest_hit(&self.tree, &query)
+    }
+
+    /// Whether anything lies on the ray: true exactly when [`Bvh::closest_hit`] finds a hit.
+    pub fn is_occluded(&self, ray: &Ray) -> bool {
+        Query::new(ray, self.bounds).is_some_and(|query| plain::is_occluded(&self.tree, &query))
+    }
+
+    /// Moves a point that was computed on the surface off it, to the side that `direction` leaves to, by just more
+    /// than the rounding errors of the point and of the ray test.
+    ///
+    /// `point` lies on a triangle of geometric normal `geometric_normal` (any sign; unit length, otherwise the step
+    /// scales with it); `direction` is the ray that starts there. The step is `2^-19` (2 millionths) of the largest
+    /// coordinate of the scene: points are interpolated from corners, so their error is relative to the corners and
+    /// not to the point, which may lie close to the origin of the world. This is why the step of Waechter and Binder
+    /// 2019 (Ray Tracing Gems, chapter 6), relative to each coordinate of the point, is not used as it stands: its
+    /// constant floor of `2^-16` world units near the origin fits scenes of about a metre only.
+    pub fn offset_origin(&self, point: Vec3, geometric_normal: Vec3, direction: Vec3) -> Vec3 {
+        let step = self.largest_coordinate.max(point.abs().max_element()) * (1.0 / 524_288.0);
+        point + geometric_normal * step.copysign(direction.dot(geometric_normal))
+    }
+
+    /// Lower and upper corner of the box around all triangles that take part, in world units.
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        self.bounds
+    }
+
+    /// How many triangles take part: those with an area, copies counted once.
+    pub fn triangle_count(&self) -> usize {
+        self.triangle_count
+    }
+
+    /// Size of the hierarchy in memory, in bytes.
+    pub fn memory_bytes(&self) -> usize {
+        self.tree.memory_bytes()
+    }
 }

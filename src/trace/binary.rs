@@ -1,0 +1,169 @@
+//! The binary tree: one triangle a leaf, built by obvhs, or balanced where that would grow too deep.
+
+use super::prepare::Prepared;
+use crate::math::random::SequentialRandom;
+use glam::Vec3;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+
+/// Marks a leaf in [`BinaryNode::right`].
+const LEAF: u32 = u32::MAX;
+
+/// A node of the binary tree.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BinaryNode {
+    /// Lower corner of its box.
+    pub low: Vec3,
+    /// Upper corner of its box.
+    pub high: Vec3,
+    /// First child; for a leaf its triangle.
+    left: u32,
+    /// Second child, or [`LEAF`].
+    right: u32,
+}
+
+impl BinaryNode {
+    /// The two children, or the triangle of a leaf, by its place in the prepared list.
+    pub fn content(&self) -> Content {
+        if self.right == LEAF { Content::Triangle(self.left) } else { Content::Children([self.left, self.right]) }
+    }
+
+    /// Half the surface of the box, in f64, where it neither under- nor overflows.
+    pub fn half_area(&self) -> f64 {
+        let size = self.high.as_dvec3() - self.low.as_dvec3();
+        size.x * size.y + size.y * size.z + size.z * size.x
+    }
+}
+
+/// What a node holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Content {
+    /// Two nodes further on in the list.
+    Children([u32; 2]),
+    /// One triangle, by its place in the prepared list.
+    Triangle(u32),
+}
+
+/// A binary tree: the root first, every node before its children.
+#[derive(Clone, Debug)]
+pub(super) struct BinaryTree {
+    /// The nodes.
+    pub nodes: Vec<BinaryNode>,
+}
+
+/// The tree that obvhs builds: neighbours on a space-filling curve joined from below (Meister and Bittner 2018), then
+/// made better by taking subtrees out and inserting them elsewhere (Meister and Bittner 2018b).
+pub(super) fn by_surface_area(prepared: &Prepared) -> BinaryTree {
+    let boxes = boxes_for_obvhs(prepared);
+    let indices = (0..boxes.len() as u32).collect();
+    let mut built = PlocBuilder::with_capacity(boxes.len()).build(
+        PlocSearchDistance::Medium,
+        &boxes,
+        indices,
+        SortPrecision::U64,
+        3,
+    );
+    ReinsertionOptimizer::default().run(&mut built, 0.15, None);
+    from_topology(prepared, |node| {
+        let node = &built.nodes[node as usize];
+        if node.is_leaf() {
+            Content::Triangle(built.primitive_indices[node.first_index as usize])
+        } else {
+            Content::Children([node.first_index, node.first_index + 1])
+        }
+    })
+}
+
+/// Boxes of which obvhs reads only how they lie to each other.
+///
+/// They are scaled to about one, so that areas neither overflow nor vanish. Boxes that coincide are moved apart a
+/// little: obvhs joins each box with the neighbour that suits it best, and where all suit alike, only one pair a round
+/// is joined, which takes time in proportion to the square of their number and makes a tree as deep as they are many.
+fn boxes_for_obvhs(prepared: &Prepared) -> Vec<Aabb> {
+    let (low, high) = prepared.bounds();
+    let centre = 0.5 * (low.as_dvec3() + high.as_dvec3());
+    let scale = 2.0 / (high.as_dvec3() - low.as_dvec3()).max_element();
+    let scaled = |point: Vec3| ((point.as_dvec3() - centre) * scale).as_vec3a();
+    prepared
+        .triangles
+        .iter()
+        .map(|triangle| {
+            let (low, high) = triangle.bounds();
+            let (mut low, mut high) = (scaled(low), scaled(high));
+            if triangle.box_copies > 0 {
+                let mut random = SequentialRandom::new(u64::from(triangle.index));
+                let mut number = || random.next_number() - 0.5;
+                let shift = (high - low).max_element() * 0.01 * glam::Vec3A::new(number(), number(), number());
+                (low, high) = (low + shift, high + shift);
+            }
+            Aabb { min: low, max: high }
+        })
+        .collect()
+}
+
+/// A balanced tree: halves along the longest side of the box around the triangles' middles. Its depth is the logarithm
+/// of their number whatever they look like; it is slower to walk than [`by_surface_area`].
+pub(super) fn balanced(prepared: &Prepared) -> BinaryTree {
+    let middles: Vec<Vec3> = prepared
+        .triangles
+        .iter()
+        .map(|triangle| {
+            let (low, high) = triangle.bounds();
+            0.5 * low + 0.5 * high
+        })
+        .collect();
+    let mut order: Vec<u32> = (0..middles.len() as u32).collect();
+    // Node k covers order[ranges[k]]; children are added behind, so the list is the topology.
+    let mut ranges = vec![(0, order.len())];
+    let mut contents = Vec::new();
+    while contents.len() < ranges.len() {
+        let (start, end) = ranges[contents.len()];
+        if end - start == 1 {
+            contents.push(Content::Triangle(order[start]));
+            continue;
+        }
+        let part = &mut order[start..end];
+        let (low, high) = part.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &slot| {
+            (low.min(middles[slot as usize]), high.max(middles[slot as usize]))
+        });
+        let axis = (0.5 * high - 0.5 * low).max_position();
+        let half = part.len() / 2;
+        part.select_nth_unstable_by(half, |&one, &other| {
+            middles[one as usize][axis].total_cmp(&middles[other as usize][axis]).then(one.cmp(&other))
+        });
+        let first_child = ranges.len() as u32;
+        ranges.push((start, start + half));
+        ranges.push((start + half, end));
+        contents.push(Content::Children([first_child, first_child + 1]));
+    }
+    from_topology(prepared, |node| contents[node as usize])
+}
+
+/// Lays the nodes out with parents before children and computes their boxes from the triangles alone.
+fn from_topology(prepared: &Prepared, content: impl Fn(u32) -> Content) -> BinaryTree {
+    let mut nodes: Vec<BinaryNode> = Vec::with_capacity(2 * prepared.triangles.len());
+    let mut sources = vec![0];
+    while let Some(&source) = sources.get(nodes.len()) {
+        let (left, right) = match content(source) {
+            Content::Triangle(triangle) => (triangle, LEAF),
+            Content::Children([left, right]) => {
+                let place = sources.len() as u32;
+                sources.extend([left, right]);
+                (place, place + 1)
+            }
+        };
+        nodes.push(BinaryNode { low: Vec3::ZERO, high: Vec3::ZERO, left, right });
+    }
+    for place in (0..nodes.len()).rev() {
+        let (low, high) = match nodes[place].content() {
+            Content::Triangle(triangle) => prepared.triangles[triangle as usize].bounds(),
+            Content::Children([left, right]) => {
+                let (left, right) = (&nodes[left as usize], &nodes[right as usize]);
+                (left.low.min(right.low), left.high.max(right.high))
+            }
+        };
+        (nodes[place].low, nodes[place].high) = (low, high);
+    }
+    BinaryTree { nodes }
+}
