@@ -4,8 +4,11 @@
 //! curves ([`transfer`]) are applied by [`file`] at the file border and nowhere else.
 
 pub mod file;
+pub mod linear;
 pub mod metrics;
+pub mod mip;
 pub mod raster;
+pub mod resize;
 pub mod transfer;
 
 pub use raster::{GreyImage, Image, RgbImage};
