@@ -4,7 +4,7 @@
 
 use glam::Vec3;
 use patina::math::random::SequentialRandom;
-use patina::trace::{Bvh, Hit, Ray};
+use patina::trace::{Bvh, Hit, Ray, Walk};
 
 fn number(random: &mut SequentialRandom) -> f32 {
     2.0 * random.next_number() - 1.0
@@ -49,17 +49,26 @@ fn soup(count: usize, size: f32, random: &mut SequentialRandom) -> (Vec<Vec3>, V
     (positions, triangles)
 }
 
+/// Asks all walks this machine has, which must agree to the bit.
+fn closest_hit(bvh: &mut Bvh, ray: &Ray) -> Option<Hit> {
+    bvh.set_walk(Walk::Plain);
+    let expected = bvh.closest_hit(ray);
+    let bits = |hit: Option<Hit>| hit.map(|hit| (hit.t.to_bits(), hit.triangle, hit.u.to_bits(), hit.v.to_bits()));
+    for walk in Walk::available() {
+        bvh.set_walk(walk);
+        assert_eq!(bits(bvh.closest_hit(ray)), bits(expected), "{walk:?}, {ray:?}");
+        assert_eq!(bvh.is_occluded(ray), expected.is_some(), "{walk:?}, {ray:?}");
+    }
+    expected
+}
+
 /// Counts the rays on which hierarchy and brute force disagree by more than rounding.
 fn disagreements(positions: &[Vec3], triangles: &[[u32; 3]], rays: &[Ray]) -> usize {
-    let bvh = Bvh::build(positions, triangles).unwrap();
-    let agrees = |ray: &Ray| {
-        let hit: Option<Hit> = bvh.closest_hit(ray);
-        assert_eq!(hit.is_some(), bvh.is_occluded(ray), "{ray:?}");
-        match (hit, brute_force(positions, triangles, ray)) {
-            (None, None) => true,
-            (Some(hit), Some((t, triangle))) => hit.triangle == triangle && (f64::from(hit.t) - t).abs() <= 1e-4 * t,
-            _ => false,
-        }
+    let mut bvh = Bvh::build(positions, triangles).unwrap();
+    let mut agrees = |ray: &Ray| match (closest_hit(&mut bvh, ray), brute_force(positions, triangles, ray)) {
+        (None, None) => true,
+        (Some(hit), Some((t, triangle))) => hit.triangle == triangle && (f64::from(hit.t) - t).abs() <= 1e-4 * t,
+        _ => false,
     };
     rays.iter().filter(|ray| !agrees(ray)).count()
 }

@@ -10,8 +10,9 @@
 //! | `wide` | nodes of eight children and blocks of triangles, and how the binary tree becomes them |
 //! | `query` | what one ray needs over and over: inverse direction, padding, shear |
 //! | `plain` | the walk through the tree in portable Rust |
+//! | `vector` | the same walk with AVX2, chosen at run time |
 //!
-//! Two triangles that share an edge
+//! Both walks do the same sums in the same order: their hits are the same bits. Two triangles that share an edge
 //! leave no gap for a ray to pass. Where several triangles are hit at the same `t`, the one of lowest index is given.
 //!
 //! This folder knows positions and triangles, nothing of materials or scenes; it culls no backfaces, moves no
@@ -21,6 +22,8 @@ mod binary;
 mod plain;
 mod prepare;
 mod query;
+#[cfg(target_arch = "x86_64")]
+mod vector;
 mod wide;
 
 use crate::error::Result;
@@ -64,6 +67,30 @@ pub struct Bvh {
     largest_coordinate: f32,
     /// How many triangles take part.
     triangle_count: usize,
+    /// Which walk answers.
+    walk: Walk,
+}
+
+/// Which instructions walk through the tree. The hits are the same bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Walk {
+    /// Portable Rust.
+    Plain,
+    /// AVX2, on the processors of x86-64 that have it.
+    Avx2,
+}
+
+impl Walk {
+    /// The walks this machine can do, the fastest last.
+    pub fn available() -> Vec<Walk> {
+        let mut walks = vec![Walk::Plain];
+        #[cfg(target_arch = "x86_64")]
+        if vector::is_available() {
+            walks.push(Walk::Avx2);
+        }
+        walks
+    }
 }
 
 impl Bvh {
@@ -77,7 +104,13 @@ impl Bvh {
         let tree = wide::build(&prepared);
         let bounds = prepared.bounds();
         let largest_coordinate = bounds.0.abs().max(bounds.1.abs()).max_element();
-        Ok(Bvh { tree, bounds, largest_coordinate, triangle_count: prepared.triangles.len() })
+        Ok(Bvh {
+            tree,
+            bounds,
+            largest_coordinate,
+            triangle_count: prepared.triangles.len(),
+            walk: Walk::available().last().copied().unwrap_or(Walk::Plain),
+        })
     }
 
     /// The nearest hit with `t` in `(0, t_max)`, from either side of a triangle.
@@ -86,12 +119,27 @@ impl Bvh {
     /// direction, a direction of zero, or a `t_max` that is not above zero.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         let query = Query::new(ray, self.bounds)?;
-        plain::closest_hit(&self.tree, &query)
+        match self.walk {
+            Walk::Plain => plain::closest_hit(&self.tree, &query),
+            // SAFETY: only walks of `Walk::available` are ever set.
+            #[cfg(target_arch = "x86_64")]
+            Walk::Avx2 => unsafe { vector::closest_hit(&self.tree, &query) },
+            #[cfg(not(target_arch = "x86_64"))]
+            Walk::Avx2 => plain::closest_hit(&self.tree, &query),
+        }
     }
 
     /// Whether anything lies on the ray: true exactly when [`Bvh::closest_hit`] finds a hit.
     pub fn is_occluded(&self, ray: &Ray) -> bool {
-        Query::new(ray, self.bounds).is_some_and(|query| plain::is_occluded(&self.tree, &query))
+        let Some(query) = Query::new(ray, self.bounds) else { return false };
+        match self.walk {
+            Walk::Plain => plain::is_occluded(&self.tree, &query),
+            // SAFETY: only walks of `Walk::available` are ever set.
+            #[cfg(target_arch = "x86_64")]
+            Walk::Avx2 => unsafe { vector::is_occluded(&self.tree, &query) },
+            #[cfg(not(target_arch = "x86_64"))]
+            Walk::Avx2 => plain::is_occluded(&self.tree, &query),
+        }
     }
 
     /// Moves a point that was computed on the surface off it, to the side that `direction` leaves to, by just more
@@ -106,6 +154,13 @@ impl Bvh {
     pub fn offset_origin(&self, point: Vec3, geometric_normal: Vec3, direction: Vec3) -> Vec3 {
         let step = self.largest_coordinate.max(point.abs().max_element()) * (1.0 / 524_288.0);
         point + geometric_normal * step.copysign(direction.dot(geometric_normal))
+    }
+
+    /// Has rays answered by another walk, for tests and comparisons; one this machine cannot do is not taken up.
+    pub fn set_walk(&mut self, walk: Walk) {
+        if Walk::available().contains(&walk) {
+            self.walk = walk;
+        }
     }
 
     /// Lower and upper corner of the box around all triangles that take part, in world units.

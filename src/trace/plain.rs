@@ -9,24 +9,50 @@ use super::query::Query;
 use super::wide::{BLOCK, LANES, STACK_SIZE, TriangleBlock, WIDTH, WideNode, WideTree};
 
 /// The best hit so far: the end of the ray to begin with.
-#[derive(Clone, Copy)]
-struct Best {
-    t: f32,
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Best {
+    /// Where it is on the ray.
+    pub t: f32,
     triangle: u32,
     u: f32,
     v: f32,
 }
 
+impl Best {
+    /// No hit yet. No triangle has an index below 0: a hit at the end of the ray itself is none.
+    #[inline(always)]
+    pub fn end_of(query: &Query) -> Best {
+        Best { t: query.t_max, triangle: 0, u: 0.0, v: 0.0 }
+    }
+
+    /// Takes a hit that is nearer, or as near and of a lower triangle; whether it was taken. The weights of the second
+    /// and third corner are `b / sum` and `c / sum`.
+    #[inline(always)]
+    pub fn update(&mut self, t: f32, triangle: u32, b: f32, c: f32, sum: f32) -> bool {
+        let is_better = t < self.t || (t == self.t && triangle < self.triangle);
+        if is_better {
+            *self = Best { t, triangle, u: b / sum, v: c / sum };
+        }
+        is_better
+    }
+}
+
+impl From<Best> for Hit {
+    fn from(best: Best) -> Hit {
+        Hit { t: best.t, triangle: best.triangle, u: best.u, v: best.v }
+    }
+}
+
 /// The nearest hit; among hits at the same `t` that of the lowest triangle.
 pub(super) fn closest_hit(tree: &WideTree, query: &Query) -> Option<Hit> {
-    // No triangle has an index below 0: a hit at t_max itself is none.
-    let mut best = Best { t: query.t_max, triangle: 0, u: 0.0, v: 0.0 };
+    let mut best = Best::end_of(query);
     let mut found = false;
-    let mut stack = [(0.0f32, 0u32); STACK_SIZE];
+    // Entry distance in the upper half, reference in the lower: the order of keys is that of distances.
+    let mut stack = [0u64; STACK_SIZE];
     let mut height = 1;
     while height > 0 {
         height -= 1;
-        let (entry, reference) = stack[height];
+        let (entry, reference) = (f32::from_bits((stack[height] >> 32) as u32), stack[height] as u32);
         if entry > best.t {
             continue;
         }
@@ -36,22 +62,20 @@ pub(super) fn closest_hit(tree: &WideTree, query: &Query) -> Option<Hit> {
         }
         let node = &tree.nodes[reference as usize];
         let entries = test_node(node, query, best.t);
-        // Farthest first onto the stack; equal distances keep their order.
+        // Farthest first onto the stack.
         let base = height;
-        for (&entry, &child) in entries.iter().zip(&node.children) {
-            if entry.is_nan() {
-                continue;
-            }
+        for (&entry, &child) in entries.iter().zip(&node.children).filter(|(entry, _)| !entry.is_nan()) {
+            let key = u64::from(entry.to_bits()) << 32 | u64::from(child);
             let mut place = height;
-            while place > base && stack[place - 1].0 < entry {
+            while place > base && stack[place - 1] < key {
                 stack[place] = stack[place - 1];
                 place -= 1;
             }
-            stack[place] = (entry, child);
+            stack[place] = key;
             height += 1;
         }
     }
-    found.then_some(Hit { t: best.t, triangle: best.triangle, u: best.u, v: best.v })
+    found.then_some(best.into())
 }
 
 /// Whether there is any hit.
@@ -62,8 +86,7 @@ pub(super) fn is_occluded(tree: &WideTree, query: &Query) -> bool {
         height -= 1;
         let reference = stack[height];
         if reference & BLOCK != 0 {
-            let mut best = Best { t: query.t_max, triangle: 0, u: 0.0, v: 0.0 };
-            if test_block(&tree.blocks[(reference & !BLOCK) as usize], query, &mut best) {
+            if test_block(&tree.blocks[(reference & !BLOCK) as usize], query, &mut Best::end_of(query)) {
                 return true;
             }
             continue;
@@ -125,7 +148,7 @@ fn test_block(block: &TriangleBlock, query: &Query, best: &mut Best) -> bool {
             let height = corner[z][lane] - query.origin[z];
             let along = corner[x][lane] - query.origin[x] - query.shear[0] * height;
             let across = corner[y][lane] - query.origin[y] - query.shear[1] * height;
-            [along, across, height * query.shear[2]]
+            [along, across, height]
         };
         let [ax, ay, az] = corner(0);
         let [bx, by, bz] = corner(1);
@@ -134,12 +157,11 @@ fn test_block(block: &TriangleBlock, query: &Query, best: &mut Best) -> bool {
         let b = ax * cy - ay * cx;
         let c = bx * ay - by * ax;
         let sum = a + b + c;
-        let t = (a * az + b * bz + c * cz) / sum;
+        let t = (a * az + b * bz + c * cz) * query.shear[2] / sum;
         let is_inside = (a >= 0.0 && b >= 0.0 && c >= 0.0) || (a <= 0.0 && b <= 0.0 && c <= 0.0);
-        let is_better = t < best.t || (t == best.t && block.triangles[lane] < best.triangle);
-        if is_inside && sum != 0.0 && t > 0.0 && is_better {
-            *best = Best { t, triangle: block.triangles[lane], u: b / sum, v: c / sum };
-            found = true;
+        // Where the sum is zero, all three are, and `t` is a NaN.
+        if is_inside && t > 0.0 {
+            found |= best.update(t, block.triangles[lane], b, c, sum);
         }
     }
     found
