@@ -1,10 +1,11 @@
 //! Linear images, image files, metrics and the mip chain.
 //!
 //! Read [`raster`] first: an image is a row-major table of pixels, row 0 at the top. Values are linear; transfer
-//! curves are applied by [`file`] at the file border and nowhere else.
+//! curves ([`transfer`]) are applied by [`file`] at the file border and nowhere else.
 
 pub mod file;
 pub mod metrics;
 pub mod raster;
+pub mod transfer;
 
 pub use raster::{GreyImage, Image, RgbImage};

@@ -1,1 +1,0 @@
-//! Image files: PNG, JPEG, OpenEXR, Radiance HDR, PFM.
