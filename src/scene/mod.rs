@@ -1,14 +1,20 @@
 //! What a fit is given: mesh, cameras, photographs; their readers and the pre-flight check.
 //!
-//! [`mesh`] and [`camera`] hold the geometry, [`photo`] the pixels, [`view`](View) joins them.
+//! [`mesh`] and [`camera`] hold the geometry, [`photo`] the pixels, [`view`](View) joins them. [`read()`] makes a scene
+//! of a folder, [`doctor`] says whether a fit can work on it. Nothing here fits or renders.
 
 pub mod camera;
+pub mod doctor;
 pub mod mesh;
 pub mod photo;
+pub mod read;
+pub mod settings;
 
 pub use camera::Camera;
 pub use mesh::Mesh;
 pub use photo::{Photo, PixelState};
+pub use read::{read, read_mesh};
+pub use settings::ReadSettings;
 
 use crate::error::Finding;
 use crate::image::Image;

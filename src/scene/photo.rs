@@ -1,5 +1,6 @@
 //! The pixels of a photograph, kept as compact as they came.
 
+pub use crate::image::transfer::linear_from_srgb8;
 use crate::image::{Image, RgbImage};
 use glam::Vec3;
 use half::f16;
@@ -76,16 +77,4 @@ impl Photo {
     pub fn to_linear(&self) -> RgbImage {
         Image::from_fn(self.width(), self.height(), |row, column| self.radiance(row, column))
     }
-}
-
-/// Linear RGB of sRGB-encoded bytes (IEC 61966-2-1), by table.
-pub fn linear_from_srgb8(bytes: [u8; 3]) -> Vec3 {
-    static TABLE: std::sync::LazyLock<[f32; 256]> = std::sync::LazyLock::new(|| {
-        std::array::from_fn(|byte| {
-            let encoded = byte as f64 / 255.0;
-            let linear = if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) };
-            linear as f32
-        })
-    });
-    Vec3::from_array(bytes.map(|byte| TABLE[byte as usize]))
 }

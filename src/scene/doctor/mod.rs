@@ -1,0 +1,2 @@
+//! The pre-flight check.
+pub mod pixel_centre;

@@ -1,0 +1,237 @@
+//! A BlendedMVS folder as downloaded (Yao et al. 2020), or any folder in its layout.
+//!
+//! ```text
+//! blended_images/ or images/   00000000.jpg ...; 00000000_masked.jpg are twins with a black background
+//! cams/                        00000000_cam.txt ...; pair.txt (optional)
+//! textured_mesh/               *.obj in one or several pieces, or *.ply; a separate download
+//! masks/                       00000000.png, 255 = object (optional, not part of the download)
+//! rendered_depth_maps/         *.pfm (optional): not read, the mesh says the same
+//! ```
+
+use super::camera_file;
+use super::source::{SourceScene, SourceView};
+use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::scene::Background;
+use crate::scene::settings::{ColourEncoding, PixelCentre, Up};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Extensions of photos.
+const PHOTO_EXTENSIONS: [&str; 6] = ["jpg", "jpeg", "png", "exr", "hdr", "pfm"];
+
+/// Whether the folder has one of the parts of this layout.
+pub fn is_folder_of_this_kind(folder: &Path) -> bool {
+    folder.join("cams").is_dir() || folder.join("blended_images").is_dir()
+}
+
+/// Lists a BlendedMVS folder and reads its cameras.
+pub fn read(folder: &Path) -> Result<SourceScene> {
+    let images = ["blended_images", "images"].map(|name| folder.join(name)).into_iter().find(|path| path.is_dir());
+    let cams = Some(folder.join("cams")).filter(|path| path.is_dir());
+    let (mesh, mut findings) = find_mesh(folder)?;
+    let (Some(images), Some(cams), false) = (&images, &cams, mesh.is_empty()) else {
+        let mut missing = Vec::new();
+        if images.is_none() {
+            missing.push("the photos: blended_images/*.jpg");
+        }
+        if cams.is_none() {
+            missing.push("the cameras: cams/*_cam.txt");
+        }
+        if mesh.is_empty() {
+            missing.push("the mesh: textured_mesh/*.obj or *.ply (BlendedMVS offers it as a separate download)");
+        }
+        return Err(Error::new(ErrorKind::Missing, format!("the folder lacks {}", missing.join("; ")))
+            .at(Place::File(folder.into()))
+            .remedy("a BlendedMVS folder holds blended_images/, cams/ and textured_mesh/; a scene.toml can name the parts by hand"));
+    };
+    let views = views(images, cams, Some(&folder.join("masks")), &mut findings)?;
+    check_pairs(&cams.join("pair.txt"), &views, &mut findings);
+    if folder.join("rendered_depth_maps").is_dir() {
+        findings.push(Finding::new(
+            Severity::Note,
+            "depth-maps-ignored",
+            "rendered_depth_maps is not read: the mesh decides what is visible",
+        ));
+    }
+    Ok(SourceScene {
+        name: folder.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        folder: folder.into(),
+        mesh,
+        views,
+        up: Up::Auto,
+        pixel_centre: PixelCentre::Auto,
+        default_pixel_centre: PixelCentre::Integer,
+        background: Background::Environment,
+        encoding: ColourEncoding::Auto,
+        held_out: None,
+        has_truth: false,
+        flip_winding: false,
+        findings,
+    })
+}
+
+/// Mesh files of the folder: OBJ pieces before PLY.
+fn find_mesh(folder: &Path) -> Result<(Vec<PathBuf>, Vec<Finding>)> {
+    let mut findings = Vec::new();
+    for place in [folder.join("textured_mesh"), folder.join("mesh"), folder.to_path_buf()] {
+        let of_kind = |extension: &str| files_of(&place, &[extension]);
+        let (pieces, plys) = (of_kind("obj")?, of_kind("ply")?);
+        if !pieces.is_empty() && !plys.is_empty() {
+            findings.push(
+                Finding::new(
+                    Severity::Note,
+                    "mesh-choice",
+                    "OBJ and PLY files lie side by side: the OBJ files are read",
+                )
+                .at(Place::File(place.clone()))
+                .remedy("name the mesh in scene.toml to read another"),
+            );
+        }
+        let mesh = if pieces.is_empty() { plys } else { pieces };
+        if !mesh.is_empty() {
+            return Ok((mesh, findings));
+        }
+    }
+    Ok((Vec::new(), findings))
+}
+
+/// Files of a folder with one of these extensions, in the order of their names. A missing folder has none.
+pub fn files_of(folder: &Path, extensions: &[&str]) -> Result<Vec<PathBuf>> {
+    if !folder.is_dir() {
+        return Ok(Vec::new());
+    }
+    let entries = std::fs::read_dir(folder).map_err(|source| Error::reading(folder, source))?;
+    let mut files = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(|source| Error::reading(folder, source))?.path();
+        let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+        if extensions.contains(&extension.as_str()) && !hidden && path.is_file() {
+            files.push(path);
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// Photos of a folder by name, without `_masked` twins; and the twins by the name they belong to.
+pub fn photos_of(images: &Path) -> Result<(BTreeMap<String, PathBuf>, BTreeMap<String, PathBuf>)> {
+    let (mut photos, mut twins) = (BTreeMap::new(), BTreeMap::new());
+    for path in files_of(images, &PHOTO_EXTENSIONS)? {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        if let Some(name) = stem.strip_suffix("_masked") {
+            twins.insert(name.to_owned(), path);
+        } else if let Some(other) = photos.insert(stem.clone(), path.clone()) {
+            return Err(Error::new(
+                ErrorKind::InvalidScene,
+                format!("two photos are named '{stem}': {} is the other", other.display()),
+            )
+            .at(Place::File(path))
+            .remedy("keep one of them"));
+        }
+    }
+    if photos.is_empty() {
+        return Err(Error::new(ErrorKind::Missing, "the folder holds no photos")
+            .at(Place::File(images.into()))
+            .remedy("it must hold JPEG, PNG, EXR, HDR or PFM files"));
+    }
+    Ok((photos, twins))
+}
+
+/// Joins photos, cameras and masks by name; what stands alone becomes a finding.
+pub fn views(images: &Path, cams: &Path, masks: Option<&Path>, findings: &mut Vec<Finding>) -> Result<Vec<SourceView>> {
+    let (photos, twins) = photos_of(images)?;
+    let mut cameras = BTreeMap::new();
+    for path in files_of(cams, &["txt"])? {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        if let Some(name) = stem.strip_suffix("_cam") {
+            cameras.insert(name.to_owned(), path);
+        }
+    }
+    let mask_files = mask_files(masks)?;
+    for (name, path) in cameras.iter().filter(|(name, _)| !photos.contains_key(*name)) {
+        findings.push(
+            Finding::new(
+                Severity::Warning,
+                "camera-without-photo",
+                format!("there is no photo '{name}': the camera is left out"),
+            )
+            .at(Place::File(path.clone()))
+            .remedy("copy the photo, or delete the camera file"),
+        );
+    }
+    let mut views = Vec::new();
+    for (name, photo) in photos {
+        let Some(cam) = cameras.get(&name) else {
+            findings.push(
+                Finding::new(
+                    Severity::Warning,
+                    "photo-without-camera",
+                    format!("there is no {name}_cam.txt: the photo is left out"),
+                )
+                .at(Place::File(photo))
+                .remedy("copy the camera file, or delete the photo"),
+            );
+            continue;
+        };
+        let (camera, mut noticed) = camera_file::read_cam_txt(cam)?;
+        findings.append(&mut noticed);
+        let mask = mask_files.get(&name).or_else(|| twins.get(&name)).cloned();
+        views.push(SourceView { name, photo, mask, camera, size: None, place: Place::File(cam.clone()) });
+    }
+    if views.is_empty() {
+        return Err(Error::new(ErrorKind::Missing, "no photo has a camera")
+            .at(Place::File(cams.into()))
+            .remedy("camera files are named after photos: 00000000.jpg needs cams/00000000_cam.txt"));
+    }
+    if mask_files.is_empty() && !twins.is_empty() {
+        findings.push(
+            Finding::new(
+                Severity::Note,
+                "masks-from-twins",
+                format!("{} masks are taken from the _masked twins of the photos", twins.len()),
+            )
+            .remedy("ignore them with --masks ignore"),
+        );
+    }
+    Ok(views)
+}
+
+/// Mask files by name; a suffix `_mask` is allowed.
+pub fn mask_files(masks: Option<&Path>) -> Result<BTreeMap<String, PathBuf>> {
+    let Some(masks) = masks else { return Ok(BTreeMap::new()) };
+    let files = files_of(masks, &PHOTO_EXTENSIONS)?;
+    let name_of = |path: &Path| {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        stem.strip_suffix("_mask").map(str::to_owned).unwrap_or(stem)
+    };
+    Ok(files.into_iter().map(|path| (name_of(&path), path)).collect())
+}
+
+/// Checks `pair.txt`. Nothing depends on it, so that what is wrong with it is a finding.
+fn check_pairs(path: &Path, views: &[SourceView], findings: &mut Vec<Finding>) {
+    if !path.is_file() {
+        return;
+    }
+    let invalid = |message: String| {
+        Finding::new(Severity::Note, "pairs-invalid", message)
+            .at(Place::File(path.into()))
+            .remedy("nothing depends on it here, but it may belong to another scene")
+    };
+    match camera_file::read_pairs(path) {
+        Err(error) => findings.push(invalid(error.to_string())),
+        Ok(pairs) => {
+            let largest =
+                pairs.iter().flat_map(|(view, list)| list.iter().map(|(other, _)| *other).chain([*view])).max();
+            let highest_name = views.iter().filter_map(|view| view.name.parse::<usize>().ok()).max();
+            if let (Some(largest), Some(highest)) = (largest, highest_name)
+                && largest > highest
+            {
+                findings.push(invalid(format!("it names view {largest}, but the last photo is {highest}")));
+            }
+            if let Some((view, _)) = pairs.iter().find(|(view, list)| list.iter().any(|(other, _)| other == view)) {
+                findings.push(invalid(format!("view {view} is its own neighbour")));
+            }
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! Files that hold cameras: `*_cam.txt` and `pair.txt` of the MVSNet family, and `cameras.json`.
+
+use super::source::SourceCamera;
+use crate::error::{Error, ErrorKind, Finding, Place, Result};
+use glam::{DMat3, DVec3};
+use std::path::{Path, PathBuf};
+
+/// Words of a text file with the line of each.
+struct Words<'a> {
+    path: &'a Path,
+    words: Vec<(usize, &'a str)>,
+    next: usize,
+    last_line: usize,
+}
+
+impl<'a> Words<'a> {
+    fn new(path: &'a Path, text: &'a str) -> Self {
+        let words = text
+            .lines()
+            .enumerate()
+            .flat_map(|(number, line)| line.split_whitespace().map(move |word| (number + 1, word)));
+        Words { path, words: words.collect(), next: 0, last_line: text.lines().count().max(1) }
+    }
+
+    fn line(&self) -> usize {
+        self.words.get(self.next).map_or(self.last_line, |word| word.0)
+    }
+
+    fn malformed(&self, message: String) -> Error {
+        Error::new(ErrorKind::Malformed, message)
+            .at(Place::Line(self.path.into(), self.line()))
+            .remedy("the file is cut short or damaged: copy it again")
+    }
+
+    fn take(&mut self, what: &str) -> Result<&'a str> {
+        let word = self.words.get(self.next).ok_or_else(|| self.malformed(format!("the file ends before {what}")))?;
+        self.next += 1;
+        Ok(word.1)
+    }
+
+    fn keyword(&mut self, keyword: &str) -> Result<()> {
+        if self.words.get(self.next).is_some_and(|word| word.1 == keyword) {
+            self.next += 1;
+            return Ok(());
+        }
+        Err(self.malformed(format!("the word '{keyword}' is missing")))
+    }
+
+    fn number(&mut self, what: &str) -> Result<f64> {
+        let word = self.take(what)?;
+        self.next -= 1;
+        let value: f64 = word.parse().map_err(|_| self.malformed(format!("'{word}' is not a number of {what}")))?;
+        if !value.is_finite() {
+            return Err(Error::new(ErrorKind::NonFinite, format!("{what} holds {word}"))
+                .at(Place::Line(self.path.into(), self.line()))
+                .remedy("remove the view or export its camera again"));
+        }
+        self.next += 1;
+        Ok(value)
+    }
+
+    fn index(&mut self, what: &str) -> Result<usize> {
+        let word = self.take(what)?;
+        word.parse().map_err(|_| {
+            self.next -= 1;
+            self.malformed(format!("'{word}' is not {what}"))
+        })
+    }
+}
+
+/// Reads a camera file of BlendedMVS: `extrinsic` 4x4, `intrinsic` 3x3, and a last line of 2 or 4 numbers (depth range),
+/// which may be missing.
+///
+/// Yao et al. 2020, "BlendedMVS"; the layout is MVSNet's (Yao et al. 2018).
+pub fn read_cam_txt(path: &Path) -> Result<(SourceCamera, Vec<Finding>)> {
+    let text = read_text(path)?;
+    let mut words = Words::new(path, &text);
+    words.keyword("extrinsic")?;
+    let mut extrinsic = [0.0; 16];
+    for value in &mut extrinsic {
+        *value = words.number("the extrinsic matrix")?;
+    }
+    words.keyword("intrinsic")?;
+    let mut intrinsic = [0.0; 9];
+    for value in &mut intrinsic {
+        *value = words.number("the intrinsic matrix")?;
+    }
+    let mut depth_numbers = 0;
+    while words.next < words.words.len() {
+        words.number("the depth range")?;
+        depth_numbers += 1;
+    }
+    if !matches!(depth_numbers, 0 | 2 | 4) {
+        words.next = words.words.len() - 1;
+        return Err(words.malformed(format!("the last line holds {depth_numbers} numbers, not 2 or 4")));
+    }
+    camera_from_rows(&intrinsic, &extrinsic, &Place::File(path.into()))
+}
+
+/// A camera from row-major 3x3 intrinsics and 4x4 `camera_from_source`.
+pub fn camera_from_rows(
+    intrinsic: &[f64; 9],
+    extrinsic: &[f64; 16],
+    place: &Place,
+) -> Result<(SourceCamera, Vec<Finding>)> {
+    let rows = |row: usize| DVec3::new(extrinsic[4 * row], extrinsic[4 * row + 1], extrinsic[4 * row + 2]);
+    let rotation = DMat3::from_cols(rows(0), rows(1), rows(2)).transpose();
+    let translation = DVec3::new(extrinsic[3], extrinsic[7], extrinsic[11]);
+    let last = &extrinsic[12..];
+    if last[..3].iter().any(|value| value.abs() > 1e-6) || (last[3] - 1.0).abs() > 1e-6 {
+        return Err(Error::new(ErrorKind::InvalidScene, "the last row of the extrinsics is not 0 0 0 1")
+            .at(place.clone())
+            .remedy("the matrix may be transposed: export it row by row, camera from world"));
+    }
+    SourceCamera::new(DMat3::from_cols_array(intrinsic).transpose(), rotation, translation, place)
+}
+
+/// The best neighbours of each view: (view, [(neighbour, score)]).
+pub type Pairs = Vec<(usize, Vec<(usize, f64)>)>;
+
+/// Reads `pair.txt`: the number of views, then for each its index and `count id score id score ...`.
+pub fn read_pairs(path: &Path) -> Result<Pairs> {
+    let text = read_text(path)?;
+    let mut words = Words::new(path, &text);
+    let count = words.index("the number of views")?;
+    let mut pairs = Vec::new();
+    for _ in 0..count {
+        let view = words.index("the index of a view")?;
+        let neighbours = words.index("the number of neighbours")?;
+        let mut list = Vec::new();
+        for _ in 0..neighbours {
+            list.push((words.index("the index of a neighbour")?, words.number("the score of a neighbour")?));
+        }
+        pairs.push((view, list));
+    }
+    if words.next < words.words.len() {
+        return Err(words.malformed(format!("more follows after the {count} views")));
+    }
+    Ok(pairs)
+}
+
+/// One entry of `cameras.json`.
+pub struct JsonView {
+    /// The photo's file, as written.
+    pub file: PathBuf,
+    /// Width and height, where given.
+    pub size: Option<(usize, usize)>,
+    /// The camera.
+    pub camera: SourceCamera,
+    /// Where it is written.
+    pub place: Place,
+}
+
+#[derive(serde::Deserialize)]
+struct CamerasJson {
+    #[serde(default)]
+    convention: Option<String>,
+    views: Vec<ViewJson>,
+}
+
+#[derive(serde::Deserialize)]
+struct ViewJson {
+    file: PathBuf,
+    width: Option<usize>,
+    height: Option<usize>,
+    #[serde(rename = "K")]
+    k: [[f64; 3]; 3],
+    w2c: [[f64; 4]; 4],
+    #[serde(default)]
+    distortion: Vec<f64>,
+}
+
+/// Reads `cameras.json`: `{"convention":"opencv","views":[{"file","width","height","K":3x3,"w2c":4x4}]}`.
+pub fn read_cameras_json(path: &Path) -> Result<(Vec<JsonView>, Vec<Finding>)> {
+    let text = read_text(path)?;
+    let json: CamerasJson = serde_json::from_str(&text).map_err(|error| {
+        Error::new(ErrorKind::Malformed, format!("not a list of cameras: {error}"))
+            .at(Place::Line(path.into(), error.line().max(1)))
+            .remedy("give {\"convention\":\"opencv\",\"views\":[{\"file\",\"width\",\"height\",\"K\",\"w2c\"}]}; NaN is not a number of JSON")
+    })?;
+    if json.convention.as_deref().is_some_and(|convention| convention != "opencv") {
+        return Err(Error::new(
+            ErrorKind::Unsupported,
+            format!("the camera convention is '{}'", json.convention.unwrap_or_default()),
+        )
+        .at(Place::File(path.into()))
+        .remedy("export cameras as opencv: x right, y down, z forward"));
+    }
+    let mut views = Vec::new();
+    let mut findings = Vec::new();
+    for view in json.views {
+        let name = view.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let place = Place::View(format!("{name} of {}", path.display()));
+        if view.distortion.iter().any(|&coefficient| coefficient != 0.0) {
+            return Err(Error::new(ErrorKind::Unsupported, "the camera has lens distortion")
+                .at(place)
+                .remedy("undistort the photos first (COLMAP: image_undistorter)"));
+        }
+        let mut extrinsic = [0.0; 16];
+        extrinsic.copy_from_slice(view.w2c.as_flattened());
+        let mut intrinsic = [0.0; 9];
+        intrinsic.copy_from_slice(view.k.as_flattened());
+        let (camera, mut noticed) = camera_from_rows(&intrinsic, &extrinsic, &place)?;
+        findings.append(&mut noticed);
+        views.push(JsonView { file: view.file, size: view.width.zip(view.height), camera, place });
+    }
+    Ok((views, findings))
+}
+
+/// Reads a text file of at most 256 MB.
+pub fn read_text(path: &Path) -> Result<String> {
+    let size = std::fs::metadata(path).map_err(|source| Error::reading(path, source))?.len();
+    if size > 1 << 28 {
+        return Err(Error::new(ErrorKind::TooLarge, format!("a text file of {size} bytes"))
+            .at(Place::File(path.into()))
+            .remedy("this is not the file it should be: check the path"));
+    }
+    let bytes = std::fs::read(path).map_err(|source| Error::reading(path, source))?;
+    String::from_utf8(bytes).map_err(|error| {
+        Error::new(ErrorKind::Malformed, "the file is not text")
+            .at(Place::Byte(path.into(), error.utf8_error().valid_up_to() as u64))
+            .remedy("the file is damaged: copy it again")
+    })
+}

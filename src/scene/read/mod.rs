@@ -1,0 +1,226 @@
+//! Readers: from a folder or a manifest to a [`Scene`].
+//!
+//! [`read`] is the door. It finds out the kind of the scene ([`exchange`], [`blended_mvs`], [`manifest`]); each kind
+//! only lists files and reads cameras into a [`source::SourceScene`]. What follows is the same for all: mesh
+//! ([`mesh_file`], with `obj` and `ply`), up axis and origin ([`world`]), photos and masks ([`photos`]), pixel centres.
+//!
+//! What it refuses to do: guess. What is missing or contradictory is an error with place and remedy, or a finding; what
+//! was assumed is a finding. Whether the parts fit together is judged by [`doctor`](crate::scene::doctor), not here.
+
+pub mod blended_mvs;
+pub mod camera_file;
+pub mod exchange;
+pub mod manifest;
+pub mod mesh_file;
+mod obj;
+pub mod photos;
+mod ply;
+pub mod source;
+pub mod world;
+
+pub use mesh_file::read_mesh;
+
+use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::scene::doctor::pixel_centre;
+use crate::scene::settings::{BackgroundChoice, ColourEncoding, MaskUse, PixelCentre, ReadSettings, Up};
+use crate::scene::{Background, Scene, View};
+use source::{SourceScene, SourceView};
+use std::path::{Path, PathBuf};
+
+/// With fewer views than this none is held out: each is needed.
+const FEWEST_VIEWS_TO_HOLD_OUT: usize = 4;
+
+/// Reads a scene: a folder with `scene.toml`, an exchange folder, a BlendedMVS folder, or a manifest file itself.
+///
+/// # Errors
+/// Anything missing, damaged or contradictory, with file, line or byte and a remedy. Geometry or photos that are valid
+/// but useless are not errors here: [`doctor::check`](crate::scene::doctor::check) names them.
+pub fn read(path: &Path, settings: &ReadSettings) -> Result<Scene> {
+    settings.validate()?;
+    assemble(find(path)?, settings)
+}
+
+/// Finds out the kind of the scene and lists it.
+fn find(path: &Path) -> Result<SourceScene> {
+    if path.is_file() {
+        if path.extension().is_some_and(|extension| extension == "toml") {
+            return manifest::read(path);
+        }
+        return Err(Error::new(ErrorKind::Unsupported, "a scene is a folder or a scene.toml")
+            .at(Place::File(path.into()))
+            .remedy("give the folder that holds the photos and the mesh"));
+    }
+    if !path.is_dir() {
+        return Err(Error::new(ErrorKind::Missing, "there is no such folder")
+            .at(Place::File(path.into()))
+            .remedy("check the path"));
+    }
+    // Downloads nest a project in folders of the same name: walk down while there is nothing but one folder.
+    let mut folder = path.to_path_buf();
+    for _ in 0..4 {
+        if folder.join(manifest::FILE_NAME).is_file() {
+            return manifest::read(&folder.join(manifest::FILE_NAME));
+        }
+        if exchange::is_folder_of_this_kind(&folder) {
+            return exchange::read(&folder);
+        }
+        if blended_mvs::is_folder_of_this_kind(&folder) {
+            return blended_mvs::read(&folder);
+        }
+        match only_subfolder(&folder)? {
+            Some(inner) => folder = inner,
+            None => break,
+        }
+    }
+    Err(Error::new(ErrorKind::Unsupported, "the folder is not a scene of a known kind")
+        .at(Place::File(path.into()))
+        .remedy("it must hold scene.toml, or cameras.json (exchange folder), or blended_images/, cams/ and textured_mesh/ (BlendedMVS)"))
+}
+
+fn only_subfolder(folder: &Path) -> Result<Option<PathBuf>> {
+    let entries = std::fs::read_dir(folder).map_err(|source| Error::reading(folder, source))?;
+    let mut folders: Vec<PathBuf> =
+        entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.is_dir()).collect();
+    Ok(if folders.len() == 1 { folders.pop() } else { None })
+}
+
+/// Turns, decodes and joins what a reader listed.
+fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
+    let SourceScene { name, folder, mesh, views, mut findings, .. } = source;
+    let views = choose_views(views, settings.max_views, &folder)?;
+
+    // The mesh, turned so that +y is up.
+    let mut source_mesh = mesh_file::read_pieces(&mesh)?;
+    if source.flip_winding {
+        source_mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+        source_mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
+    }
+    let cameras: Vec<_> = views.iter().map(|view| view.camera).collect();
+    let asked_up = if settings.up == Up::Auto { source.up } else { settings.up };
+    let (up, mut noticed) = world::up_in_source(asked_up, &cameras)?;
+    findings.append(&mut noticed);
+    let world_from_source = world::world_from_source(up, source_mesh.bounds());
+    let (mesh, mut noticed) = source_mesh.into_world(&world_from_source);
+    findings.append(&mut noticed);
+    mesh.validate()?;
+
+    // The photos.
+    let encoding = if settings.encoding == ColourEncoding::Auto { source.encoding } else { settings.encoding };
+    let loaded = photos::load_all(&views, encoding, settings)?;
+    if settings.masks == MaskUse::Use {
+        let without = views.iter().filter(|view| view.mask.is_none()).count();
+        if without > 0 && without < views.len() {
+            findings.push(
+                Finding::new(
+                    Severity::Warning,
+                    "masks-incomplete",
+                    format!("{without} of {} views have no mask: rays decide there", views.len()),
+                )
+                .remedy("add the missing masks, or ignore masks"),
+            );
+        }
+    }
+    let asked_centre =
+        if settings.pixel_centre == PixelCentre::Auto { source.pixel_centre } else { settings.pixel_centre };
+    let centre = if asked_centre == PixelCentre::Auto { source.default_pixel_centre } else { asked_centre };
+    let mut joined = Vec::with_capacity(views.len());
+    for (view, photo) in views.into_iter().zip(loaded) {
+        findings.extend(photo.findings);
+        let camera = view.camera.in_world(&world_from_source, photo.file_size, centre.shift_pixels());
+        joined.push(View {
+            name: view.name,
+            camera: if settings.shrink == 1 { camera } else { camera.shrunk(settings.shrink) },
+            photo: photo.photo,
+            states: photo.states,
+            held_out: false,
+        });
+    }
+    hold_out(&mut joined, source.held_out.as_deref(), settings.hold_out_every, &mut findings)?;
+
+    let mut scene = Scene {
+        name,
+        folder: Some(folder.clone()),
+        mesh,
+        views: joined,
+        world_from_source,
+        background: match settings.background {
+            BackgroundChoice::Auto => source.background,
+            BackgroundChoice::Environment => Background::Environment,
+            BackgroundChoice::Black => Background::Black,
+        },
+        truth: None,
+        findings,
+    };
+    if source.has_truth {
+        let mut noticed = Vec::new();
+        scene.truth = exchange::read_truth(&folder, &scene.views, settings.shrink, &mut noticed)?;
+        scene.findings.append(&mut noticed);
+    }
+    if asked_centre == PixelCentre::Auto {
+        pixel_centre::settle(&mut scene, centre, settings.shrink);
+    }
+    Ok(scene)
+}
+
+/// Sorts the views by name, refuses names that occur twice and takes at most `most` of them, spread evenly.
+fn choose_views(mut views: Vec<SourceView>, most: usize, folder: &Path) -> Result<Vec<SourceView>> {
+    views.sort_by(|a, b| a.name.cmp(&b.name));
+    if let Some(pair) = views.windows(2).find(|pair| pair[0].name == pair[1].name) {
+        return Err(Error::new(ErrorKind::InvalidScene, format!("two views are named '{}'", pair[0].name))
+            .at(pair[1].place.clone())
+            .remedy("photos need different names, whatever their folder or extension"));
+    }
+    if views.is_empty() {
+        return Err(Error::new(ErrorKind::InvalidScene, "the scene has no views")
+            .at(Place::File(folder.into()))
+            .remedy("add photos and their cameras"));
+    }
+    if most > 0 && most < views.len() {
+        let count = views.len();
+        let mut index = 0;
+        views.retain(|_| {
+            // View i stays when it is the first of its share: floor(i m / n) steps up there.
+            let stays = index == 0 || index * most / count != (index - 1) * most / count;
+            index += 1;
+            stays
+        });
+    }
+    Ok(views)
+}
+
+fn hold_out(views: &mut [View], named: Option<&[String]>, every: usize, findings: &mut Vec<Finding>) -> Result<()> {
+    if let Some(names) = named {
+        for name in names {
+            let Some(view) = views.iter_mut().find(|view| view.name == *name) else {
+                findings.push(
+                    Finding::new(
+                        Severity::Warning,
+                        "held-out-unknown",
+                        format!("there is no view '{name}' to hold out"),
+                    )
+                    .remedy("held_out names photos without their extension"),
+                );
+                continue;
+            };
+            view.held_out = true;
+        }
+        if views.iter().all(|view| view.held_out) {
+            return Err(Error::new(ErrorKind::InvalidScene, "every view is held out: none is left to fit")
+                .remedy("name fewer views in held_out"));
+        }
+        return Ok(());
+    }
+    if every == 0 {
+        return Ok(());
+    }
+    if views.len() < FEWEST_VIEWS_TO_HOLD_OUT || every == 1 {
+        findings.push(Finding::new(
+            Severity::Note,
+            "none-held-out",
+            format!("no view is held out of {}: the fit cannot be judged on a view it has not seen", views.len()),
+        ));
+        return Ok(());
+    }
+    views.iter_mut().step_by(every).for_each(|view| view.held_out = true);
+    Ok(())
+}
