@@ -14,6 +14,7 @@ pub struct LossRow {
     /// Name of the stage, such as `diffuse` or `all maps`.
     pub stage: String,
     /// Seconds of work since the start of the run, pauses left out.
+    #[serde(deserialize_with = "crate::export::loss_log::number_or_nan")]
     pub seconds: f64,
     /// The whole loss that was stepped on.
     #[serde(deserialize_with = "crate::export::loss_log::number_or_nan")]

@@ -11,7 +11,8 @@ pub mod convention;
 pub mod loss_log;
 pub mod obj;
 pub mod run_folder;
-mod standin;
+#[allow(missing_docs)]
+pub mod standin;
 
 pub use loss_log::LossRow;
 pub use run_folder::{RunFolder, RunResult};

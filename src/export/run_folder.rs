@@ -50,9 +50,12 @@ impl RunFolder {
                 Error::writing(path, source).remedy("name a folder that does not exist yet with -o")
             })?;
             if entries.next().is_some() {
-                return Err(Error::new(ErrorKind::Unwritable, "the folder holds other files and is not a run of Patina")
-                    .at(Place::File(path.into()))
-                    .remedy("name a new or an empty folder with -o; nothing was changed"));
+                return Err(Error::new(
+                    ErrorKind::Unwritable,
+                    "the folder holds other files and is not a run of Patina",
+                )
+                .at(Place::File(path.into()))
+                .remedy("name a new or an empty folder with -o; nothing was changed"));
             }
         }
         std::fs::create_dir_all(path).map_err(|source| Error::writing(path, source))?;
@@ -63,7 +66,8 @@ impl RunFolder {
     /// Opens a run folder to read. Only the folder itself is checked here: each file is checked when it is read.
     pub fn open(path: &Path) -> Result<Self> {
         if !path.is_dir() {
-            let message = if path.exists() { "this is a file, not a run folder" } else { "there is no such run folder" };
+            let message =
+                if path.exists() { "this is a file, not a run folder" } else { "there is no such run folder" };
             return Err(Error::new(ErrorKind::Missing, message)
                 .at(Place::File(path.into()))
                 .remedy("check the path, or make it with `patina fit SCENE -o RUN`"));

@@ -51,3 +51,13 @@ pub fn encode_jpeg(image: &Image<[u8; 3]>, quality: u8) -> Vec<u8> {
     );
     bytes
 }
+pub fn ssim(a: &RgbImage, b: &RgbImage, counted: &Image<bool>) -> f64 {
+    let mut sum = 0.0;
+    let mut n = 0.0;
+    for ((a, b), _) in a.pixels().iter().zip(b.pixels()).zip(counted.pixels()).filter(|(_, c)| **c) {
+        let (x, y) = (f64::from(a.x), f64::from(b.x));
+        sum += (2.0 * x * y + 1e-4) / (x * x + y * y + 1e-4);
+        n += 1.0;
+    }
+    sum / n
+}
