@@ -1,1 +1,16 @@
-//! What can be said about a fit: coverage, comparison, report.
+//! What can be said about a fit: scores, tables over seeds, and the report.
+//!
+//! Read [`scores`] first: how a picture is compared with a photograph, and which pixels count. [`truth`] compares maps
+//! and light with a known truth, [`report`] makes the one page that shows it all, [`study`] gathers numbers over seeds.
+//! Every score comes twice, raw and scale-aligned, because reflectance times c with light over c is the same picture.
+//!
+//! What this folder refuses to do: it renders nothing and changes no map; pictures are handed to it.
+
+pub mod memory;
+pub mod plot;
+pub mod report;
+pub mod scores;
+pub mod study;
+pub mod truth;
+
+pub use report::{ReportData, ReportImages, write_report};

@@ -1,0 +1,282 @@
+//! The run folder: everything a fit leaves behind, under fixed names.
+//!
+//! | file | what | made by |
+//! |---|---|---|
+//! | `convention.txt` | what the numbers mean; marks the folder as a run | [`RunFolder::create`] |
+//! | `settings.toml` | settings of the run | `patina fit`, at its start |
+//! | `checkpoint` | state to resume from | `patina fit`, while it runs |
+//! | `diffuse.exr specular.exr roughness.exr seen.exr env.exr mesh.obj` | the result | `patina fit`, at its end |
+//! | `loss.csv` | the loss of every step | `patina fit` |
+//! | `report.json report.html` | scores and pictures | `patina fit`, `patina compare` |
+
+use super::{LossRow, convention, loss_log, obj, standin as file};
+use crate::error::{Error, ErrorKind, Place, Result};
+use crate::image::{GreyImage, Image, RgbImage};
+use crate::light::Environment;
+use crate::material::MaterialMaps;
+use crate::scene::Mesh;
+use std::path::{Path, PathBuf};
+
+/// What a fit found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunResult {
+    /// The maps, on the atlas of `mesh`.
+    pub maps: MaterialMaps,
+    /// The light of the photographs.
+    pub environment: Environment,
+    /// The surface with atlas coordinates.
+    pub mesh: Mesh,
+    /// In how many photographs a texel was seen, of the maps' size; 0: never.
+    pub times_seen: GreyImage,
+}
+
+/// A folder that holds a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunFolder {
+    path: PathBuf,
+}
+
+impl RunFolder {
+    /// Makes a run folder, or takes one that is there already. Nothing in it is deleted; a file is replaced when its
+    /// successor is complete.
+    ///
+    /// # Errors
+    /// `Unwritable` when the folder cannot be made, or when it holds other things than a run: a scene's own `mesh.obj`
+    /// must not be overwritten.
+    pub fn create(path: &Path) -> Result<Self> {
+        let folder = RunFolder { path: path.into() };
+        if path.exists() && !folder.is_run() {
+            let mut entries = std::fs::read_dir(path).map_err(|source| {
+                Error::writing(path, source).remedy("name a folder that does not exist yet with -o")
+            })?;
+            if entries.next().is_some() {
+                return Err(Error::new(
+                    ErrorKind::Unwritable,
+                    "the folder holds other files and is not a run of Patina",
+                )
+                .at(Place::File(path.into()))
+                .remedy("name a new or an empty folder with -o; nothing was changed"));
+            }
+        }
+        std::fs::create_dir_all(path).map_err(|source| Error::writing(path, source))?;
+        crate::files::write_bytes(&folder.file("convention.txt"), convention::SHEET.as_bytes())?;
+        Ok(folder)
+    }
+
+    /// Opens a run folder to read. Only the folder itself is checked here: each file is checked when it is read.
+    pub fn open(path: &Path) -> Result<Self> {
+        if !path.is_dir() {
+            let message =
+                if path.exists() { "this is a file, not a run folder" } else { "there is no such run folder" };
+            return Err(Error::new(ErrorKind::Missing, message)
+                .at(Place::File(path.into()))
+                .remedy("check the path, or make it with `patina fit SCENE -o RUN`"));
+        }
+        Ok(RunFolder { path: path.into() })
+    }
+
+    /// Whether the folder bears the mark of a run.
+    pub fn is_run(&self) -> bool {
+        std::fs::read(self.file("convention.txt"))
+            .is_ok_and(|bytes| bytes.starts_with(convention::FIRST_LINE.as_bytes()))
+    }
+
+    /// Whether every file of a [`RunResult`] is there.
+    pub fn has_result(&self) -> bool {
+        RESULT_FILES.iter().all(|name| self.file(name).is_file())
+    }
+
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// A file of the folder by its name.
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+
+    /// Where the checkpoint lies; its content is the fit's own.
+    pub fn checkpoint_path(&self) -> PathBuf {
+        self.file("checkpoint")
+    }
+
+    /// Where the HTML report lies.
+    pub fn report_html_path(&self) -> PathBuf {
+        self.file("report.html")
+    }
+
+    /// Writes the result, checked first: a result that would not be read back is not written.
+    pub fn write_result(&self, result: &RunResult) -> Result<()> {
+        result.validate(&self.path)?;
+        file::write_exr_rgb(&self.file("diffuse.exr"), &result.maps.diffuse)?;
+        file::write_exr_rgb(&self.file("specular.exr"), &result.maps.specular)?;
+        file::write_exr_grey(&self.file("roughness.exr"), &result.maps.roughness)?;
+        file::write_exr_grey(&self.file("seen.exr"), &result.times_seen)?;
+        file::write_exr_rgb(&self.file("env.exr"), &result.environment.radiance)?;
+        obj::write(&self.file("mesh.obj"), &result.mesh)
+    }
+
+    /// Reads the result. Before anything is read, all missing files are named in one error.
+    pub fn read_result(&self) -> Result<RunResult> {
+        let missing: Vec<&str> = RESULT_FILES.into_iter().filter(|name| !self.file(name).is_file()).collect();
+        if let Some(first) = missing.first() {
+            let remedy = if self.checkpoint_path().is_file() {
+                "the fit has not ended: go on with `patina resume RUN`"
+            } else {
+                "make the run again with `patina fit SCENE -o RUN`"
+            };
+            let message = format!("the run has no {}", missing.join(", no "));
+            return Err(Error::new(ErrorKind::Missing, message).at(Place::File(self.file(first))).remedy(remedy));
+        }
+        let result = RunResult {
+            maps: MaterialMaps {
+                diffuse: self.read_rgb("diffuse.exr")?,
+                specular: self.read_rgb("specular.exr")?,
+                roughness: self.read_grey("roughness.exr")?,
+            },
+            environment: Environment { radiance: self.read_rgb("env.exr")? },
+            mesh: obj::read(&self.file("mesh.obj"))?,
+            times_seen: self.read_grey("seen.exr")?,
+        };
+        result.validate(&self.path)?;
+        Ok(result)
+    }
+
+    /// Writes `loss.csv`.
+    pub fn write_loss(&self, rows: &[LossRow]) -> Result<()> {
+        loss_log::write(&self.file("loss.csv"), rows)
+    }
+
+    /// Reads `loss.csv`.
+    pub fn read_loss(&self) -> Result<Vec<LossRow>> {
+        loss_log::read(&self.file("loss.csv")).map_err(|error| made_by(error, "patina fit SCENE -o RUN"))
+    }
+
+    /// Writes `settings.toml`.
+    pub fn write_settings<T: serde::Serialize>(&self, settings: &T) -> Result<()> {
+        let path = self.file("settings.toml");
+        let text = toml::to_string_pretty(settings).map_err(|source| {
+            Error::new(ErrorKind::Internal, format!("settings cannot be written as TOML: {source}"))
+                .at(Place::File(path.clone()))
+        })?;
+        crate::files::write_bytes(&path, text.as_bytes())
+    }
+
+    /// Reads `settings.toml`. An error names the line.
+    pub fn read_settings<T: serde::de::DeserializeOwned>(&self) -> Result<T> {
+        let path = self.file("settings.toml");
+        let text = self.read_text("settings.toml", "patina fit SCENE -o RUN")?;
+        toml::from_str(&text).map_err(|source| {
+            let line = source.span().map_or(1, |span| 1 + text[..span.start.min(text.len())].matches('\n').count());
+            Error::new(ErrorKind::InvalidSetting, source.message().replace('\n', " "))
+                .at(Place::Line(path, line))
+                .remedy("mend the line, or delete it to take the default")
+        })
+    }
+
+    /// Writes `report.json`. A number that is not finite becomes `null`.
+    pub fn write_report_json<T: serde::Serialize>(&self, report: &T) -> Result<()> {
+        let path = self.file("report.json");
+        let mut text = serde_json::to_string_pretty(report).map_err(|source| {
+            Error::new(ErrorKind::Internal, format!("the report cannot be written as JSON: {source}"))
+                .at(Place::File(path.clone()))
+        })?;
+        text.push('\n');
+        crate::files::write_bytes(&path, text.as_bytes())
+    }
+
+    /// Reads `report.json`. An error names the line.
+    pub fn read_report_json<T: serde::de::DeserializeOwned>(&self) -> Result<T> {
+        let text = self.read_text("report.json", "patina compare RUN SCENE")?;
+        serde_json::from_str(&text).map_err(|source| {
+            Error::new(ErrorKind::Malformed, source.to_string())
+                .at(Place::Line(self.file("report.json"), source.line()))
+                .remedy("make it again with `patina compare RUN SCENE`")
+        })
+    }
+
+    fn read_text(&self, name: &str, command: &str) -> Result<String> {
+        let path = self.file(name);
+        std::fs::read_to_string(&path).map_err(|source| made_by(Error::reading(&path, source), command))
+    }
+
+    fn read_rgb(&self, name: &str) -> Result<RgbImage> {
+        file::read_rgb(&self.file(name)).map_err(|error| made_by(error, "patina fit SCENE -o RUN"))
+    }
+
+    fn read_grey(&self, name: &str) -> Result<GreyImage> {
+        file::read_grey(&self.file(name)).map_err(|error| made_by(error, "patina fit SCENE -o RUN"))
+    }
+}
+
+const RESULT_FILES: [&str; 6] = ["diffuse.exr", "specular.exr", "roughness.exr", "seen.exr", "env.exr", "mesh.obj"];
+
+/// The same error with the command that makes the file as its remedy, where the file is missing or damaged.
+fn made_by(error: Error, command: &str) -> Error {
+    if !matches!(error.kind(), ErrorKind::Missing | ErrorKind::Malformed) {
+        return error;
+    }
+    let verb = if error.kind() == ErrorKind::Missing { "make it" } else { "make it again" };
+    Error::new(error.kind(), error.message()).at(error.place().clone()).remedy(format!("{verb} with `{command}`"))
+}
+
+impl RunResult {
+    /// Writes the result into a run folder: [`RunFolder::write_result`].
+    pub fn write(&self, folder: &RunFolder) -> Result<()> {
+        folder.write_result(self)
+    }
+
+    /// Reads the result of a run folder: [`RunFolder::read_result`].
+    pub fn read(folder: &RunFolder) -> Result<Self> {
+        folder.read_result()
+    }
+
+    /// Checks that the parts belong together and that every number is finite.
+    fn validate(&self, folder: &Path) -> Result<()> {
+        let diffuse = &self.maps.diffuse;
+        let size = (diffuse.width(), diffuse.height());
+        if size.0 == 0 || size.1 == 0 {
+            return Err(Error::new(ErrorKind::Malformed, "the map has no texels")
+                .at(Place::File(folder.join("diffuse.exr")))
+                .remedy("make the run again with `patina fit SCENE -o RUN`"));
+        }
+        let specular = &self.maps.specular;
+        let (roughness, seen) = (&self.maps.roughness, &self.times_seen);
+        for (name, width, height) in [
+            ("specular.exr", specular.width(), specular.height()),
+            ("roughness.exr", roughness.width(), roughness.height()),
+            ("seen.exr", seen.width(), seen.height()),
+        ] {
+            if (width, height) != size {
+                let message = format!("the map is {width} x {height}, diffuse.exr is {} x {}", size.0, size.1);
+                return Err(Error::new(ErrorKind::Malformed, message)
+                    .at(Place::File(folder.join(name)))
+                    .remedy("the files are of different runs: make them again with `patina fit SCENE -o RUN`"));
+            }
+        }
+        check_finite(folder, "diffuse.exr", diffuse, |p| p.is_finite())?;
+        check_finite(folder, "specular.exr", specular, |p| p.is_finite())?;
+        check_finite(folder, "roughness.exr", roughness, |p| p.is_finite())?;
+        check_finite(folder, "seen.exr", seen, |p| p.is_finite())?;
+        check_finite(folder, "env.exr", &self.environment.radiance, |p| p.is_finite() && p.min_element() >= 0.0)
+    }
+}
+
+fn check_finite<T: std::fmt::Debug>(
+    folder: &Path,
+    name: &str,
+    image: &Image<T>,
+    is_valid: impl Fn(&T) -> bool,
+) -> Result<()> {
+    match image.pixels().iter().position(|pixel| !is_valid(pixel)) {
+        None => Ok(()),
+        Some(index) => {
+            let (row, column) = (index / image.width(), index % image.width());
+            let message = format!("texel row {row} column {column} is {:?}", image.pixels()[index]);
+            Err(Error::new(ErrorKind::NonFinite, message)
+                .at(Place::File(folder.join(name)))
+                .remedy("the file is damaged: make it again with `patina fit SCENE -o RUN`"))
+        }
+    }
+}

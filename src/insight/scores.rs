@@ -1,0 +1,334 @@
+//! How a picture is compared with a photograph.
+//!
+//! A pixel counts when the mask and the rays say surface, it is not clipped, and both sides are finite: background and
+//! clipped pixels would reward or punish what a fit cannot know. RMSE is taken on linear radiance; PSNR and SSIM on
+//! sRGB-encoded values clamped to [0, 1], as they are printed elsewhere. The scale-aligned twins multiply the picture,
+//! channel by channel, by the factor that brings it nearest to the photograph in linear least squares.
+
+use crate::error::{Error, ErrorKind, Result};
+use crate::export::standin as metrics;
+use crate::image::{Image, RgbImage};
+use crate::scene::PixelState;
+use glam::Vec3;
+
+/// Scores of one picture. NaN when no pixel counts; PSNR is infinite for equal pictures.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct PictureScore {
+    /// Root of the mean squared difference of linear radiance, over pixels and channels.
+    #[serde(deserialize_with = "crate::export::loss_log::number_or_nan")]
+    pub rmse_linear: f64,
+    /// `-10 log10(mean squared difference)` of sRGB-encoded values in [0, 1], in decibels.
+    #[serde(deserialize_with = "crate::export::loss_log::number_or_nan")]
+    pub psnr_srgb_db: f64,
+    /// Structural similarity (Wang et al. 2004) of sRGB-encoded values, mean over counted pixels; 1 is equal.
+    #[serde(deserialize_with = "crate::export::loss_log::number_or_nan")]
+    pub ssim_srgb: f64,
+}
+
+impl PictureScore {
+    /// The score of nothing.
+    pub const NONE: PictureScore = PictureScore { rmse_linear: f64::NAN, psnr_srgb_db: f64::NAN, ssim_srgb: f64::NAN };
+}
+
+/// Sums that give the best scale of one picture, of many together, and the error after it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct AlignmentSums {
+    /// Number of pixels that count.
+    pub pixels: u64,
+    /// Sum of squares of the photograph, per channel.
+    pub photo_squared: [f64; 3],
+    /// Sum of squares of the picture, per channel.
+    pub picture_squared: [f64; 3],
+    /// Sum of products, per channel.
+    pub product: [f64; 3],
+    /// Sum of squared differences over all channels, before alignment.
+    pub squared_difference: f64,
+}
+
+impl AlignmentSums {
+    /// The sums over the counted pixels of one picture.
+    pub fn of(photo: &RgbImage, picture: &RgbImage, counted: &Image<bool>) -> Self {
+        let mut sums = AlignmentSums::default();
+        for ((photo, picture), counted) in photo.pixels().iter().zip(picture.pixels()).zip(counted.pixels()) {
+            if !counted {
+                continue;
+            }
+            sums.pixels += 1;
+            let (photo, picture) = (photo.as_dvec3().to_array(), picture.as_dvec3().to_array());
+            for channel in 0..3 {
+                let (y, x) = (photo[channel], picture[channel]);
+                sums.photo_squared[channel] += y * y;
+                sums.picture_squared[channel] += x * x;
+                sums.product[channel] += x * y;
+                sums.squared_difference += (x - y) * (x - y);
+            }
+        }
+        sums
+    }
+
+    /// Adds the sums of another picture.
+    pub fn add(&mut self, other: &AlignmentSums) {
+        self.pixels += other.pixels;
+        self.squared_difference += other.squared_difference;
+        for channel in 0..3 {
+            self.photo_squared[channel] += other.photo_squared[channel];
+            self.picture_squared[channel] += other.picture_squared[channel];
+            self.product[channel] += other.product[channel];
+        }
+    }
+
+    /// The factor per channel that brings the pictures nearest to the photographs: `sum xy / sum xx`.
+    /// 1 for a channel that is black or points the other way.
+    pub fn scale(&self) -> [f64; 3] {
+        std::array::from_fn(|channel| {
+            let scale = self.product[channel] / self.picture_squared[channel];
+            if scale.is_finite() && scale > 0.0 { scale } else { 1.0 }
+        })
+    }
+
+    /// Linear RMSE before alignment; NaN when no pixel counts.
+    pub fn rmse(&self) -> f64 {
+        (self.squared_difference / (3 * self.pixels) as f64).sqrt()
+    }
+
+    /// Linear RMSE after multiplying the pictures by `scale`; NaN when no pixel counts.
+    pub fn rmse_at(&self, scale: [f64; 3]) -> f64 {
+        let sum: f64 = (0..3)
+            .map(|c| {
+                let s = scale[c];
+                (self.photo_squared[c] - 2.0 * s * self.product[c] + s * s * self.picture_squared[c]).max(0.0)
+            })
+            .sum();
+        (sum / (3 * self.pixels) as f64).sqrt()
+    }
+}
+
+/// What is found on one view.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ViewScores {
+    /// As rendered.
+    pub raw: PictureScore,
+    /// After multiplying the picture by `scale`.
+    pub aligned: PictureScore,
+    /// The factor per channel of `aligned`: the best one of this view alone.
+    pub scale: [f64; 3],
+    /// Share in [0, 1] of the surface pixels that are clipped, and so left out.
+    #[serde(deserialize_with = "crate::export::loss_log::number_or_nan")]
+    pub clipped_share: f64,
+    /// Surface pixels left out because the picture or the photograph is not finite there.
+    pub non_finite_pixels: u64,
+    /// The sums behind the RMSE, to score many views together.
+    pub sums: AlignmentSums,
+}
+
+/// Which pixels count: surface by the mask and by the rays, not clipped. Without `coverage` the mask alone decides.
+pub fn counted_pixels(states: &Image<PixelState>, coverage: Option<&Image<bool>>) -> Image<bool> {
+    Image::from_fn(states.width(), states.height(), |row, column| {
+        let state = states[(row, column)];
+        state.is_surface() && !state.is_clipped() && coverage.is_none_or(|coverage| coverage[(row, column)])
+    })
+}
+
+/// Scores a picture against a photograph, both linear.
+///
+/// `coverage` says where rays hit the surface. `exposure_stops` multiplies both sides by `2^stops` before sRGB encoding
+/// (PSNR, SSIM): 0 for 8-bit photographs.
+///
+/// # Errors
+/// `InvalidScene` when the sizes differ.
+pub fn score_view(
+    photo: &RgbImage,
+    picture: &RgbImage,
+    states: &Image<PixelState>,
+    coverage: Option<&Image<bool>>,
+    exposure_stops: f32,
+) -> Result<ViewScores> {
+    let size = (photo.width(), photo.height());
+    let sizes = [
+        ("picture", picture.width(), picture.height()),
+        ("pixel states", states.width(), states.height()),
+        ("coverage", coverage.map_or(size.0, Image::width), coverage.map_or(size.1, Image::height)),
+    ];
+    for (name, width, height) in sizes {
+        if (width, height) != size {
+            let message = format!("the {name} is {width} x {height}, the photograph {} x {}", size.0, size.1);
+            return Err(Error::new(ErrorKind::InvalidScene, message).remedy("render at the size of the photograph"));
+        }
+    }
+    let mut counted = counted_pixels(states, coverage);
+    let mut non_finite_pixels = 0;
+    for (index, counted) in counted.pixels_mut().iter_mut().enumerate() {
+        if *counted && !(photo.pixels()[index].is_finite() && picture.pixels()[index].is_finite()) {
+            *counted = false;
+            non_finite_pixels += 1;
+        }
+    }
+    let on_surface =
+        |index: usize| states.pixels()[index].is_surface() && coverage.is_none_or(|coverage| coverage.pixels()[index]);
+    let surface = (0..states.pixels().len()).filter(|&index| on_surface(index)).count();
+    let clipped = (0..states.pixels().len()).filter(|&i| on_surface(i) && states.pixels()[i].is_clipped()).count();
+
+    let sums = AlignmentSums::of(photo, picture, &counted);
+    let scale = sums.scale();
+    let aligned_picture = scaled(picture, scale);
+    let gain = exposure_stops.exp2();
+    let encoded_photo = encoded(photo, gain);
+    let encoded_score = |rmse_linear: f64, picture: &RgbImage| {
+        if sums.pixels == 0 {
+            return PictureScore::NONE;
+        }
+        let encoded_picture = encoded(picture, gain);
+        let rmse = AlignmentSums::of(&encoded_photo, &encoded_picture, &counted).rmse();
+        PictureScore {
+            rmse_linear,
+            psnr_srgb_db: -20.0 * rmse.log10(),
+            ssim_srgb: metrics::ssim(&encoded_photo, &encoded_picture, &counted),
+        }
+    };
+    Ok(ViewScores {
+        raw: encoded_score(sums.rmse(), picture),
+        aligned: encoded_score(AlignmentSums::of(photo, &aligned_picture, &counted).rmse(), &aligned_picture),
+        scale,
+        clipped_share: clipped as f64 / surface as f64,
+        non_finite_pixels,
+        sums,
+    })
+}
+
+/// The picture times a factor per channel.
+pub fn scaled(picture: &RgbImage, scale: [f64; 3]) -> RgbImage {
+    let scale = Vec3::from_array(scale.map(|s| s as f32));
+    picture.map(|&pixel| pixel * scale)
+}
+
+/// sRGB-encoded values in [0, 1] (IEC 61966-2-1) of linear ones times `gain`; not finite becomes 0.
+fn encoded(image: &RgbImage, gain: f32) -> RgbImage {
+    image.map(|&pixel| Vec3::from_array(pixel.to_array().map(|linear| srgb_encoded(linear * gain))))
+}
+
+/// The sRGB curve (IEC 61966-2-1) on [0, 1]; values outside are clamped, NaN becomes 0.
+pub fn srgb_encoded(linear: f32) -> f32 {
+    let linear = if linear.is_nan() { 0.0 } else { linear.clamp(0.0, 1.0) };
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// Scores of many views together.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct AggregateScore {
+    /// Number of views with at least one pixel that counts.
+    pub views: usize,
+    /// RMSE over all pixels of all views; PSNR and SSIM as means over the views.
+    pub raw: PictureScore,
+    /// The same, aligned: RMSE with one factor per channel for all views together, since the scene has one scale;
+    /// PSNR and SSIM as means over the views aligned one by one.
+    pub aligned: PictureScore,
+    /// The one factor per channel.
+    pub scale: [f64; 3],
+}
+
+/// Scores many views together, in their order. Views where nothing counts are left out.
+pub fn aggregate<'a>(views: impl IntoIterator<Item = &'a ViewScores>) -> AggregateScore {
+    let views: Vec<&ViewScores> = views.into_iter().filter(|view| view.sums.pixels > 0).collect();
+    let mut sums = AlignmentSums::default();
+    views.iter().for_each(|view| sums.add(&view.sums));
+    let scale = sums.scale();
+    let mean = |number: fn(&ViewScores) -> f64| views.iter().map(|view| number(view)).sum::<f64>() / views.len() as f64;
+    AggregateScore {
+        views: views.len(),
+        raw: PictureScore {
+            rmse_linear: sums.rmse(),
+            psnr_srgb_db: mean(|view| view.raw.psnr_srgb_db),
+            ssim_srgb: mean(|view| view.raw.ssim_srgb),
+        },
+        aligned: PictureScore {
+            rmse_linear: sums.rmse_at(scale),
+            psnr_srgb_db: mean(|view| view.aligned.psnr_srgb_db),
+            ssim_srgb: mean(|view| view.aligned.ssim_srgb),
+        },
+        scale,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grey(width: usize, height: usize, value: f32) -> RgbImage {
+        Image::filled(width, height, Vec3::splat(value))
+    }
+
+    #[test]
+    fn rmse_and_psnr_match_a_hand_calculation() {
+        // Four pixels: one background, one clipped, one that misses the mesh; the last two differ by 0.1 and 0.3.
+        let states = Image::from_pixels(
+            5,
+            1,
+            vec![
+                PixelState::Background,
+                PixelState::SurfaceClipped,
+                PixelState::Surface,
+                PixelState::Surface,
+                PixelState::Surface,
+            ],
+        );
+        let coverage = Image::from_pixels(5, 1, vec![true, true, false, true, true]);
+        let photo = grey(5, 1, 0.5);
+        let mut picture = photo.map(|_| Vec3::splat(9.0));
+        picture[(0, 3)] = Vec3::splat(0.6);
+        picture[(0, 4)] = Vec3::splat(0.2);
+        let scores = score_view(&photo, &picture, &states, Some(&coverage), 0.0).unwrap();
+        assert_eq!(scores.sums.pixels, 2);
+        assert!((scores.raw.rmse_linear - 0.05f64.sqrt()).abs() < 1e-6, "{scores:?}");
+        // sRGB curve at 0.5, 0.6, 0.2, computed apart: 0.735357, 0.797738, 0.484529.
+        let mean_squared = ((0.797738f64 - 0.735357).powi(2) + (0.484529f64 - 0.735357).powi(2)) / 2.0;
+        assert!((scores.raw.psnr_srgb_db + 10.0 * mean_squared.log10()).abs() < 1e-3, "{scores:?}");
+        // Scale: (0.6 + 0.2) 0.5 / (0.36 + 0.04) = 1; so the twin is equal.
+        assert!((scores.scale[0] - 1.0).abs() < 1e-6);
+        assert!((scores.clipped_share - 1.0 / 3.0).abs() < 1e-12, "one of three covered surface pixels");
+    }
+
+    #[test]
+    fn a_scaled_picture_is_equal_after_alignment_and_only_then() {
+        let photo = Image::from_fn(16, 16, |r, c| Vec3::new(0.1 + 0.02 * r as f32, 0.3, 0.01 * c as f32 + 0.2));
+        let picture = photo.map(|&p| p * Vec3::new(2.0, 0.5, 1.25));
+        let states = Image::filled(16, 16, PixelState::Surface);
+        let scores = score_view(&photo, &picture, &states, None, 0.0).unwrap();
+        for (scale, expected) in scores.scale.iter().zip([0.5, 2.0, 0.8]) {
+            assert!((scale - expected).abs() < 1e-6);
+        }
+        assert!(scores.raw.rmse_linear > 0.1 && scores.aligned.rmse_linear < 1e-7);
+        assert!(scores.aligned.psnr_srgb_db > 100.0 && scores.aligned.ssim_srgb > 0.9999);
+        let together = aggregate([&scores, &scores]);
+        assert!(together.aligned.rmse_linear < 1e-7 && together.views == 2);
+        assert!((together.raw.rmse_linear - scores.raw.rmse_linear).abs() < 1e-12);
+    }
+
+    #[test]
+    fn one_scale_for_all_views_does_not_hide_that_views_disagree() {
+        let states = Image::filled(8, 8, PixelState::Surface);
+        let bright = score_view(&grey(8, 8, 0.4), &grey(8, 8, 0.2), &states, None, 0.0).unwrap();
+        let dark = score_view(&grey(8, 8, 0.4), &grey(8, 8, 0.8), &states, None, 0.0).unwrap();
+        assert!(bright.aligned.rmse_linear < 1e-7 && dark.aligned.rmse_linear < 1e-7);
+        // s = (0.08 + 0.32) / (0.04 + 0.64) = 10/17; errors 0.4 - 2/17 and 0.4 - 8/17.
+        let expected = (((0.4f64 - 2.0 / 17.0).powi(2) + (0.4f64 - 8.0 / 17.0).powi(2)) / 2.0).sqrt();
+        let together = aggregate([&bright, &dark]);
+        assert!((together.aligned.rmse_linear - expected).abs() < 1e-6, "{together:?}");
+    }
+
+    #[test]
+    fn nothing_to_count_and_not_finite_pixels_do_not_panic() {
+        let none = score_view(&grey(4, 4, 0.1), &grey(4, 4, 0.1), &Image::filled(4, 4, PixelState::Ignored), None, 0.0);
+        assert!(none.unwrap().raw.rmse_linear.is_nan());
+        let mut picture = grey(4, 4, 0.1);
+        picture[(1, 2)] = Vec3::new(f32::NAN, 0.0, f32::INFINITY);
+        let states = Image::filled(4, 4, PixelState::Surface);
+        let scores = score_view(&grey(4, 4, 0.1), &picture, &states, None, 0.0).unwrap();
+        assert_eq!((scores.non_finite_pixels, scores.sums.pixels), (1, 15));
+        assert!(scores.raw.rmse_linear.abs() < 1e-9 && scores.raw.psnr_srgb_db == f64::INFINITY);
+        assert!(score_view(&grey(4, 4, 0.1), &grey(3, 4, 0.1), &states, None, 0.0).is_err());
+        assert!(aggregate([]).raw.rmse_linear.is_nan());
+        let empty =
+            score_view(&grey(0, 0, 0.0), &grey(0, 0, 0.0), &Image::filled(0, 0, PixelState::Surface), None, 0.0);
+        assert!(empty.unwrap().clipped_share.is_nan());
+    }
+}
