@@ -1,1 +1,22 @@
-//! Where a texel is changed.
+//! Where a texel is changed: losses, consistency between views, Adam, schedule, checkpoint.
+//!
+//! Read in this order: [`settings`] says what can be chosen, [`schedule`] turns it into stages, [`targets`] holds the
+//! photographs at the resolution of a stage, [`loss`] compares a pixel with its photo, [`consistency`] compares the
+//! gradients of views, [`adam`] moves the numbers, and [`fitter`] is the loop body: one call, one step.
+//! [`start`] chooses where to begin, [`gauge`] names the freedom that photographs leave, [`checkpoint`] saves it all.
+//!
+//! A fit knows nothing of threads that watch it, of files it came from or of windows: that is `job`.
+
+pub mod adam;
+pub mod checkpoint;
+pub mod consistency;
+pub mod fitter;
+pub mod gauge;
+pub mod loss;
+pub mod schedule;
+pub mod settings;
+pub mod start;
+pub mod targets;
+
+pub use fitter::{Fitter, LossRow, StepOutcome};
+pub use settings::FitSettings;

@@ -9,6 +9,7 @@ use super::maps::MaterialMaps;
 use crate::image::Image;
 use crate::math::real::Real;
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 
 /// Numbers a texel holds: diffuse RGB, specular RGB, log width, and one of padding that keeps texels aligned.
 pub const TEXEL_NUMBERS: usize = 8;
@@ -159,7 +160,7 @@ impl<R: Real> TexelPyramid<R> {
         for level in 1..self.levels.len() {
             let (fine, coarse) = self.levels.split_at_mut(level);
             let fine = &fine[level - 1].texels;
-            for (parent, texel) in coarse[0].texels.iter_mut().enumerate() {
+            coarse[0].texels.par_iter_mut().with_min_len(1 << 13).enumerate().for_each(|(parent, texel)| {
                 let mut sum = [R::zero(); TEXEL_NUMBERS];
                 for (child, share) in weights.shares(level - 1, parent) {
                     let share = R::from_f32(share);
@@ -168,32 +169,38 @@ impl<R: Real> TexelPyramid<R> {
                     }
                 }
                 *texel = sum;
-            }
+            });
         }
     }
 
     /// The exact transpose of [`TexelPyramid::rebuild`]: adds each coarse level to the finer ones and clears it, so
-    /// that a gradient gathered on all levels ends on the base. Numbers beyond the seventh are pulled unweighted by
-    /// share, so that a count of evidence reaches every child.
+    /// that a gradient gathered on all levels ends on the base. The eighth number, a count of evidence, reaches every
+    /// child that has a share.
     pub fn pull_down(&mut self, weights: &PyramidWeights) {
         for level in (1..self.levels.len()).rev() {
             let (fine, coarse) = self.levels.split_at_mut(level);
-            let fine = &mut fine[level - 1].texels;
-            for (parent, texel) in coarse[0].texels.iter_mut().enumerate() {
-                if texel.iter().all(|value| value.is_zero()) {
-                    continue;
-                }
-                for (child, share) in weights.shares(level - 1, parent) {
-                    let share = R::from_f32(share);
-                    for number in 0..7 {
-                        fine[child][number] += texel[number] * share;
+            let (fine, coarse) = (&mut fine[level - 1], &mut coarse[0]);
+            let (fine_width, coarse_width) = (fine.width, coarse.width);
+            // Two fine rows belong to one coarse row, so rows of parents are independent.
+            let rows = fine.texels.par_chunks_mut(2 * fine_width).zip(coarse.texels.par_chunks_mut(coarse_width));
+            rows.enumerate().for_each(|(row, (fine, coarse))| {
+                for (column, texel) in coarse.iter_mut().enumerate() {
+                    if texel.iter().all(|value| value.is_zero()) {
+                        continue;
                     }
-                    if !share.is_zero() {
-                        fine[child][7] += texel[7];
+                    for (child, share) in weights.shares(level - 1, row * coarse_width + column) {
+                        let child = &mut fine[child - 2 * row * fine_width];
+                        let share = R::from_f32(share);
+                        for number in 0..7 {
+                            child[number] += texel[number] * share;
+                        }
+                        if !share.is_zero() {
+                            child[7] += texel[7];
+                        }
                     }
+                    *texel = [R::zero(); TEXEL_NUMBERS];
                 }
-                *texel = [R::zero(); TEXEL_NUMBERS];
-            }
+            });
         }
     }
 

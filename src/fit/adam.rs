@@ -1,0 +1,174 @@
+//! Adam (Kingma and Ba 2015) for maps of which a step sees only a part.
+//!
+//! A texel that no pixel of a step touched keeps value and moments; its bias correction counts its own updates only.
+//! So texels that nobody sees never move, and a texel seen rarely is not pushed by stale momentum.
+
+use crate::material::lobe::MIN_WIDTH;
+use crate::material::texels::Texel;
+use rayon::prelude::*;
+
+/// Decay of the first moment.
+const BETA_ONE: f32 = 0.9;
+/// Decay of the second moment.
+const BETA_TWO: f32 = 0.99;
+/// Added to the root of the second moment, relative to nothing: gradients of a mean over 10^6 pixels are about 1e-8.
+const EPSILON: f32 = 1e-16;
+
+/// Moments of a group of numbers; the last entry of each group counts its updates.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Moments {
+    /// Mean of the gradient, seven numbers a texel, and the number of updates.
+    pub first: Vec<Texel<f32>>,
+    /// Mean of the squared gradient.
+    pub second: Vec<Texel<f32>>,
+}
+
+/// Step sizes of the seven numbers of a texel; zero keeps a number as it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TexelRates {
+    /// Of diffuse reflectance.
+    pub diffuse: f32,
+    /// Of specular reflectance.
+    pub specular: f32,
+    /// Of the logarithm of the microfacet width.
+    pub log_width: f32,
+}
+
+impl Moments {
+    /// Moments of `count` groups, all zero.
+    pub fn zeros(count: usize) -> Self {
+        Moments { first: vec![[0.0; 8]; count], second: vec![[0.0; 8]; count] }
+    }
+
+    /// Moves the texels that a gradient touched, and clears the gradient. Values are projected to their ranges after
+    /// the step; the projection does not enter the gradient, so a value leaves its bound as soon as the photos ask.
+    /// Returns the number of gradients that were not finite and were left out.
+    pub fn step_texels(&mut self, texels: &mut [Texel<f32>], gradient: &mut [Texel<f32>], rates: TexelRates) -> usize {
+        let rate_of = |number: usize| match number {
+            0..3 => rates.diffuse,
+            3..6 => rates.specular,
+            _ => rates.log_width,
+        };
+        let log_min = MIN_WIDTH.ln();
+        texels
+            .par_iter_mut()
+            .zip(gradient)
+            .zip(&mut self.first)
+            .zip(&mut self.second)
+            .with_min_len(4096)
+            .map(|(((texel, gradient), first), second)| {
+                if gradient[7] == 0.0 {
+                    return 0;
+                }
+                let own = std::mem::take(gradient);
+                if !own.iter().all(|value| value.is_finite()) {
+                    return 1;
+                }
+                let corrections = count_update(first);
+                for number in 0..7 {
+                    let direction = update(own[number], &mut first[number], &mut second[number], corrections);
+                    let moved = texel[number] - rate_of(number) * direction;
+                    texel[number] =
+                        if number == 6 { moved.clamp(log_min, 0.0) } else { moved.clamp(0.0, 1.0) };
+                }
+                0
+            })
+            .sum()
+    }
+
+    /// Moves the light. A texel's step is `rate (mean + L)`, so that a sun grows by a share of itself while a dark
+    /// texel still moves; `mean` is the mean radiance. Values stay at or above zero. Clears the gradient and returns
+    /// the number of gradients that were not finite.
+    pub fn step_light(&mut self, light: &mut [[f32; 3]], gradient: &mut [[f32; 3]], mean: f32, rate: f32) -> usize {
+        let mut left_out = 0;
+        for (index, (radiance, gradient)) in light.iter_mut().zip(gradient).enumerate() {
+            let own = std::mem::take(gradient);
+            if own == [0.0; 3] {
+                continue;
+            }
+            if !own.iter().all(|value| value.is_finite()) {
+                left_out += 1;
+                continue;
+            }
+            let corrections = count_update(&mut self.first[index]);
+            for channel in 0..3 {
+                let direction = update(
+                    own[channel],
+                    &mut self.first[index][channel],
+                    &mut self.second[index][channel],
+                    corrections,
+                );
+                radiance[channel] = (radiance[channel] - rate * (mean + radiance[channel]) * direction).max(0.0);
+            }
+        }
+        left_out
+    }
+
+    /// One plain number in group 0: returns its step before the rate.
+    pub fn direction_of(&mut self, group: usize, gradient: f32) -> f32 {
+        let corrections = count_update(&mut self.first[group]);
+        update(gradient, &mut self.first[group][0], &mut self.second[group][0], corrections)
+    }
+}
+
+/// Counts an update of a group and returns the corrections of both moments.
+fn count_update(first: &mut Texel<f32>) -> (f32, f32) {
+    first[7] += 1.0;
+    (1.0 / (1.0 - BETA_ONE.powf(first[7])), 1.0 / (1.0 - BETA_TWO.powf(first[7])))
+}
+
+#[inline(always)]
+fn update(gradient: f32, first: &mut f32, second: &mut f32, corrections: (f32, f32)) -> f32 {
+    *first = BETA_ONE * *first + (1.0 - BETA_ONE) * gradient;
+    *second = BETA_TWO * *second + (1.0 - BETA_TWO) * gradient * gradient;
+    let scale = (*second * corrections.1).sqrt();
+    *first * corrections.0 / (scale + EPSILON)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn untouched_texels_do_not_move_and_touched_ones_reach_their_goal() {
+        let mut texels = vec![[0.5f32; 8]; 2];
+        texels[0][6] = -1.0;
+        let start = texels[1];
+        let goal = [0.2, 0.9, 0.4, 0.0, 1.0, 0.3, -2.0];
+        let mut moments = Moments::zeros(2);
+        let rates = TexelRates { diffuse: 0.02, specular: 0.02, log_width: 0.05 };
+        for step in 0..600 {
+            let mut gradient = vec![[0.0f32; 8]; 2];
+            for number in 0..7 {
+                gradient[0][number] = 1e-7 * (texels[0][number] - goal[number]);
+            }
+            gradient[0][7] = 1.0;
+            let fade = 1.0 - step as f32 / 600.0;
+            let rates = TexelRates {
+                diffuse: rates.diffuse * fade,
+                specular: rates.specular * fade,
+                log_width: rates.log_width * fade,
+            };
+            assert_eq!(moments.step_texels(&mut texels, &mut gradient, rates), 0);
+            assert_eq!(gradient[0], [0.0; 8], "the gradient is cleared");
+        }
+        assert_eq!(texels[1], start);
+        for number in 0..7 {
+            assert!((texels[0][number] - goal[number]).abs() < 2e-3, "{number}: {}", texels[0][number]);
+        }
+    }
+
+    #[test]
+    fn a_gradient_that_is_not_finite_is_counted_and_left_out() {
+        let mut texels = vec![[0.5f32; 8]];
+        let mut gradient = vec![[f32::NAN; 8]];
+        let mut moments = Moments::zeros(1);
+        let rates = TexelRates { diffuse: 0.1, specular: 0.1, log_width: 0.1 };
+        assert_eq!(moments.step_texels(&mut texels, &mut gradient, rates), 1);
+        assert_eq!(texels[0], [0.5; 8]);
+        assert_eq!(moments, Moments::zeros(1));
+        let mut light = vec![[1.0f32; 3]];
+        assert_eq!(moments.step_light(&mut light, &mut [[f32::INFINITY; 3]], 1.0, 0.1), 1);
+        assert_eq!(light[0], [1.0; 3]);
+    }
+}

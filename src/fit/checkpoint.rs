@@ -1,0 +1,197 @@
+//! A fit's state as one file, written whole or not at all.
+//!
+//! Layout: the line `PATINA CHECKPOINT 1`, eight bytes with the length of a JSON text, that text, then the arrays as
+//! little-endian `f32` in a fixed order, then eight bytes with a checksum over all before them.
+
+use super::adam::Moments;
+use super::fitter::{FitState, LossRow};
+use crate::error::{Error, ErrorKind, Place, Result};
+use crate::files::write_atomically;
+use crate::material::texels::Texel;
+use serde::{Deserialize, Serialize};
+use std::io::Write;
+use std::path::Path;
+
+const MAGIC: &[u8] = b"PATINA CHECKPOINT 1\n";
+
+#[derive(Serialize, Deserialize)]
+struct Header {
+    stage: usize,
+    step_in_stage: usize,
+    step: usize,
+    map_size: usize,
+    light_texels: usize,
+    views: usize,
+    losses: Vec<LossRow>,
+    non_finite: Vec<(String, u64)>,
+    events: Vec<String>,
+    seconds: f64,
+}
+
+/// Writes a state; the file that was there before stays until the new one is complete.
+pub fn write(path: &Path, state: &FitState) -> Result<()> {
+    let header = Header {
+        stage: state.stage,
+        step_in_stage: state.step_in_stage,
+        step: state.step,
+        map_size: state.map_size,
+        light_texels: state.light.len(),
+        views: state.log_gains.len(),
+        losses: state.losses.clone(),
+        non_finite: state.non_finite.clone(),
+        events: state.events.clone(),
+        seconds: state.seconds,
+    };
+    let json = serde_json::to_vec(&header)
+        .map_err(|source| Error::new(ErrorKind::Internal, format!("cannot encode a checkpoint: {source}")))?;
+    write_atomically(path, |writer| {
+        let mut checksum = Checksum::default();
+        let mut put = |bytes: &[u8]| {
+            checksum.add(bytes);
+            writer.write_all(bytes)
+        };
+        put(MAGIC)?;
+        put(&(json.len() as u64).to_le_bytes())?;
+        put(&json)?;
+        for texels in [
+            &state.texels,
+            &state.moments.first,
+            &state.moments.second,
+            &state.light_moments.first,
+            &state.light_moments.second,
+            &state.gain_moments.first,
+            &state.gain_moments.second,
+        ] {
+            put(bytemuck::cast_slice(texels))?;
+        }
+        put(bytemuck::cast_slice(&state.light))?;
+        put(bytemuck::cast_slice(&state.log_gains))?;
+        let checksum = checksum.0;
+        writer.write_all(&checksum.to_le_bytes())
+    })
+}
+
+/// Reads a state back, bit for bit.
+pub fn read(path: &Path) -> Result<FitState> {
+    let bytes = std::fs::read(path).map_err(|source| {
+        Error::reading(path, source).remedy("a run writes it while it goes; start the run again with `patina fit`")
+    })?;
+    let broken = |byte: usize, what: &str| {
+        Error::new(ErrorKind::Malformed, format!("not a whole checkpoint: {what}"))
+            .at(Place::Byte(path.into(), byte as u64))
+            .remedy("the file is damaged: start the run again, or copy the checkpoint anew")
+    };
+    let body_end = bytes.len().checked_sub(8).ok_or_else(|| broken(0, "it is too short"))?;
+    if !bytes.starts_with(MAGIC) {
+        return Err(broken(0, "it does not begin with its name"));
+    }
+    let mut checksum = Checksum::default();
+    checksum.add(&bytes[..body_end]);
+    if bytes[body_end..] != checksum.0.to_le_bytes() {
+        return Err(broken(body_end, "the checksum does not match"));
+    }
+    let mut rest = &bytes[MAGIC.len()..body_end];
+    let length = rest.split_off(..8).ok_or_else(|| broken(MAGIC.len(), "it has no header"))?;
+    let length = u64::from_le_bytes(length.try_into().unwrap_or_default()) as usize;
+    let json = rest.split_off(..length).ok_or_else(|| broken(MAGIC.len(), "its header is cut"))?;
+    let header: Header = serde_json::from_slice(json).map_err(|source| broken(MAGIC.len() + 8, &source.to_string()))?;
+
+    let mut take = |floats: usize| -> Result<Vec<f32>> {
+        let bytes = floats.checked_mul(4).and_then(|count| rest.split_off(..count));
+        let bytes = bytes.ok_or_else(|| broken(body_end, "an array is cut"))?;
+        Ok(bytes.chunks_exact(4).map(|four| f32::from_le_bytes([four[0], four[1], four[2], four[3]])).collect())
+    };
+    let mut texels = |count: usize| -> Result<Vec<Texel<f32>>> {
+        let floats = take(count.saturating_mul(8))?;
+        Ok(floats.chunks_exact(8).map(|eight| std::array::from_fn(|number| eight[number])).collect())
+    };
+    let count = header.map_size.saturating_mul(header.map_size);
+    let state_texels = texels(count)?;
+    let mut moments = |count: usize| -> Result<Moments> { Ok(Moments { first: texels(count)?, second: texels(count)? }) };
+    let texel_moments = moments(count)?;
+    let light_moments = moments(header.light_texels)?;
+    let gain_moments = moments(header.views)?;
+    let light = take(header.light_texels.saturating_mul(3))?.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
+    let log_gains = take(header.views)?;
+    if !rest.is_empty() {
+        return Err(broken(body_end - rest.len(), "it is too long"));
+    }
+    Ok(FitState {
+        stage: header.stage,
+        step_in_stage: header.step_in_stage,
+        step: header.step,
+        map_size: header.map_size,
+        texels: state_texels,
+        moments: texel_moments,
+        light,
+        light_moments,
+        log_gains,
+        gain_moments,
+        losses: header.losses,
+        non_finite: header.non_finite,
+        events: header.events,
+        seconds: header.seconds,
+    })
+}
+
+/// Fowler, Noll and Vo 1a over bytes: finds cuts and flips, no defence against intent.
+#[derive(Default)]
+struct Checksum(u64);
+
+impl Checksum {
+    /// Adds a run of bytes; how the bytes are split into runs does not matter.
+    fn add(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn state() -> FitState {
+        FitState {
+            stage: 1,
+            step_in_stage: 2,
+            step: 7,
+            map_size: 2,
+            texels: (0..4).map(|texel| std::array::from_fn(|n| (texel * 8 + n) as f32 * 0.1)).collect(),
+            moments: Moments::zeros(4),
+            light: vec![[1.5, 1e5, 1e-7]; 8],
+            light_moments: Moments::zeros(8),
+            log_gains: vec![0.1, -0.1],
+            gain_moments: Moments::zeros(2),
+            losses: vec![LossRow {
+                step: 1,
+                stage: "diffuse 1/4".into(),
+                seconds: 0.1 + 0.2,
+                loss: 1.0 / 3.0,
+                image_loss: 0.3,
+                consistency: 0.0,
+                held_out_rmse: Some(0.1),
+            }],
+            non_finite: vec![("x".into(), 3)],
+            events: vec!["left a saddle".into()],
+            seconds: 12.3,
+        }
+    }
+
+    #[test]
+    fn round_trips_bit_for_bit_and_refuses_damage() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("checkpoint");
+        write(&path, &state()).unwrap();
+        assert_eq!(read(&path).unwrap(), state());
+        let good = std::fs::read(&path).unwrap();
+        for cut in [0, 5, MAGIC.len() + 3, good.len() / 2, good.len() - 1] {
+            crate::files::write_bytes(&path, &good[..cut]).unwrap();
+            assert_eq!(read(&path).unwrap_err().kind(), ErrorKind::Malformed, "cut at {cut}");
+        }
+        let mut flipped = good.clone();
+        flipped[good.len() / 2] ^= 1;
+        crate::files::write_bytes(&path, &flipped).unwrap();
+        assert!(read(&path).is_err());
+    }
+}

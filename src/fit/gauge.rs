@@ -1,0 +1,71 @@
+//! The freedom that photographs leave: reflectance times c, light over c, per channel.
+//!
+//! For a Lambert surface every photo stays the same; Schlick's rise to one at grazing angles, interreflection, the
+//! bounds of reflectance and a visible background each break the freedom a little or wholly. The rule that fixed it is
+//! named in every report, and scores are given raw and scale-aligned.
+
+use super::settings::BackgroundEvidence;
+use crate::render::Parameters;
+use crate::scene::Background;
+use glam::Vec3;
+
+/// What fixed the scale between reflectance and light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum GaugeRule {
+    /// Background pixels show the light itself.
+    Background,
+    /// The light was known.
+    FixedLight,
+    /// The start: mean reflectance 0.5 in the mean light that explains the photographs.
+    Start,
+}
+
+impl GaugeRule {
+    /// The rule that holds for a fit.
+    pub fn of(background: Background, evidence: BackgroundEvidence, fixed_light: bool) -> Self {
+        match (fixed_light, background, evidence) {
+            (true, _, _) => GaugeRule::FixedLight,
+            (false, Background::Environment, BackgroundEvidence::Use) => GaugeRule::Background,
+            _ => GaugeRule::Start,
+        }
+    }
+
+    /// One sentence for the report.
+    pub fn sentence(self) -> &'static str {
+        match self {
+            GaugeRule::Background => {
+                "Background pixels show the light directly and so fix the scale between reflectance and light."
+            }
+            GaugeRule::FixedLight => "The light was given, so the scale of reflectance is fixed.",
+            GaugeRule::Start => {
+                "Nothing in the photographs fixes the scale between diffuse reflectance and light; it stays near the \
+                 start, a mean reflectance of 0.5. Read the scale-aligned scores."
+            }
+        }
+    }
+}
+
+/// Moves along the freedom: both reflectances times `scale`, light over it. Pictures of diffuse surfaces stay the same
+/// as long as no reflectance meets its bound of 1; returns the share of texel channels that did.
+pub fn move_scale(parameters: &mut Parameters<f32>, scale: Vec3) -> f64 {
+    let scale = scale.to_array();
+    let mut bounded = 0usize;
+    let mut total = 0usize;
+    for level in &mut parameters.texels.levels {
+        for texel in &mut level.texels {
+            for number in 0..6 {
+                let moved = texel[number] * scale[number % 3];
+                bounded += usize::from(moved > 1.0);
+                total += 1;
+                texel[number] = moved.clamp(0.0, 1.0);
+            }
+        }
+    }
+    for radiance in &mut parameters.light {
+        for channel in 0..3 {
+            radiance[channel] /= scale[channel];
+        }
+    }
+    bounded as f64 / total.max(1) as f64
+}

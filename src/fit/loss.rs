@@ -1,0 +1,151 @@
+//! Squared difference between a pixel's estimate and its photo, with censored and background pixels.
+
+use super::targets::Target;
+use crate::math::real::Real;
+use crate::render::accumulate::{PixelDerivative, PixelEstimate, PixelLoss};
+use crate::scene::{Background, PixelState, Scene};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+
+/// Mean squared error of one view; a sum over pixels times `weight`.
+pub struct ViewLoss<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// The photograph.
+    pub target: &'a Target,
+    /// Factor of each pixel's squared error: one over the number of values in the view's mean.
+    pub weight: f32,
+    /// Gain of the view: the picture is multiplied by it before it is compared.
+    pub gain: f32,
+    /// Whether background pixels are evidence for the light.
+    pub use_background: bool,
+    /// Derivative of the loss by the gain, in units of 2^-40, added up in whole numbers so that the order of pixels
+    /// does not matter.
+    pub d_gain: AtomicU64,
+}
+
+const GAIN_UNIT: f64 = (1u64 << 40) as f64;
+
+impl<'a> ViewLoss<'a> {
+    /// The loss of a view.
+    pub fn new(scene: &'a Scene, target: &'a Target, weight: f32, gain: f32, use_background: bool) -> Self {
+        ViewLoss { scene, target, weight, gain, use_background, d_gain: AtomicU64::new(0) }
+    }
+
+    /// Derivative of the loss by the gain.
+    pub fn gain_derivative(&self) -> f32 {
+        (self.d_gain.load(Ordering::Relaxed) as i64 as f64 / GAIN_UNIT) as f32
+    }
+
+    /// What a pixel is evidence for, given which share of its camera rays met nothing.
+    fn is_evidence(&self, state: PixelState, escaped: f32) -> bool {
+        match (state, self.scene.background) {
+            (PixelState::Ignored, _) => false,
+            // A black background is known exactly: mixed pixels are right, empty ones say nothing.
+            (_, Background::Black) => escaped < 1.0 && state.is_surface(),
+            // Mask and rays must agree. A mixed pixel shows some background, which in a photograph is not at infinity.
+            (state, Background::Environment) if state.is_surface() => {
+                escaped == 0.0 || (self.use_background && escaped == 1.0)
+            }
+            (_, Background::Environment) => escaped == 1.0 && self.use_background,
+        }
+    }
+}
+
+impl<R: Real> PixelLoss<R> for ViewLoss<'_> {
+    fn at(&self, pixel: usize, estimate: &PixelEstimate<R>) -> Option<PixelDerivative<R>> {
+        let (photo, state) = self.target.at(self.scene, pixel);
+        if !self.is_evidence(state, estimate.escaped) {
+            return None;
+        }
+        let gain = R::from_f32(self.gain);
+        let weight = R::from_f32(self.weight);
+        let mut derivative = PixelDerivative { loss: R::zero(), d_first: [R::zero(); 3], d_second: [R::zero(); 3] };
+        let mut d_gain = R::zero();
+        for channel in 0..3 {
+            let photo_value = photo[channel];
+            let mean = 0.5 * (estimate.first[channel].to_f32() + estimate.second[channel].to_f32()) * self.gain;
+            // A clipped channel says only that the radiance is at least this much.
+            if state.is_clipped() && photo_value >= CLIPPED_RADIANCE && mean >= photo_value {
+                continue;
+            }
+            let first = estimate.first[channel] * gain - R::from_f32(photo_value);
+            let second = estimate.second[channel] * gain - R::from_f32(photo_value);
+            derivative.loss += weight * first * second;
+            derivative.d_first[channel] = weight * second * gain;
+            derivative.d_second[channel] = weight * first * gain;
+            d_gain += weight * (second * estimate.first[channel] + first * estimate.second[channel]);
+        }
+        let units = (f64::from(d_gain.to_f32()) * GAIN_UNIT) as i64;
+        self.d_gain.fetch_add(units as u64, Ordering::Relaxed);
+        Some(derivative)
+    }
+}
+
+/// Linear radiance of an 8-bit sRGB value of 254: at and above it a channel counts as clipped.
+pub const CLIPPED_RADIANCE: f32 = 0.991;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Image;
+    use crate::scene::{Camera, Mesh, Photo, View};
+    use glam::Vec3;
+
+    fn scene(photo: Vec3, state: PixelState) -> Scene {
+        Scene {
+            name: "test".into(),
+            folder: None,
+            mesh: Mesh::default(),
+            views: vec![View {
+                name: "0".into(),
+                camera: Camera::looking_at(Vec3::Z, Vec3::ZERO, 1, 1, 1.0),
+                photo: Photo::Linear32(Image::filled(1, 1, photo)),
+                states: Image::filled(1, 1, state),
+                held_out: false,
+            }],
+            world_from_source: Default::default(),
+            background: Background::Environment,
+            truth: None,
+            findings: Vec::new(),
+        }
+    }
+
+    fn at(scene: &Scene, estimate: PixelEstimate<f64>, use_background: bool) -> Option<PixelDerivative<f64>> {
+        let target = Target::new(scene, 0, 0);
+        ViewLoss::new(scene, &target, 0.5, 1.0, use_background).at(0, &estimate)
+    }
+
+    #[test]
+    fn the_product_of_two_estimates_and_its_derivative() {
+        let scene = scene(Vec3::new(0.2, 0.4, 0.6), PixelState::Surface);
+        let estimate = PixelEstimate { first: [0.3, 0.4, 0.5], second: [0.1, 0.5, 0.9], escaped: 0.0 };
+        let result = at(&scene, estimate, true).unwrap();
+        let expected = 0.5 * (0.1 * -0.1 + 0.0 * 0.1 + -0.1 * 0.3);
+        assert!((result.loss - expected).abs() < 1e-7);
+        assert!((result.d_first[2] - 0.5 * 0.3).abs() < 1e-7);
+        assert!((result.d_second[0] - 0.5 * 0.1).abs() < 1e-7);
+    }
+
+    #[test]
+    fn clipped_channels_push_up_but_never_down() {
+        let scene = scene(Vec3::new(1.0, 0.5, 1.0), PixelState::SurfaceClipped);
+        let estimate = PixelEstimate { first: [3.0, 0.6, 0.2], second: [3.0, 0.6, 0.2], escaped: 0.0 };
+        let result = at(&scene, estimate, true).unwrap();
+        assert_eq!(result.d_first[0], 0.0);
+        assert!(result.d_first[1] > 0.0 && result.d_first[2] < 0.0);
+    }
+
+    #[test]
+    fn mask_and_rays_must_agree() {
+        let estimate = |escaped| PixelEstimate { first: [0.0; 3], second: [0.0; 3], escaped };
+        let surface = scene(Vec3::ONE * 0.5, PixelState::Surface);
+        assert!(at(&surface, estimate(0.0), false).is_some());
+        assert!(at(&surface, estimate(0.5), true).is_none(), "a mixed pixel");
+        let background = scene(Vec3::ONE * 0.5, PixelState::Background);
+        assert!(at(&background, estimate(1.0), true).is_some());
+        assert!(at(&background, estimate(1.0), false).is_none());
+        assert!(at(&background, estimate(0.0), true).is_none(), "the mask says background, rays say surface");
+        assert!(at(&scene(Vec3::ONE, PixelState::Ignored), estimate(0.0), true).is_none());
+    }
+}

@@ -1,0 +1,265 @@
+//! Every choice of a fit, once: the command line, the settings file and the window read this structure.
+
+use crate::error::{Error, ErrorKind, Place, Result};
+use crate::render::first_hits::PixelFilter;
+use serde::{Deserialize, Serialize};
+
+/// How gradients of different views are weighed against each other (multi-view gradient consistency, Joy and Poullis
+/// 2023, eq. 2 and 3).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Consistency {
+    /// Not at all.
+    #[default]
+    None,
+    /// One factor for the whole step, the exponential of the variance over the normalised stack of gradients; it
+    /// carries no gradient and is 1 + 1e-6 or so.
+    Released,
+    /// A factor for each texel, the exponential of its variance over views; it carries no gradient.
+    Constant,
+    /// The variance is part of the loss, and its true gradient is followed.
+    Exact,
+}
+
+/// Where a fit begins.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Start {
+    /// From the photographs: light from the background where it is seen, one grey for the surface.
+    #[default]
+    Measured,
+    /// As printed in the paper: diffuse 0, specular 0, roughness 0.5, light 0. An exact saddle: it is detected and left.
+    Paper,
+}
+
+/// Whether pixels that show the background are evidence for the light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum BackgroundEvidence {
+    /// They show the environment itself.
+    #[default]
+    Use,
+    /// They are left out.
+    Ignore,
+}
+
+/// The order in which maps are freed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Steps {
+    /// First diffuse and light alone, then everything.
+    #[default]
+    TwoStep,
+    /// Everything from the start.
+    OneStep,
+}
+
+/// Settings of a fit. Defaults are the balanced preset.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, clap::Args)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct FitSettings {
+    /// Seed of all random numbers.
+    #[arg(long, default_value_t = FitSettings::default().seed)]
+    pub seed: u64,
+    /// Width and height of the maps in texels: a power of two, 16 to 8192.
+    #[arg(long, default_value_t = FitSettings::default().map_size)]
+    pub map_size: usize,
+    /// Height of the environment in texels; it is twice as wide.
+    #[arg(long, default_value_t = FitSettings::default().environment_height)]
+    pub environment_height: usize,
+    /// Two steps as in the paper, or one.
+    #[arg(long, value_enum, default_value_t)]
+    pub steps: Steps,
+    /// Optimiser steps of the first step: diffuse and light.
+    #[arg(long, default_value_t = FitSettings::default().steps_diffuse)]
+    pub steps_diffuse: usize,
+    /// Optimiser steps of the second step: all maps and light.
+    #[arg(long, default_value_t = FitSettings::default().steps_all)]
+    pub steps_all: usize,
+    /// Views in one optimiser step.
+    #[arg(long, default_value_t = FitSettings::default().views_per_step)]
+    pub views_per_step: usize,
+    /// Pixels in one optimiser step over all its views; 0 takes every pixel. Consistency always takes every pixel.
+    #[arg(long, default_value_t = FitSettings::default().pixels_per_step)]
+    pub pixels_per_step: usize,
+    /// Paths a pixel in one optimiser step; an even number keeps the squared error unbiased.
+    #[arg(long, default_value_t = FitSettings::default().samples)]
+    pub samples: usize,
+    /// Surface hits on the longest path; 1 is direct light only.
+    #[arg(long, default_value_t = FitSettings::default().bounces)]
+    pub bounces: usize,
+    /// Levels of coarse-to-fine: each halves photographs and maps once more. 1 works at full size only.
+    #[arg(long, default_value_t = FitSettings::default().levels)]
+    pub levels: usize,
+    /// How samples are spread over a pixel.
+    #[arg(long, value_enum, default_value_t)]
+    pub pixel_filter: PixelFilter,
+    /// Multi-view gradient consistency.
+    #[arg(long, value_enum, default_value_t)]
+    pub consistency: Consistency,
+    /// Background pixels as evidence for the light.
+    #[arg(long, value_enum, default_value_t)]
+    pub background: BackgroundEvidence,
+    /// Fit a gain for each view, with mean logarithm zero.
+    #[arg(long)]
+    pub exposure: bool,
+    /// Where to begin.
+    #[arg(long, value_enum, default_value_t)]
+    pub start: Start,
+    /// Keep the light as it is at the start; with `--env` on the command line, a light that is known.
+    #[arg(long)]
+    pub fixed_light: bool,
+    /// Step size of diffuse reflectance.
+    #[arg(long, default_value_t = FitSettings::default().rate_diffuse)]
+    pub rate_diffuse: f32,
+    /// Step size of specular reflectance.
+    #[arg(long, default_value_t = FitSettings::default().rate_specular)]
+    pub rate_specular: f32,
+    /// Step size of the logarithm of the microfacet width.
+    #[arg(long, default_value_t = FitSettings::default().rate_roughness)]
+    pub rate_roughness: f32,
+    /// Step size of the light, relative to its mean plus the texel's own radiance.
+    #[arg(long, default_value_t = FitSettings::default().rate_light)]
+    pub rate_light: f32,
+    /// Step sizes fall along a cosine to this share at the end of each of the two steps.
+    #[arg(long, default_value_t = FitSettings::default().final_rate)]
+    pub final_rate: f32,
+    /// Optimiser steps over which the specular lobe is switched on.
+    #[arg(long, default_value_t = FitSettings::default().lobe_ramp)]
+    pub lobe_ramp: usize,
+    /// Memory for first hits that are traced once, in MiB; 0 traces them anew in each step.
+    #[arg(long, default_value_t = FitSettings::default().first_hits_mib)]
+    pub first_hits_mib: usize,
+    /// Optimiser steps between two looks at the held-out views; 0 never looks.
+    #[arg(long, default_value_t = FitSettings::default().held_out_interval)]
+    pub held_out_interval: usize,
+}
+
+impl Default for FitSettings {
+    fn default() -> Self {
+        FitSettings {
+            seed: 1,
+            map_size: 2048,
+            environment_height: 32,
+            steps: Steps::TwoStep,
+            steps_diffuse: 120,
+            steps_all: 180,
+            views_per_step: 5,
+            pixels_per_step: 200_000,
+            samples: 4,
+            bounces: 2,
+            levels: 3,
+            pixel_filter: PixelFilter::Box,
+            consistency: Consistency::None,
+            background: BackgroundEvidence::Use,
+            exposure: false,
+            start: Start::Measured,
+            fixed_light: false,
+            rate_diffuse: 0.03,
+            rate_specular: 0.015,
+            rate_roughness: 0.04,
+            rate_light: 0.03,
+            final_rate: 0.05,
+            lobe_ramp: 20,
+            first_hits_mib: 1024,
+            held_out_interval: 10,
+        }
+    }
+}
+
+impl FitSettings {
+    /// Checks every range; the error names the setting.
+    pub fn validate(&self) -> Result<()> {
+        let wrong = |name: &str, message: &str| {
+            Err(Error::new(ErrorKind::InvalidSetting, message).at(Place::Setting(name.into())))
+        };
+        if !self.map_size.is_power_of_two() || !(16..=8192).contains(&self.map_size) {
+            return wrong("map-size", "must be a power of two from 16 to 8192");
+        }
+        if !(2..=1024).contains(&self.environment_height) {
+            return wrong("environment-height", "must be 2 to 1024");
+        }
+        if self.samples == 0 || self.samples > 4096 {
+            return wrong("samples", "must be 1 to 4096");
+        }
+        if self.bounces == 0 || self.bounces > crate::render::path::MAX_BOUNCES {
+            return wrong("bounces", "must be 1 to 16");
+        }
+        if self.views_per_step == 0 {
+            return wrong("views-per-step", "must be at least 1");
+        }
+        if self.consistency != Consistency::None && self.views_per_step < 2 {
+            return wrong("views-per-step", "must be at least 2 for consistency between views");
+        }
+        if !(1..=6).contains(&self.levels) || self.map_size >> (self.levels - 1) < 8 {
+            return wrong("levels", "must be 1 to 6 and leave maps of at least 8 texels");
+        }
+        if self.steps_diffuse + self.steps_all == 0 {
+            return wrong("steps-all", "must be at least 1");
+        }
+        for (name, rate) in [
+            ("rate-diffuse", self.rate_diffuse),
+            ("rate-specular", self.rate_specular),
+            ("rate-roughness", self.rate_roughness),
+            ("rate-light", self.rate_light),
+            ("final-rate", self.final_rate),
+        ] {
+            if !(rate.is_finite() && (0.0..=1.0).contains(&rate)) {
+                return wrong(name, "must be 0 to 1");
+            }
+        }
+        Ok(())
+    }
+
+    /// The settings as TOML, only those that differ from the defaults.
+    pub fn to_toml(&self) -> String {
+        let own = toml::Table::try_from(self).unwrap_or_default();
+        let default = toml::Table::try_from(FitSettings::default()).unwrap_or_default();
+        let changed: toml::Table = own.into_iter().filter(|(name, value)| default.get(name) != Some(value)).collect();
+        toml::to_string_pretty(&changed).unwrap_or_default()
+    }
+
+    /// The settings of a TOML text; what it does not name keeps its default.
+    pub fn from_toml(text: &str) -> Result<Self> {
+        toml::from_str(text).map_err(|source| {
+            Error::new(ErrorKind::Malformed, format!("settings are not understood: {}", source.message()))
+                .remedy("names are those of `patina fit --help`")
+        })
+    }
+
+    /// Name, value and whether it is the default, for reports.
+    pub fn listed(&self) -> Vec<(String, String, bool)> {
+        let own = toml::Table::try_from(self).unwrap_or_default();
+        let default = toml::Table::try_from(FitSettings::default()).unwrap_or_default();
+        own.into_iter().map(|(name, value)| (name.clone(), value.to_string(), default.get(&name) == Some(&value))).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_settings_file_holds_only_the_differences_and_round_trips() {
+        let settings = FitSettings {
+            map_size: 512,
+            consistency: Consistency::Exact,
+            rate_light: 0.5,
+            exposure: true,
+            ..Default::default()
+        };
+        let text = settings.to_toml();
+        assert_eq!(text.lines().count(), 4, "{text}");
+        assert_eq!(FitSettings::from_toml(&text).unwrap(), settings);
+        assert_eq!(FitSettings::from_toml("").unwrap(), FitSettings::default());
+        assert!(FitSettings::from_toml("map-sise = 3").is_err());
+    }
+
+    #[test]
+    fn ranges_are_checked_by_name() {
+        FitSettings::default().validate().unwrap();
+        let error = FitSettings { map_size: 1000, ..Default::default() }.validate().unwrap_err();
+        assert!(error.to_string().contains("--map-size"), "{error}");
+        assert!(FitSettings { rate_diffuse: f32::NAN, ..Default::default() }.validate().is_err());
+    }
+}

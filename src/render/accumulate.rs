@@ -1,0 +1,316 @@
+//! Pixels in parallel, gradients reduced in a fixed order.
+//!
+//! Pixels are cut into chunks of a fixed size; each chunk is worked by one thread into a small table of its own, and
+//! tables are added to the gradient in the order of the chunks. The result does not depend on the number of threads.
+
+use super::first_hits::CameraRays;
+use super::path::{PathArena, PathTracer};
+use super::sums::{GradientSink, Parameters, add_weighted, radiance, radiance_backward};
+use crate::material::texels::Texel;
+use crate::material::{Material, TextureTap};
+use crate::math::random::{SampleStream, StreamKey};
+use crate::math::real::Real;
+use crate::math::sphere::BilinearTap;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Pixels of one chunk.
+const CHUNK_PIXELS: usize = 1024;
+/// Chunks that are in memory at once.
+const CHUNKS_AT_ONCE: usize = 32;
+
+/// Two independent estimates of a pixel, each the mean of half of the samples.
+///
+/// The product `(a - y)(b - y)` is an unbiased estimate of the squared error, where the square of a single noisy
+/// estimate would add its variance; its derivative is exact for the same numbers.
+#[derive(Clone, Copy, Debug)]
+pub struct PixelEstimate<R> {
+    /// Mean of the first half of the samples.
+    pub first: [R; 3],
+    /// Mean of the second half; equal to the first when there is one sample.
+    pub second: [R; 3],
+    /// Share of the camera rays that met nothing, in [0, 1].
+    pub escaped: f32,
+}
+
+/// The derivative of the loss by the two estimates of a pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct PixelDerivative<R> {
+    /// The pixel's part of the loss.
+    pub loss: R,
+    /// Derivative by [`PixelEstimate::first`].
+    pub d_first: [R; 3],
+    /// Derivative by [`PixelEstimate::second`].
+    pub d_second: [R; 3],
+}
+
+/// A loss over pixels.
+pub trait PixelLoss<R>: Sync {
+    /// The loss and its derivative at a pixel (row-major index); `None` where the photo says nothing.
+    fn at(&self, pixel: usize, estimate: &PixelEstimate<R>) -> Option<PixelDerivative<R>>;
+}
+
+/// The random numbers of a pass.
+#[derive(Clone, Copy, Debug)]
+pub struct PassKey {
+    /// Seed of the run.
+    pub seed: u64,
+    /// Step of the fit.
+    pub step: u32,
+    /// Index of the view.
+    pub view: u32,
+}
+
+impl PassKey {
+    /// The stream of sample `sample` of `samples` at a pixel. The halves of the samples have streams of their own, so
+    /// that the two estimates are independent.
+    pub fn stream(&self, pixel: usize, sample: usize, samples: usize) -> SampleStream {
+        let half = (samples / 2).max(1);
+        let second = u32::from(sample >= half && samples > 1);
+        let key = StreamKey::new(self.seed ^ (u64::from(second) << 62), self.step, self.view, pixel as u32);
+        SampleStream::new(key, if second == 1 { sample - half } else { sample } as u32)
+    }
+}
+
+/// What a pass over pixels adds up.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PassTotals<R> {
+    /// Sum of the loss.
+    pub loss: R,
+    /// Pixels that said something.
+    pub pixels: u64,
+    /// Pixels whose estimate or derivative was not finite: left out.
+    pub non_finite_pixels: u64,
+    /// The first of them, row-major.
+    pub first_non_finite: Option<usize>,
+}
+
+/// Traces the given pixels of a view and adds the derivatives of `loss` to `gradient`.
+///
+/// `gradient` has the shape of `parameters`; its coarse mip levels are filled as well: pull them down afterwards.
+/// Returns early, with the totals so far, when `stop` is set.
+pub fn accumulate<R: Real>(
+    tracer: &PathTracer<'_>,
+    rays: &CameraRays<'_>,
+    pixels: &[u32],
+    key: PassKey,
+    parameters: &Parameters<R>,
+    loss: &impl PixelLoss<R>,
+    gradient: &mut Parameters<R>,
+    stop: &AtomicBool,
+) -> PassTotals<R> {
+    let mut totals = PassTotals::default();
+    let chunks: Vec<&[u32]> = pixels.chunks(CHUNK_PIXELS).collect();
+    for wave in chunks.chunks(CHUNKS_AT_ONCE) {
+        if stop.load(Ordering::Relaxed) {
+            break;
+        }
+        let results: Vec<(PassTotals<R>, ChunkGradient<R>)> = wave
+            .par_iter()
+            .map(|chunk| {
+                let mut table = ChunkGradient::new(parameters.light.len());
+                let totals = work_chunk(tracer, rays, chunk, key, parameters, loss, &mut table, stop);
+                (totals, table)
+            })
+            .collect();
+        for (part, table) in results {
+            totals.loss += part.loss;
+            totals.pixels += part.pixels;
+            totals.non_finite_pixels += part.non_finite_pixels;
+            totals.first_non_finite = totals.first_non_finite.or(part.first_non_finite);
+            table.add_to(gradient);
+        }
+    }
+    totals
+}
+
+fn work_chunk<R: Real>(
+    tracer: &PathTracer<'_>,
+    rays: &CameraRays<'_>,
+    pixels: &[u32],
+    key: PassKey,
+    parameters: &Parameters<R>,
+    loss: &impl PixelLoss<R>,
+    table: &mut ChunkGradient<R>,
+    stop: &AtomicBool,
+) -> PassTotals<R> {
+    let samples = rays.samples();
+    let strength = tracer.settings.lobe_strength;
+    let mut arena = PathArena::default();
+    let mut totals = PassTotals::default();
+    for &pixel in pixels {
+        if stop.load(Ordering::Relaxed) {
+            break;
+        }
+        let pixel = pixel as usize;
+        let estimate = estimate_pixel(tracer, rays, pixel, key, parameters, &mut arena);
+        if !estimate.first.iter().chain(&estimate.second).all(|value| value.is_finite()) {
+            totals.non_finite_pixels += 1;
+            totals.first_non_finite.get_or_insert(pixel);
+            continue;
+        }
+        let Some(derivative) = loss.at(pixel, &estimate) else { continue };
+        totals.loss += derivative.loss;
+        totals.pixels += 1;
+        let half = (samples / 2).max(1);
+        for (sample, path) in arena.paths.iter().enumerate() {
+            let (d_mean, count) = if samples == 1 {
+                (std::array::from_fn(|c| derivative.d_first[c] + derivative.d_second[c]), 1)
+            } else if sample < half {
+                (derivative.d_first, half)
+            } else {
+                (derivative.d_second, samples - half)
+            };
+            let share = R::from_f32(1.0 / count as f32);
+            radiance_backward(parameters, &arena, path, strength, d_mean.map(|d| d * share), table);
+        }
+    }
+    totals
+}
+
+/// Traces the samples of a pixel into `arena` (cleared first) and adds up its two estimates.
+pub fn estimate_pixel<R: Real>(
+    tracer: &PathTracer<'_>,
+    rays: &CameraRays<'_>,
+    pixel: usize,
+    key: PassKey,
+    parameters: &Parameters<R>,
+    arena: &mut PathArena,
+) -> PixelEstimate<R> {
+    trace_pixel(tracer, rays, pixel, key, arena);
+    sum_pixel(parameters, arena, tracer.settings.lobe_strength)
+}
+
+/// Traces the samples of a pixel into `arena`, cleared first.
+pub fn trace_pixel(
+    tracer: &PathTracer<'_>,
+    rays: &CameraRays<'_>,
+    pixel: usize,
+    key: PassKey,
+    arena: &mut PathArena,
+) {
+    arena.clear();
+    let samples = rays.samples();
+    for sample in 0..samples {
+        let mut stream = key.stream(pixel, sample, samples);
+        let (ray, hit) = rays.at(pixel, sample, &mut stream);
+        tracer.trace(&ray, hit, &mut stream, arena);
+    }
+}
+
+/// The two estimates of a pixel whose paths are in `arena`.
+pub fn sum_pixel<R: Real>(parameters: &Parameters<R>, arena: &PathArena, lobe_strength: f32) -> PixelEstimate<R> {
+    let samples = arena.paths.len();
+    let half = (samples / 2).max(1);
+    let mut sums = [[R::zero(); 3]; 2];
+    let mut escaped = 0;
+    for (sample, path) in arena.paths.iter().enumerate() {
+        let value = radiance(parameters, arena, path, lobe_strength);
+        let sum = &mut sums[usize::from(sample >= half)];
+        for channel in 0..3 {
+            sum[channel] += value[channel];
+        }
+        escaped += usize::from(path.escaped);
+    }
+    let first = sums[0].map(|sum| sum * R::from_f32(1.0 / half as f32));
+    let second =
+        if samples > 1 { sums[1].map(|sum| sum * R::from_f32(1.0 / (samples - half) as f32)) } else { first };
+    PixelEstimate { first, second, escaped: escaped as f32 / samples.max(1) as f32 }
+}
+
+/// Gradients of one chunk: an open-addressing table of texels and a dense light.
+struct ChunkGradient<R> {
+    /// `level << 28 | index`, or `EMPTY`.
+    keys: Vec<u32>,
+    texels: Vec<Texel<R>>,
+    used: usize,
+    light: Vec<[R; 3]>,
+}
+
+const EMPTY: u32 = u32::MAX;
+const LEVEL_SHIFT: u32 = 28;
+
+impl<R: Real> ChunkGradient<R> {
+    fn new(light_texels: usize) -> Self {
+        ChunkGradient {
+            keys: vec![EMPTY; 1 << 13],
+            texels: vec![[R::zero(); 8]; 1 << 13],
+            used: 0,
+            light: vec![[R::zero(); 3]; light_texels],
+        }
+    }
+
+    #[inline(always)]
+    fn texel(&mut self, key: u32) -> &mut Texel<R> {
+        let mask = self.keys.len() - 1;
+        let mut slot = (key.wrapping_mul(0x9e37_79b1) >> 7) as usize & mask;
+        loop {
+            if self.keys[slot] == key {
+                return &mut self.texels[slot];
+            }
+            if self.keys[slot] == EMPTY {
+                break;
+            }
+            slot = (slot + 1) & mask;
+        }
+        if self.used * 4 >= self.keys.len() * 3 {
+            self.grow();
+            return self.texel(key);
+        }
+        self.used += 1;
+        self.keys[slot] = key;
+        &mut self.texels[slot]
+    }
+
+    #[cold]
+    fn grow(&mut self) {
+        let keys = std::mem::take(&mut self.keys);
+        let texels = std::mem::take(&mut self.texels);
+        self.keys = vec![EMPTY; keys.len() * 2];
+        self.texels = vec![[R::zero(); 8]; keys.len() * 2];
+        self.used = 0;
+        for (key, texel) in keys.into_iter().zip(texels) {
+            if key != EMPTY {
+                *self.texel(key) = texel;
+            }
+        }
+    }
+
+    fn add_to(&self, gradient: &mut Parameters<R>) {
+        for (&key, texel) in self.keys.iter().zip(&self.texels) {
+            if key != EMPTY {
+                let level = &mut gradient.texels.levels[(key >> LEVEL_SHIFT) as usize];
+                let total = &mut level.texels[(key & ((1 << LEVEL_SHIFT) - 1)) as usize];
+                for (total, &value) in total.iter_mut().zip(texel) {
+                    *total += value;
+                }
+            }
+        }
+        for (total, light) in gradient.light.iter_mut().zip(&self.light) {
+            for channel in 0..3 {
+                total[channel] += light[channel];
+            }
+        }
+    }
+}
+
+impl<R: Real> GradientSink<R> for ChunkGradient<R> {
+    #[inline(always)]
+    fn add_material(&mut self, tap: &TextureTap, d_material: &Material<R>) {
+        let d = d_material.to_array();
+        for k in 0..4 {
+            add_weighted(self.texel(tap.level << LEVEL_SHIFT | tap.index[k]), &d, tap.weight[k]);
+        }
+    }
+
+    #[inline(always)]
+    fn add_light(&mut self, tap: &BilinearTap, d_radiance: [R; 3]) {
+        for k in 0..4 {
+            let weight = R::from_f32(tap.weight[k]);
+            let light = &mut self.light[tap.index[k] as usize];
+            for channel in 0..3 {
+                light[channel] += d_radiance[channel] * weight;
+            }
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! Pictures and layers of a view.
+
+use super::accumulate::{PassKey, estimate_pixel};
+use super::first_hits::{CameraRays, PixelFilter};
+use super::path::{PathArena, PathSettings, PathTracer};
+use super::sums::Parameters;
+use super::surface::Surface;
+use crate::image::{GreyImage, Image, RgbImage};
+use crate::light::EnvironmentSampler;
+use crate::math::random::{SampleStream, StreamKey};
+use crate::scene::Camera;
+use glam::Vec3;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// How a picture is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PictureSettings {
+    /// Samples a pixel in one group.
+    pub samples: usize,
+    /// Independent groups; two or more give a variance.
+    pub groups: usize,
+    /// How samples are spread over a pixel.
+    pub filter: PixelFilter,
+    /// Number of surface hits on the longest path.
+    pub max_bounces: usize,
+    /// Strength of the specular lobe as a whole, in [0, 1].
+    pub lobe_strength: f32,
+    /// Whether the environment shows behind the surface.
+    pub background_visible: bool,
+    /// Seed of the random numbers.
+    pub seed: u64,
+}
+
+impl Default for PictureSettings {
+    fn default() -> Self {
+        PictureSettings {
+            samples: 64,
+            groups: 1,
+            filter: PixelFilter::Box,
+            max_bounces: 3,
+            lobe_strength: 1.0,
+            background_visible: true,
+            seed: 1,
+        }
+    }
+}
+
+/// A picture in linear radiance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Linear RGB.
+    pub radiance: RgbImage,
+    /// Variance of each pixel's mean, from independent groups of samples; `None` for one group.
+    pub variance: Option<RgbImage>,
+    /// Share of each pixel that the surface covers, in [0, 1].
+    pub coverage: GreyImage,
+    /// Pixels that were not finite and are black instead.
+    pub non_finite_pixels: usize,
+}
+
+/// Renders a view by path tracing. Stops early, with black pixels, when `stop` is set.
+pub fn render(
+    surface: &Surface,
+    camera: &Camera,
+    parameters: &Parameters<f32>,
+    view: u32,
+    settings: &PictureSettings,
+    stop: &AtomicBool,
+) -> Picture {
+    let sampler = EnvironmentSampler::new(&parameters.environment());
+    let tracer = PathTracer {
+        surface,
+        proposal: &parameters.texels,
+        light: &sampler,
+        environment_size: parameters.environment_size,
+        settings: PathSettings {
+            max_bounces: settings.max_bounces,
+            lobe_strength: settings.lobe_strength,
+            background_visible: settings.background_visible,
+            camera_cone_radians: 0.0,
+            bounce_cone_radians: 0.0,
+        },
+    };
+    let rays = CameraRays::fresh(surface, camera, settings.filter, settings.samples);
+    let groups = settings.groups.max(1);
+    let pixels: Vec<(Vec3, Vec3, f32, bool)> = (0..camera.width * camera.height)
+        .into_par_iter()
+        .map_init(PathArena::default, |arena, pixel| {
+            if stop.load(Ordering::Relaxed) {
+                return (Vec3::ZERO, Vec3::ZERO, 0.0, true);
+            }
+            let (mut mean, mut squared_deviations, mut escaped) = (Vec3::ZERO, Vec3::ZERO, 0.0);
+            for group in 0..groups {
+                let key = PassKey { seed: settings.seed, step: group as u32, view };
+                let estimate = estimate_pixel(&tracer, &rays, pixel, key, parameters, arena);
+                let half = (rays.samples() / 2).max(1) as f32;
+                let share = if rays.samples() > 1 { half / rays.samples() as f32 } else { 1.0 };
+                let value =
+                    Vec3::from_array(estimate.first) * share + Vec3::from_array(estimate.second) * (1.0 - share);
+                let delta = value - mean;
+                mean += delta / (group + 1) as f32;
+                squared_deviations += delta * (value - mean);
+                escaped += estimate.escaped;
+            }
+            let variance = squared_deviations / ((groups - 1).max(1) * groups) as f32;
+            let coverage = 1.0 - escaped / groups as f32;
+            if mean.is_finite() { (mean, variance, coverage, true) } else { (Vec3::ZERO, Vec3::ZERO, coverage, false) }
+        })
+        .collect();
+    let (width, height) = (camera.width, camera.height);
+    let image = |pixel: fn(&(Vec3, Vec3, f32, bool)) -> Vec3| {
+        Image::from_pixels(width, height, pixels.iter().map(pixel).collect())
+    };
+    Picture {
+        radiance: image(|pixel| pixel.0),
+        variance: (groups > 1).then(|| image(|pixel| pixel.1)),
+        coverage: Image::from_pixels(width, height, pixels.iter().map(|pixel| pixel.2).collect()),
+        non_finite_pixels: pixels.iter().filter(|pixel| !pixel.3).count(),
+    }
+}
+
+/// Layers of a view without light: what the camera sees of the maps.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layers {
+    /// Diffuse reflectance, linear RGB, averaged over the covered part of each pixel.
+    pub diffuse: RgbImage,
+    /// Specular reflectance F0.
+    pub specular: RgbImage,
+    /// Roughness `r = a^2`.
+    pub roughness: GreyImage,
+    /// Unit shading normal in the world; zero where nothing is seen.
+    pub normal: RgbImage,
+    /// Share of each pixel that the surface covers, in [0, 1].
+    pub coverage: GreyImage,
+}
+
+/// Renders the layers of a view with `samples` rays a pixel.
+pub fn layers(surface: &Surface, camera: &Camera, parameters: &Parameters<f32>, samples: usize) -> Layers {
+    #[derive(Clone, Copy, Default)]
+    struct Pixel {
+        diffuse: Vec3,
+        specular: Vec3,
+        roughness: f32,
+        normal: Vec3,
+        coverage: f32,
+    }
+    let samples = samples.max(1);
+    let rays = CameraRays::fresh(surface, camera, PixelFilter::Box, samples);
+    let pixels: Vec<Pixel> = (0..camera.width * camera.height)
+        .into_par_iter()
+        .map(|pixel| {
+            let mut sum = Pixel::default();
+            for sample in 0..samples {
+                let mut stream = SampleStream::new(StreamKey::new(0, 0, 0, pixel as u32), sample as u32);
+                let (ray, Some(hit)) = rays.at(pixel, sample, &mut stream) else { continue };
+                let point = surface.point(&hit);
+                if point.geometric_normal.dot(ray.direction) >= 0.0 {
+                    continue;
+                }
+                let material = parameters.texels.fetch(&parameters.texels.tap(point.uv, 0));
+                sum.diffuse += Vec3::from_array(material.diffuse);
+                sum.specular += Vec3::from_array(material.specular);
+                sum.roughness += (2.0 * material.log_width).exp();
+                sum.normal += point.shading_normal;
+                sum.coverage += 1.0;
+            }
+            let share = if sum.coverage > 0.0 { 1.0 / sum.coverage } else { 0.0 };
+            Pixel {
+                diffuse: sum.diffuse * share,
+                specular: sum.specular * share,
+                roughness: sum.roughness * share,
+                normal: sum.normal.normalize_or_zero(),
+                coverage: sum.coverage / samples as f32,
+            }
+        })
+        .collect();
+    let (width, height) = (camera.width, camera.height);
+    let rgb = |pick: fn(&Pixel) -> Vec3| Image::from_pixels(width, height, pixels.iter().map(pick).collect());
+    let grey = |pick: fn(&Pixel) -> f32| Image::from_pixels(width, height, pixels.iter().map(pick).collect());
+    Layers {
+        diffuse: rgb(|pixel| pixel.diffuse),
+        specular: rgb(|pixel| pixel.specular),
+        roughness: grey(|pixel| pixel.roughness),
+        normal: rgb(|pixel| pixel.normal),
+        coverage: grey(|pixel| pixel.coverage),
+    }
+}
