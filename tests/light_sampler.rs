@@ -51,7 +51,11 @@ fn integrated_density(sampler: &EnvironmentSampler, width: usize, height: usize,
     for row in 0..height * split {
         let solid_angle = sphere::solid_angle_of_texel(row, width * split, height * split);
         for column in 0..width * split {
-            let direction = sphere::direction_of_texel(row, column, width * split, height * split);
+            // The middle of the solid angle, not of theta: at a pole they differ.
+            let edge = |row: usize| (std::f64::consts::PI * row as f64 / (height * split) as f64).cos();
+            let theta = (0.5 * (edge(row) + edge(row + 1))).acos() as f32;
+            let phi = std::f32::consts::TAU * (column as f32 + 0.5) / (width * split) as f32;
+            let direction = sphere::direction_of_angles(phi, theta);
             bins[row / split * width + column / split] += f64::from(sampler.pdf(direction)) * solid_angle;
         }
     }
@@ -62,8 +66,10 @@ fn integrated_density(sampler: &EnvironmentSampler, width: usize, height: usize,
 fn the_density_integrates_to_one() {
     for (name, environment) in lights() {
         let sampler = EnvironmentSampler::new(&environment);
-        let integral: f64 = integrated_density(&sampler, 128, 64, 8).iter().sum();
+        let integral: f64 =
+            integrated_density(&sampler, 2 * environment.width(), 2 * environment.height(), 5).iter().sum();
         assert!((integral - 1.0).abs() < 1e-3, "{name}: {integral}");
+        println!("{name}: density integrates to 1 {:+.1e}", integral - 1.0);
     }
 }
 
@@ -76,7 +82,7 @@ fn samples_follow_the_density_by_a_chi_square_test() {
     for (name, environment) in lights {
         let sampler = EnvironmentSampler::new(&environment);
         let (width, height) = (60, 28);
-        let expected = integrated_density(&sampler, width, height, 16);
+        let expected = integrated_density(&sampler, width, height, 12);
         let mut counts = vec![0usize; width * height];
         let mut random = SequentialRandom::new(5);
         for _ in 0..SAMPLES {
@@ -144,11 +150,11 @@ fn the_estimate_of_irradiance_is_unbiased() {
     let lights = lights();
     for (name, environment) in &lights {
         let sampler = EnvironmentSampler::new(environment);
-        for normal in [Vec3::Y, Vec3::new(0.6, 0.0, 0.8), Vec3::new(-0.48, -0.6, -0.64)] {
+        for normal in [Vec3::Y, Vec3::new(-0.48, -0.6, -0.64)] {
             let truth = environment.irradiance(normal);
             let mut random = SequentialRandom::new(17);
             let mut moments = [Moments::default(); 3];
-            for _ in 0..40_000 {
+            for _ in 0..20_000 {
                 let (direction, density) = sampler.sample([random.next_number(), random.next_number()]).unwrap();
                 let value = environment.radiance_towards(direction) * direction.dot(normal).max(0.0) / density;
                 (0..3).for_each(|channel| moments[channel].add(f64::from(value[channel])));
