@@ -203,17 +203,12 @@ fn blurred(image: &Image<[f64; 5]>) -> Image<[f64; 5]> {
     if image.pixels().is_empty() {
         return image.clone();
     }
-    let along_rows = each_row(width, height, |row, column| {
-        windowed(column, width, |neighbour| image[(row, neighbour)])
-    });
+    let along_rows =
+        each_row(width, height, |row, column| windowed(column, width, |neighbour| image[(row, neighbour)]));
     each_row(width, height, |row, column| windowed(row, height, |neighbour| along_rows[(neighbour, column)]))
 }
 
-fn each_row(
-    width: usize,
-    height: usize,
-    pixel: impl Fn(usize, usize) -> [f64; 5] + Sync,
-) -> Image<[f64; 5]> {
+fn each_row(width: usize, height: usize, pixel: impl Fn(usize, usize) -> [f64; 5] + Sync) -> Image<[f64; 5]> {
     let mut image = Image::filled(width, height, [0.0; 5]);
     image.pixels_mut().par_chunks_mut(width).enumerate().for_each(|(row, pixels)| {
         pixels.iter_mut().enumerate().for_each(|(column, value)| *value = pixel(row, column));

@@ -194,13 +194,7 @@ impl MipChain {
 
 impl Step {
     /// The area-weighted sum of `value(index, area)` under each coarse texel.
-    fn gather(
-        &self,
-        width: usize,
-        height: usize,
-        value: impl Fn(usize, f32) -> f32,
-        fine_width: usize,
-    ) -> Image<f32> {
+    fn gather(&self, width: usize, height: usize, value: impl Fn(usize, f32) -> f32, fine_width: usize) -> Image<f32> {
         Image::from_fn(width, height, |row, column| {
             let mut sum = 0.0;
             for (fine_row, row_part) in self.rows.fine_of_coarse[row].pairs() {
@@ -236,9 +230,8 @@ mod tests {
         let mut random = SequentialRandom::new(1);
         for (width, height) in [(64, 32), (37, 51), (3, 7), (1, 9), (1, 1)] {
             let mut holes = random;
-            let weight = Image::from_fn(width, height, |_, _| {
-                if holes.next_number() < 0.4 { 0.0 } else { holes.next_number() }
-            });
+            let weight =
+                Image::from_fn(width, height, |_, _| if holes.next_number() < 0.4 { 0.0 } else { holes.next_number() });
             let chain = MipChain::new(&weight, usize::MAX);
             let base = random_image::<7>(width, height, &mut random);
             let levels = chain.build(&base);

@@ -1,10 +1,16 @@
 //! The light of a scene: an environment infinitely far away.
+//!
+//! Read [`environment`] first: a latitude-longitude map of radiance, looked up bilinearly, and what can be asked of it.
+//! [`sampler`] draws directions for next-event estimation, [`resample`] turns and resizes a map without losing
+//! energy, [`sky`] makes a daylight when there is no photograph of one.
+//!
+//! What is not here: lamps, area lights and anything near; and no visibility, that is the tracer's.
 
-use crate::image::RgbImage;
+pub mod environment;
+mod inversion;
+pub mod resample;
+pub mod sampler;
+pub mod sky;
 
-/// A latitude-longitude map of radiance, in the conventions of the crate's front page.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Environment {
-    /// Linear RGB radiance, row 0 up; all values finite and at least 0.
-    pub radiance: RgbImage,
-}
+pub use environment::Environment;
+pub use sampler::EnvironmentSampler;

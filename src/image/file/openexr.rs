@@ -32,7 +32,8 @@ pub fn size(reader: &mut (impl BufRead + Seek), path: &Path, length: u64) -> Res
         if pixels > super::source::LARGEST_PIXEL_COUNT {
             return Err(too_large(path, format!("the file claims {width} x {height} pixels")));
         }
-        let sample_bytes: usize = header.channels.list.iter().map(|channel| channel.sample_type.bytes_per_sample()).sum();
+        let sample_bytes: usize =
+            header.channels.list.iter().map(|channel| channel.sample_type.bytes_per_sample()).sum();
         let bytes = pixels.saturating_mul(sample_bytes as u64);
         let ratio = match header.compression {
             openexr::Compression::Uncompressed => 1,
@@ -40,7 +41,10 @@ pub fn size(reader: &mut (impl BufRead + Seek), path: &Path, length: u64) -> Res
             _ => u64::MAX,
         };
         if bytes / ratio > length {
-            return Err(implausible(path, format!("{length} bytes cannot hold the {width} x {height} pixels it claims")));
+            return Err(implausible(
+                path,
+                format!("{length} bytes cannot hold the {width} x {height} pixels it claims"),
+            ));
         }
         decoded = decoded.saturating_add(bytes);
     }
@@ -113,9 +117,10 @@ fn read_layers(source: &Source) -> Result<Layers> {
             .from_buffered(&mut cursor))
     })?;
     let image = outcome.map_err(|error| explain(error, &source.path, cursor.position()))?;
-    let names = image.layer_data.iter().map(|layer| {
-        layer.channel_data.list.iter().map(|channel| channel.name.to_string()).collect()
-    });
+    let names = image
+        .layer_data
+        .iter()
+        .map(|layer| layer.channel_data.list.iter().map(|channel| channel.name.to_string()).collect());
     Ok(Layers { names: names.collect(), image })
 }
 

@@ -86,7 +86,10 @@ fn explain(error: ImageError, path: &Path, byte: u64) -> Error {
 fn checked<T>(source: &Source, width: u32, height: u32, pixels: Vec<T>) -> Result<Image<T>> {
     let (width, height) = (width as usize, height as usize);
     if pixels.len() != width * height || (width, height) != (source.header.width, source.header.height) {
-        return Err(implausible(&source.path, format!("the decoded image is not the {width} x {height} of its header")));
+        return Err(implausible(
+            &source.path,
+            format!("the decoded image is not the {width} x {height} of its header"),
+        ));
     }
     Ok(Image::from_pixels(width, height, pixels))
 }
