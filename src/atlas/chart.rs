@@ -133,11 +133,8 @@ impl ChartMesh {
 
     /// Parts the chart in two edge-connected halves of surface triangles: seeds far apart, each triangle to the nearer.
     pub fn halves(&self, surface: &Surface) -> [Vec<u32>; 2] {
-        let centres: Vec<DVec3> = self
-            .triangles
-            .iter()
-            .map(|&triangle| surface.corners(triangle).into_iter().sum::<DVec3>() / 3.0)
-            .collect();
+        let centres: Vec<DVec3> =
+            self.triangles.iter().map(|&triangle| surface.corners(triangle).into_iter().sum::<DVec3>() / 3.0).collect();
         let farthest = |distances: &[f64]| {
             (0..distances.len()).max_by(|&a, &b| distances[a].total_cmp(&distances[b]).then(b.cmp(&a))).unwrap_or(0)
         };
@@ -194,34 +191,4 @@ impl Ord for OrderedLength {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
         self.0.total_cmp(&other.0)
     }
-}
-
-/// Parts a set of triangles in edge-connected ones, each ascending, in the order of their first triangle.
-pub(crate) fn connected_parts(surface: &Surface, triangles: &[u32]) -> Vec<Vec<u32>> {
-    let mut seen = vec![false; triangles.len()];
-    let mut parts = Vec::new();
-    for start in 0..triangles.len() {
-        if seen[start] {
-            continue;
-        }
-        seen[start] = true;
-        let mut part = vec![triangles[start]];
-        let mut stack = vec![triangles[start]];
-        while let Some(triangle) = stack.pop() {
-            for edge in 0..3 {
-                let other = surface.topology.across[triangle as usize * 3 + edge];
-                if other != NONE
-                    && let Ok(neighbour) = triangles.binary_search(&(other / 3))
-                    && !seen[neighbour]
-                {
-                    seen[neighbour] = true;
-                    part.push(triangles[neighbour]);
-                    stack.push(triangles[neighbour]);
-                }
-            }
-        }
-        part.sort_unstable();
-        parts.push(part);
-    }
-    parts
 }

@@ -7,7 +7,7 @@
 use super::chart::{ChartMesh, Surface};
 use super::lscm;
 use super::outline;
-use super::quality::{Distortion, chart_distortion};
+use super::quality::chart_distortion;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -17,7 +17,6 @@ pub(crate) struct FlatChart {
     pub chart: ChartMesh,
     /// Point of each chart vertex; the area of the chart equals its area in space.
     pub points: Vec<DVec2>,
-    pub distortion: Distortion,
 }
 
 /// What a chart may cost.
@@ -51,8 +50,7 @@ pub(crate) fn try_flatten(surface: &Surface, chart: ChartMesh, limits: Limits) -
     }
     if let [triangle] = chart.triangles[..] {
         let points = lscm::lay_flat(surface.corners(triangle)).unwrap_or_default().to_vec();
-        let distortion = Distortion::default();
-        return Ok(FlatChart { chart, points, distortion });
+        return Ok(FlatChart { chart, points });
     }
     let mean: DVec3 =
         chart.triangles.iter().map(|&t| surface.normals[t as usize] * surface.areas[t as usize]).sum::<DVec3>();
@@ -75,11 +73,10 @@ pub(crate) fn try_flatten(surface: &Surface, chart: ChartMesh, limits: Limits) -
 
 /// The chart with these points, scaled to its area in space, when it is good.
 fn checked(surface: &Surface, chart: &ChartMesh, mut points: Vec<DVec2>, limits: Limits) -> Option<FlatChart> {
-    let double_areas =
-        chart.corners.iter().map(|corners| {
-            let [a, b, c] = corners.map(|vertex| points[vertex as usize]);
-            (b - a).perp_dot(c - a)
-        });
+    let double_areas = chart.corners.iter().map(|corners| {
+        let [a, b, c] = corners.map(|vertex| points[vertex as usize]);
+        (b - a).perp_dot(c - a)
+    });
     let mut sum = 0.0;
     for double_area in double_areas {
         if double_area.is_nan() || double_area <= 0.0 {
@@ -93,7 +90,7 @@ fn checked(surface: &Surface, chart: &ChartMesh, mut points: Vec<DVec2>, limits:
     let distortion = chart_distortion(surface, chart, &points);
     let good = distortion.angle_mean <= limits.angle && distortion.area_mean <= limits.area;
     (good && !outline::wraps(chart, &points) && !outline::crosses_itself(&chart.loops, &points))
-        .then(|| FlatChart { chart: chart.clone(), points, distortion })
+        .then(|| FlatChart { chart: chart.clone(), points })
 }
 
 /// Lays every cluster flat; `label` names the cluster of each triangle.

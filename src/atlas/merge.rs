@@ -15,18 +15,40 @@ use std::collections::{HashMap, HashSet};
 const UNION_LIMITS: Limits = Limits { angle: 1.04, area: 1.15 };
 /// Room that a union may take, as a multiple of the room of its halves: fewer seams are worth a little room.
 const ROOM_FACTOR: f64 = 1.05;
+/// Share of its box that a large union has to fill: small charts nest beside a crooked one, large ones leave it bare.
+const FILL_LEAST: f64 = 0.66;
+/// Share of the surface from which a union is large.
+const LARGE: f64 = 0.03;
 /// Share of the outline of the smaller chart that has to be common.
 const SHARED_LEAST: f64 = 0.08;
 const ROUNDS: usize = 60;
-/// Triangles mapped on trial, as a multiple of the triangles of the mesh, before no more pairs are tried.
-const TRIAL_BUDGET: usize = 6;
+/// Triangles mapped on trial before no more pairs are tried: six times those of the mesh, less often for large meshes.
+fn trial_budget(triangles: usize) -> usize {
+    (6 * triangles).min((triangles * 5 / 4).max(500_000))
+}
 
 struct Candidate {
     flat: FlatChart,
     outline: f64,
     room: f64,
+    area: f64,
+    /// Share of its box.
+    fill: f64,
     /// Grows with every union, so that a pair that failed is not tried again until one of the two has changed.
     name: u32,
+}
+
+impl Candidate {
+    fn new(flat: FlatChart, gutter: f64, name: u32) -> Self {
+        let size = least_box(&flat.points).size;
+        let corners = |corners: &[u32; 3]| corners.map(|vertex| flat.points[vertex as usize]);
+        let area: f64 = flat.chart.corners.iter().map(corners).map(|[a, b, c]| (b - a).perp_dot(c - a) / 2.0).sum();
+        let outline = outline_length(&flat);
+        // Half way between the room of the chart and that of its box, for charts nest, with half a gutter around it.
+        let around = outline * gutter / 2.0 + gutter * gutter;
+        let room = 0.5 * (area + around + (size.x + gutter) * (size.y + gutter));
+        Candidate { flat, outline, room, area, fill: area / (size.x * size.y), name }
+    }
 }
 
 /// Merges charts. `texels_per_unit` is the expected scale of the map, `gutter` the empty texels around each chart.
@@ -38,11 +60,9 @@ pub(crate) fn merge(
     progress: &(dyn Fn(f32) + Sync),
 ) -> Vec<FlatChart> {
     let gutter = gutter as f64 / texels_per_unit;
-    let wrap = |(name, flat): (usize, FlatChart)| {
-        let (outline, room) = (outline_length(&flat), room(&flat, gutter));
-        Some(Candidate { flat, outline, room, name: name as u32 })
-    };
-    let mut charts: Vec<Option<Candidate>> = charts.into_iter().enumerate().map(wrap).collect();
+    let large = LARGE * surface.areas.iter().sum::<f64>();
+    let mut charts: Vec<Option<Candidate>> =
+        charts.into_iter().enumerate().map(|(name, flat)| Some(Candidate::new(flat, gutter, name as u32))).collect();
     let mut label = vec![0u32; surface.areas.len()];
     for (index, chart) in charts.iter().enumerate() {
         for &triangle in chart.iter().flat_map(|chart| &chart.flat.chart.triangles) {
@@ -51,7 +71,7 @@ pub(crate) fn merge(
     }
     let mut names = charts.len() as u32;
     let mut failed: HashSet<(u32, u32)> = HashSet::new();
-    let mut budget = TRIAL_BUDGET * surface.areas.len();
+    let mut budget = trial_budget(surface.areas.len());
     for round in 0..ROUNDS {
         let pairs = disjoint_pairs(surface, &label, &charts, &failed, &mut budget);
         if pairs.is_empty() {
@@ -65,8 +85,10 @@ pub(crate) fn merge(
                 triangles.extend(&b.flat.chart.triangles);
                 triangles.sort_unstable();
                 let flat = try_flatten(surface, ChartMesh::new(surface, triangles), UNION_LIMITS).ok()?;
-                let (outline, room) = (outline_length(&flat), room(&flat, gutter));
-                (room <= ROOM_FACTOR * (a.room + b.room)).then_some(Candidate { flat, outline, room, name: 0 })
+                let union = Candidate::new(flat, gutter, 0);
+                let halves_fill = (a.area * a.fill + b.area * b.fill) / (a.area + b.area);
+                let crooked = union.area > large && union.fill < FILL_LEAST.min(halves_fill);
+                (!crooked && union.room <= ROOM_FACTOR * (a.room + b.room)).then_some(union)
             })
             .collect();
         for (&(a, b), union) in pairs.iter().zip(unions) {
@@ -124,7 +146,8 @@ fn disjoint_pairs(
         if taken[a as usize] || taken[b as usize] {
             continue;
         }
-        let triangles = |index: u32| charts[index as usize].as_ref().map_or(0, |chart| chart.flat.chart.triangles.len());
+        let triangles =
+            |index: u32| charts[index as usize].as_ref().map_or(0, |chart| chart.flat.chart.triangles.len());
         let cost = triangles(a) + triangles(b);
         if cost > *budget {
             continue;
@@ -142,14 +165,4 @@ fn outline_length(flat: &FlatChart) -> f64 {
         (0..vertices.len()).map(|index| at(index).distance(at(index + 1))).sum()
     };
     flat.chart.loops.iter().map(length).sum()
-}
-
-/// Area that a chart takes on the map: half way between its own and that of its box, for charts nest, with half a
-/// gutter around it.
-fn room(flat: &FlatChart, gutter: f64) -> f64 {
-    let size = least_box(&flat.points).size;
-    let corners = |corners: &[u32; 3]| corners.map(|vertex| flat.points[vertex as usize]);
-    let area: f64 = flat.chart.corners.iter().map(corners).map(|[a, b, c]| (b - a).perp_dot(c - a) / 2.0).sum();
-    let around = outline_length(flat) * gutter / 2.0 + gutter * gutter;
-    0.5 * (area + around + (size.x + gutter) * (size.y + gutter))
 }

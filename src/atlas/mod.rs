@@ -156,25 +156,19 @@ pub fn build(mesh: &Mesh, settings: &AtlasSettings, progress: &(dyn Fn(f32) + Sy
         }
     }
 
-    let t0=std::time::Instant::now(); //ATLAS_TIMES
     let surface = Surface::new(&cleaned.mesh, &topology);
     let limits = Limits { angle: settings.angle_distortion_limit, area: settings.area_distortion_limit };
     let tiny_area = 1e-5 * surface.areas.iter().sum::<f64>();
     let labels = cluster::cluster(&surface, settings.normal_spread, 4, tiny_area);
-    eprintln!("cluster {:?}",t0.elapsed()); //ATLAS_TIMES
     progress(0.15);
     let charts = flatten::flatten_all(&surface, &labels, limits, &|share| progress(0.15 + 0.25 * share));
-    eprintln!("flatten {:?} {}",t0.elapsed(),charts.len()); //ATLAS_TIMES
     // The scale at which about 60 % of the map are filled: near enough to weigh gutters against areas.
     let area: f64 = surface.areas.iter().sum();
     let texels_per_unit = 0.77 * settings.resolution_texels as f64 / area.sqrt();
     let charts =
         merge::merge(&surface, charts, texels_per_unit, settings.gutter_texels, &|share| progress(0.4 + 0.3 * share));
-    eprintln!("merge {:?} {}",t0.elapsed(),charts.len()); //ATLAS_TIMES
-    let placements = pack::pack(&charts, settings.resolution_texels, settings.gutter_texels, &|share| {
-        progress(0.7 + 0.25 * share)
-    })?;
-    eprintln!("pack {:?}",t0.elapsed()); //ATLAS_TIMES
+    let placements =
+        pack::pack(&charts, settings.resolution_texels, settings.gutter_texels, &|share| progress(0.7 + 0.25 * share))?;
     let (mesh, chart_of_triangle) = assemble(&cleaned.mesh, &charts, &placements, settings.resolution_texels);
     let atlas = finish(mesh, chart_of_triangle, cleaned.source_triangle, findings, settings);
     progress(1.0);

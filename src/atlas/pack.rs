@@ -6,13 +6,15 @@
 //! is what the stored map has.
 
 use super::flatten::FlatChart;
-use super::shape::{Boxed, Shape, least_box};
+use super::shape::{Boxed, Shape, bounds, least_box};
 use crate::error::{Error, ErrorKind, Place, Result};
 use glam::{DAffine2, DMat2, DVec2};
 use rayon::prelude::*;
 
 /// Trials of the search for the scale.
 const TRIALS: usize = 8;
+/// Charts up to which large ones are also tried askew.
+const FEW_CHARTS: usize = 400;
 /// Share of the height that may stay empty when the search ends early.
 const GOOD_ENOUGH: f64 = 0.99;
 
@@ -87,60 +89,63 @@ struct Laid {
 }
 
 /// Lays all charts at a scale (texels per world unit) into the strip.
-fn lay(
-    charts: &[FlatChart],
-    boxes: &[Boxed],
-    order: &[usize],
-    scale: f64,
-    resolution: usize,
-    gutter: usize,
-) -> Laid {
-    let prepared: Vec<(DAffine2, [Shape; 4])> = order
-        .par_iter()
-        .map(|&index| {
-            let boxed = boxes[index];
-            let extent = boxed.size * scale;
-            let (width, height) = ((extent.x.ceil() as usize).max(1), (extent.y.ceil() as usize).max(1));
-            let slack = (DVec2::new(width as f64, height as f64) - extent) / 2.0;
-            let place = DAffine2::from_mat2_translation(boxed.rotation * scale, slack - boxed.low * scale);
-            let points: Vec<DVec2> =
-                charts[index].points.iter().map(|&point| place.transform_point2(point)).collect();
-            let triangles = charts[index].chart.corners.iter().map(|c| c.map(|vertex| points[vertex as usize]));
-            let shape = Shape::new(width, height, triangles);
-            let (quarter, half, last);
-            quarter = shape.quarter_turn();
-            half = quarter.quarter_turn();
-            last = half.quarter_turn();
-            (place, [shape, quarter, half, last])
-        })
-        .collect();
+fn lay(charts: &[FlatChart], boxes: &[Boxed], order: &[usize], scale: f64, resolution: usize, gutter: usize) -> Laid {
+    let prepared: Vec<Vec<(DAffine2, Shape)>> =
+        order.par_iter().map(|&index| poses(&charts[index], boxes[index], scale, resolution, charts.len())).collect();
     let mut strip = Strip::new(resolution);
     let mut laid = Laid { placements: vec![DAffine2::IDENTITY; charts.len()], height: 0, complete: true };
     let limit = resolution * 3 / 2;
-    for (&index, (place, turns)) in order.iter().zip(&prepared) {
-        // The turn whose top ends lowest wins; equal ones keep the first.
+    for (&index, poses) in order.iter().zip(&prepared) {
+        // The pose whose top ends lowest wins; equal ones keep the first.
         let mut best: Option<(usize, usize, usize, usize)> = None;
-        for (turn, shape) in turns.iter().enumerate() {
+        for (pose, (_, shape)) in poses.iter().enumerate() {
             let top = best.map_or(limit, |b| b.0 - 1);
             if let Some((x, y)) = strip.lowest_place(shape, top) {
-                best = Some((y + shape.height, turn, x, y));
+                best = Some((y + shape.height, pose, x, y));
             }
         }
-        let Some((top, turn, x, y)) = best else {
+        let Some((top, pose, x, y)) = best else {
             laid.complete = false;
             break;
         };
-        strip.occupy(&turns[turn], x, y, gutter);
+        let (place, shape) = &poses[pose];
+        strip.occupy(shape, x, y, gutter);
         laid.height = laid.height.max(top);
-        let offset = DAffine2::from_translation(DVec2::new(x as f64, y as f64));
-        laid.placements[index] = offset * quarter_turns(turn, &turns[0]) * *place;
+        laid.placements[index] = DAffine2::from_translation(DVec2::new(x as f64, y as f64)) * *place;
     }
     laid
 }
 
-/// The motion that belongs to `Shape::quarter_turn` applied `turns` times to a box of the size of `shape`.
-fn quarter_turns(turns: usize, shape: &Shape) -> DAffine2 {
-    let (width, height) = (shape.width as f64, shape.height as f64);
+/// The ways in which a chart may stand: in its least box, in four quarter turns; a large one among few also askew.
+fn poses(flat: &FlatChart, boxed: Boxed, scale: f64, resolution: usize, charts: usize) -> Vec<(DAffine2, Shape)> {
+    let large = boxed.size.x * scale * 12.0 > resolution as f64 && charts <= FEW_CHARTS;
+    let tilts: &[f64] = if large { &[0.0, 22.5, 45.0, 67.5] } else { &[0.0] };
+    let mut poses = Vec::with_capacity(4 * tilts.len());
+    for &tilt in tilts {
+        let boxed = match tilt {
+            0.0 => boxed,
+            _ => bounds(&flat.points, DMat2::from_angle(f64::to_radians(tilt)) * boxed.rotation),
+        };
+        let extent = boxed.size * scale;
+        let (width, height) = ((extent.x.ceil() as usize).max(1), (extent.y.ceil() as usize).max(1));
+        let slack = (DVec2::new(width as f64, height as f64) - extent) / 2.0;
+        let place = DAffine2::from_mat2_translation(boxed.rotation * scale, slack - boxed.low * scale);
+        let outline = |vertices: &Vec<u32>| -> Vec<DVec2> {
+            vertices.iter().map(|&vertex| place.transform_point2(flat.points[vertex as usize])).collect()
+        };
+        let loops: Vec<Vec<DVec2>> = flat.chart.loops.iter().map(outline).collect();
+        let mut shape = Shape::new(width, height, &loops);
+        for turns in 0..4 {
+            let motion = quarter_turns(turns, (width as f64, height as f64)) * place;
+            let turned = shape.quarter_turn();
+            poses.push((motion, std::mem::replace(&mut shape, turned)));
+        }
+    }
+    poses
+}
+
+/// The motion that belongs to `Shape::quarter_turn` applied `turns` times to a box of this size.
+fn quarter_turns(turns: usize, (width, height): (f64, f64)) -> DAffine2 {
     let columns = |x: DVec2, y: DVec2, shift: DVec2| DAffine2::from_mat2_translation(DMat2::from_cols(x, y), shift);
     match turns {
         0 => DAffine2::IDENTITY,

@@ -35,7 +35,8 @@ pub(crate) fn least_box(points: &[DVec2]) -> Boxed {
     bounds(&hull, DMat2::from_cols(DVec2::Y, DVec2::NEG_X) * boxed.rotation)
 }
 
-fn bounds(points: &[DVec2], rotation: DMat2) -> Boxed {
+/// The box around points after a rotation.
+pub(crate) fn bounds(points: &[DVec2], rotation: DMat2) -> Boxed {
     let turned = points.iter().map(|&point| rotation * point);
     let (low, high) = turned.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
     Boxed { rotation, low, size: high - low }
@@ -78,17 +79,37 @@ pub(crate) struct Shape {
 }
 
 impl Shape {
-    /// Rasterises triangles, given in texels with the lower corner of their box at the origin.
-    pub fn new(width: usize, height: usize, triangles: impl Iterator<Item = [DVec2; 3]>) -> Self {
+    /// Rasterises the inside of loops, given in texels with the lower corner of their box at the origin: the texels
+    /// that an edge touches, and those whose centre lies inside by the even-odd rule. Every texel that the chart touches
+    /// is one or the other.
+    pub fn new(width: usize, height: usize, loops: &[Vec<DVec2>]) -> Self {
         let mut rows = vec![Vec::new(); height];
-        for corners in triangles {
-            touched_spans(corners, 0.0, |row, first, end| {
-                let row = row.clamp(0, height as i64 - 1) as usize;
-                let (first, end) = (first.clamp(0, width as i64 - 1), end.clamp(1, width as i64));
-                rows[row].push((first as u32, end as u32));
-            });
+        let mut crossings = vec![Vec::new(); height];
+        for points in loops {
+            for (index, &from) in points.iter().enumerate() {
+                let to = points[(index + 1) % points.len()];
+                touched_spans([from, to, to], 0.0, |row, first, end| {
+                    let row = row.clamp(0, height as i64 - 1) as usize;
+                    let (first, end) = (first.clamp(0, width as i64 - 1), end.clamp(1, width as i64));
+                    rows[row].push((first as u32, end as u32));
+                });
+                let centre_rows = |y: f64| (y - 0.5).ceil().clamp(0.0, height as f64) as usize;
+                for row in centre_rows(from.y.min(to.y))..centre_rows(from.y.max(to.y)) {
+                    let share = (row as f64 + 0.5 - from.y) / (to.y - from.y);
+                    crossings[row].push(from.x + share * (to.x - from.x));
+                }
+            }
         }
-        rows.iter_mut().for_each(join_runs);
+        for (runs, crossings) in rows.iter_mut().zip(&mut crossings) {
+            crossings.sort_unstable_by(f64::total_cmp);
+            for pair in crossings.chunks_exact(2) {
+                let [first, end] = [pair[0], pair[1]].map(|x| (x - 0.5).ceil().clamp(0.0, width as f64) as u32);
+                if first < end {
+                    runs.push((first, end));
+                }
+            }
+            join_runs(runs);
+        }
         Self::from_rows(width, rows)
     }
 
@@ -155,7 +176,7 @@ mod tests {
 
     #[test]
     fn four_quarter_turns_are_none() {
-        let shape = Shape::new(7, 4, [[DVec2::ZERO, DVec2::new(6.5, 0.2), DVec2::new(2.0, 3.7)]].into_iter());
+        let shape = Shape::new(7, 4, &[vec![DVec2::ZERO, DVec2::new(6.5, 0.2), DVec2::new(2.0, 3.7)]]);
         let once = shape.quarter_turn();
         assert_eq!((once.width, once.height), (4, 7));
         assert_eq!(once.quarter_turn().quarter_turn().quarter_turn().rows, shape.rows);
