@@ -189,6 +189,13 @@ fn a_flat_sheet_keeps_its_shape() {
 }
 
 #[test]
+fn a_long_strip_does_not_waste_the_map() {
+    let atlas = checked(&grid(400, 10, |u, v| Vec3::new(40.0 * u, v, 0.0)), &settings(512));
+    assert!(atlas.quality.share_of_area > 0.6, "{:?}", atlas.quality);
+    assert!(atlas.quality.charts <= 24, "{:?}", atlas.quality);
+}
+
+#[test]
 fn closed_surfaces_of_genus_0_and_1_are_cut() {
     for (mesh, name) in [(icosphere(4), "sphere"), (torus(64, 32), "torus")] {
         let atlas = checked(&mesh, &settings(512));

@@ -8,6 +8,7 @@ use super::chart::{ChartMesh, Surface};
 use super::lscm;
 use super::outline;
 use super::quality::chart_distortion;
+use super::shape::least_box;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -91,6 +92,24 @@ fn checked(surface: &Surface, chart: &ChartMesh, mut points: Vec<DVec2>, limits:
     let good = distortion.angle_mean <= limits.angle && distortion.area_mean <= limits.area;
     (good && !outline::wraps(chart, &points) && !outline::crosses_itself(&chart.loops, &points))
         .then(|| FlatChart { chart: chart.clone(), points })
+}
+
+/// Halves charts whose box is longer than `longest`, as long as their pieces are much shorter: one long strip would
+/// dictate the scale of the whole map. Triangles are never cut, so a chart of few long ones stays.
+pub(crate) fn split_long(surface: &Surface, charts: Vec<FlatChart>, longest: f64, limits: Limits) -> Vec<FlatChart> {
+    let split = |flat: FlatChart| -> Vec<FlatChart> {
+        let length = least_box(&flat.points).size.x;
+        if length <= longest || flat.chart.triangles.len() < 2 {
+            return vec![flat];
+        }
+        let pieces: Vec<FlatChart> =
+            flat.chart.halves(surface).into_iter().flat_map(|half| flatten(surface, half, limits)).collect();
+        if pieces.iter().any(|piece| least_box(&piece.points).size.x > 0.8 * length) {
+            return vec![flat];
+        }
+        split_long(surface, pieces, longest, limits)
+    };
+    charts.into_iter().flat_map(split).collect()
 }
 
 /// Lays every cluster flat; `label` names the cluster of each triangle.
