@@ -92,9 +92,7 @@ fn exr_layers_choose_the_picture_and_name_the_channels_when_there_is_none() {
         ["R", "G", "B"].map(|letter| channel(&format!("ViewLayer.{group}.{letter}"), value)).to_vec()
     };
     // As Blender writes them: prefixed groups, depth and alpha beside.
-    write(
-        [view_layer("AO", 7.0), view_layer("Combined", 0.25), vec![channel("ViewLayer.Depth.Z", 3.0)]].concat(),
-    );
+    write([view_layer("AO", 7.0), view_layer("Combined", 0.25), vec![channel("ViewLayer.Depth.Z", 3.0)]].concat());
     assert_eq!(file::read_rgb(&path).unwrap().pixels(), [Vec3::splat(0.25); 6]);
     assert_eq!(file::read_grey(&path).unwrap().pixels(), [0.25; 6]);
 

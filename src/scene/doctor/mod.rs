@@ -128,7 +128,7 @@ pub fn check_with(scene: &Scene, bvh: &Bvh) -> Report {
 
 /// Gravest first; findings of one severity keep their order.
 fn sort(findings: &mut [Finding]) {
-    findings.sort_by(|a, b| b.severity.cmp(&a.severity));
+    findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
 }
 
 /// A list of names for a message: the first few, then a count.
