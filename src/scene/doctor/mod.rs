@@ -1,2 +1,139 @@
-//! The pre-flight check.
+//! The pre-flight check: can a fit work on this scene, and what would spoil it?
+//!
+//! [`check`] returns a [`Report`]: findings with code, place and remedy, and one line of figures per view. A fit must
+//! not start when [`Report::is_fatal`]. [`overlay()`] draws the mesh's outline over a photo, so that a person can judge
+//! in one glance what no figure tells.
+//!
+//! | file | what it asks |
+//! |---|---|
+//! | [`geometry`] | is the mesh a surface: degenerate, duplicated, unreferenced parts; winding |
+//! | [`cameras`] | do the cameras look at the mesh, upright, not mirrored |
+//! | [`silhouette`] | do masks and mesh agree |
+//! | [`pixel_centre`], [`edge_profile`] | where do pixel centres lie in the intrinsics, to a hundredth of a pixel |
+//! | [`pictures`] | encoding, clipping, darkness |
+//! | [`exposure`] | do views agree on the radiance of what they share |
+//!
+//! It refuses to repair: it measures and says what to do.
+
+pub mod cameras;
+pub mod edge_profile;
+pub mod exposure;
+pub mod geometry;
+pub mod overlay;
+pub mod pictures;
 pub mod pixel_centre;
+pub mod probe;
+pub mod silhouette;
+
+pub use overlay::overlay;
+pub use pixel_centre::CentreMeasurement;
+
+use crate::error::{Finding, Severity};
+use crate::scene::Scene;
+use crate::trace::Bvh;
+use rayon::prelude::*;
+
+/// What the check found.
+#[derive(Clone, Debug, Default, serde::Serialize)]
+pub struct Report {
+    /// Findings of the reader and of the check, the gravest first.
+    pub findings: Vec<Finding>,
+    /// Figures of each view, in the order of the scene.
+    pub views: Vec<ViewCheck>,
+    /// Where pixel centres lie, when silhouettes tell.
+    pub pixel_centre: Option<CentreMeasurement>,
+    /// Figures of the mesh.
+    pub mesh: geometry::MeshCheck,
+}
+
+/// Figures of a view. Shares are in [0, 1].
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+pub struct ViewCheck {
+    /// Name of the view.
+    pub name: String,
+    /// Whether it is held out.
+    pub held_out: bool,
+    /// Share of the picture that shows the mesh.
+    pub mesh_share: f64,
+    /// Of the mesh's pixels, the share that shows back faces.
+    pub back_face_share: f64,
+    /// Of the front-facing pixels, the share whose shading normal points away from the camera's side.
+    pub opposed_normal_share: f64,
+    /// Intersection over union of mask and mesh silhouette; `None` without a mask.
+    pub mask_overlap: Option<f64>,
+    /// Share of pixels with a clipped channel.
+    pub clipped_share: f64,
+    /// Share of pixels that say nothing.
+    pub ignored_share: f64,
+    /// Median luminance of the mesh's pixels, linear.
+    pub median_luminance: f64,
+    /// Brightness against the other views by the surface they share, in stops; `None` when nothing is shared.
+    pub exposure_stops: Option<f64>,
+}
+
+impl Report {
+    /// Whether a fit cannot work.
+    pub fn is_fatal(&self) -> bool {
+        self.findings.iter().any(|finding| finding.severity == Severity::Fatal)
+    }
+}
+
+/// Checks a scene; builds its ray structure for that.
+pub fn check(scene: &Scene) -> Report {
+    let bvh = scene.mesh.validate().and_then(|()| Bvh::build(&scene.mesh.positions, &scene.mesh.triangles));
+    match bvh {
+        Ok(bvh) => check_with(scene, &bvh),
+        Err(error) => {
+            let mut report = Report { findings: scene.findings.clone(), ..Default::default() };
+            report.findings.push(
+                Finding::new(Severity::Fatal, "mesh-unusable", error.message()).at(error.place().clone()).remedy(
+                    if error.remedy_text().is_empty() {
+                        "give a mesh with triangles of some area"
+                    } else {
+                        error.remedy_text()
+                    },
+                ),
+            );
+            cameras::check(scene, &mut report);
+            sort(&mut report.findings);
+            report
+        }
+    }
+}
+
+/// Checks a scene whose ray structure is at hand. `bvh` must be of the scene's mesh.
+pub fn check_with(scene: &Scene, bvh: &Bvh) -> Report {
+    let mut report = Report { findings: scene.findings.clone(), ..Default::default() };
+    let usable = cameras::check(scene, &mut report);
+    let probes: Vec<Vec<probe::Probe>> = scene
+        .views
+        .par_iter()
+        .zip(&usable)
+        .map(|(view, usable)| if *usable { probe::probe_view(view, bvh) } else { Vec::new() })
+        .collect();
+    report.views = scene
+        .views
+        .iter()
+        .map(|view| ViewCheck { name: view.name.clone(), held_out: view.held_out, ..Default::default() })
+        .collect();
+    geometry::check(scene, &probes, &mut report);
+    cameras::check_sight(scene, &probes, &mut report);
+    silhouette::check(scene, &probes, &mut report);
+    pictures::check(scene, &probes, &mut report);
+    exposure::check(scene, bvh, &probes, &mut report);
+    pixel_centre::check(scene, bvh, &mut report);
+    sort(&mut report.findings);
+    report
+}
+
+/// Gravest first; findings of one severity keep their order.
+fn sort(findings: &mut [Finding]) {
+    findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
+}
+
+/// A list of names for a message: the first few, then a count.
+fn names_of(names: &[&str]) -> String {
+    const SHOWN: usize = 6;
+    let shown = names.iter().take(SHOWN).copied().collect::<Vec<_>>().join(", ");
+    if names.len() > SHOWN { format!("{shown} and {} more", names.len() - SHOWN) } else { shown }
+}

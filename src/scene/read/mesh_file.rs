@@ -96,7 +96,8 @@ pub fn read_pieces(paths: &[PathBuf]) -> Result<SourceMesh> {
 
 /// Joins vertices whose position, normal and texture coordinate are the same bits; the first one stays.
 fn join_equal_vertices(mesh: &mut SourceMesh) {
-    let mut first_of: HashMap<([u64; 3], [u32; 3], [u32; 2]), u32> = HashMap::with_capacity(mesh.positions.len());
+    type VertexBits = ([u64; 3], [u32; 3], [u32; 2]);
+    let mut first_of: HashMap<VertexBits, u32> = HashMap::with_capacity(mesh.positions.len());
     let mut target = Vec::with_capacity(mesh.positions.len());
     let mut kept = 0usize;
     for index in 0..mesh.positions.len() {

@@ -23,7 +23,8 @@ pub use mesh_file::read_mesh;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::scene::doctor::pixel_centre;
 use crate::scene::settings::{BackgroundChoice, ColourEncoding, MaskUse, PixelCentre, ReadSettings, Up};
-use crate::scene::{Background, Scene, View};
+use crate::scene::{Background, Scene, View, WorldFromSource};
+use photos::LoadedPhoto;
 use source::{SourceScene, SourceView};
 use std::path::{Path, PathBuf};
 
@@ -122,18 +123,10 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
     }
     let asked_centre =
         if settings.pixel_centre == PixelCentre::Auto { source.pixel_centre } else { settings.pixel_centre };
-    let centre = if asked_centre == PixelCentre::Auto { source.default_pixel_centre } else { asked_centre };
+    let assumed_centre = if asked_centre == PixelCentre::Auto { source.default_pixel_centre } else { asked_centre };
     let mut joined = Vec::with_capacity(views.len());
-    for (view, photo) in views.into_iter().zip(loaded) {
-        findings.extend(photo.findings);
-        let camera = view.camera.in_world(&world_from_source, photo.file_size, centre.shift_pixels());
-        joined.push(View {
-            name: view.name,
-            camera: if settings.shrink == 1 { camera } else { camera.shrunk(settings.shrink) },
-            photo: photo.photo,
-            states: photo.states,
-            held_out: false,
-        });
+    for (view, photo) in views.iter().zip(loaded) {
+        joined.push(join(view, photo, &world_from_source, assumed_centre, settings.shrink, &mut findings));
     }
     hold_out(&mut joined, source.held_out.as_deref(), settings.hold_out_every, &mut findings)?;
 
@@ -157,9 +150,64 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
         scene.findings.append(&mut noticed);
     }
     if asked_centre == PixelCentre::Auto {
-        pixel_centre::settle(&mut scene, centre, settings.shrink);
+        let (centre, finding) = if settings.shrink == 1 {
+            pixel_centre::decide(&scene, assumed_centre)
+        } else {
+            decide_centre_unshrunk(&scene, &views, encoding, settings, assumed_centre)?
+        };
+        let shift = (centre.shift_pixels() - assumed_centre.shift_pixels()) / settings.shrink as f64;
+        scene.views.iter_mut().for_each(|view| view.camera.centre_pixels += shift as f32);
+        scene.findings.push(finding);
     }
     Ok(scene)
+}
+
+/// A view in the world, of the size of its shrunk photo.
+fn join(
+    view: &SourceView,
+    photo: LoadedPhoto,
+    world: &WorldFromSource,
+    centre: PixelCentre,
+    shrink: usize,
+    findings: &mut Vec<Finding>,
+) -> View {
+    findings.extend(photo.findings);
+    let camera = view.camera.in_world(world, photo.file_size, centre.shift_pixels());
+    View {
+        name: view.name.clone(),
+        camera: if shrink == 1 { camera } else { camera.shrunk(shrink) },
+        photo: photo.photo,
+        states: photo.states,
+        held_out: false,
+    }
+}
+
+/// Half a pixel is measured on photos as they are: a few are decoded once more, in full size.
+fn decide_centre_unshrunk(
+    scene: &Scene,
+    views: &[SourceView],
+    encoding: ColourEncoding,
+    settings: &ReadSettings,
+    assumed: PixelCentre,
+) -> Result<(PixelCentre, Finding)> {
+    let few: Vec<SourceView> = views.iter().step_by(views.len().div_ceil(6)).cloned().collect();
+    let loaded = photos::load_all(&few, encoding, &ReadSettings { shrink: 1, ..settings.clone() })?;
+    let joined = few
+        .iter()
+        .zip(loaded)
+        .map(|(view, photo)| join(view, photo, &scene.world_from_source, assumed, 1, &mut Vec::new()))
+        .collect();
+    let full_size = Scene {
+        name: scene.name.clone(),
+        folder: None,
+        mesh: scene.mesh.clone(),
+        views: joined,
+        world_from_source: scene.world_from_source,
+        background: scene.background,
+        truth: None,
+        findings: Vec::new(),
+    };
+    Ok(pixel_centre::decide(&full_size, assumed))
 }
 
 /// Sorts the views by name, refuses names that occur twice and takes at most `most` of them, spread evenly.

@@ -31,8 +31,7 @@ pub struct LoadedPhoto {
 
 /// Decodes all views; the first error in the order of `views` is returned.
 pub fn load_all(views: &[SourceView], encoding: ColourEncoding, settings: &ReadSettings) -> Result<Vec<LoadedPhoto>> {
-    let sizes: Vec<_> =
-        views.par_iter().map(|view| check_size(view)).collect::<Vec<_>>().into_iter().collect::<Result<_>>()?;
+    let sizes: Vec<_> = views.par_iter().map(check_size).collect::<Vec<_>>().into_iter().collect::<Result<_>>()?;
     let pixels: usize = sizes.iter().map(|(width, height)| width * height).sum();
     let shrink = settings.shrink;
     let as_half = pixels / (shrink * shrink) * std::mem::size_of::<Vec3>() > MOST_FLOAT_BYTES;

@@ -1,0 +1,182 @@
+//! Do views agree on the radiance of the surface they share?
+//!
+//! Points seen by two views give the logarithm of a ratio; its median over the points hardly feels highlights. The
+//! views' exposures are the least-squares solution of all pairs, with median zero.
+
+use super::Report;
+use super::probe::{Probe, surface_at};
+use crate::error::{Finding, Place, Severity};
+use crate::math::{luminance, statistics::quantile};
+use crate::scene::{PixelState, Scene};
+use crate::trace::{Bvh, Ray};
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Points of each view that are looked up in its neighbours.
+const POINTS_PER_VIEW: usize = 500;
+/// Neighbours of each view: those that look from the most similar side.
+const NEIGHBOURS: usize = 8;
+/// A pair needs this many shared points.
+const FEWEST_SHARED: usize = 20;
+/// A view that is off by more than this, in stops, is named.
+const JUMP_STOPS: f64 = 0.5;
+
+/// A pair of views and the median of ln(radiance in b / radiance in a) over what they share.
+struct Pair {
+    a: usize,
+    b: usize,
+    log_ratio: f64,
+    weight: f64,
+}
+
+/// Measures the views' exposures against each other.
+pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Report) {
+    let pairs: Vec<Pair> = (0..scene.views.len())
+        .into_par_iter()
+        .map(|a| pairs_of(scene, bvh, probes, a))
+        .collect::<Vec<_>>()
+        .into_iter()
+        .flatten()
+        .collect();
+    let exposures = solve(scene.views.len(), &pairs);
+    let mut jumps = 0;
+    for ((view, line), exposure) in scene.views.iter().zip(&mut report.views).zip(&exposures) {
+        line.exposure_stops = exposure.map(|log| log / std::f64::consts::LN_2);
+        if let Some(stops) = line.exposure_stops.filter(|stops| stops.abs() > JUMP_STOPS) {
+            jumps += 1;
+            report.findings.push(
+                Finding::new(
+                    Severity::Warning,
+                    "exposure-jump",
+                    format!(
+                        "the view is {:.1} stops {} than the others see the same surface",
+                        stops.abs(),
+                        if stops > 0.0 { "brighter" } else { "darker" }
+                    ),
+                )
+                .at(Place::View(view.name.clone()))
+                .remedy("fit an exposure per view, or develop all photos with one exposure and white balance"),
+            );
+        }
+    }
+    let known = exposures.iter().flatten().count();
+    if jumps == 0 && known > 2 {
+        let spread = (exposures.iter().flatten().map(|log| log * log).sum::<f64>() / known as f64).sqrt()
+            / std::f64::consts::LN_2;
+        if spread > 0.1 {
+            report.findings.push(
+                Finding::new(
+                    Severity::Note,
+                    "exposure-varies",
+                    format!("exposures vary by {spread:.2} stops (standard deviation over the views)"),
+                )
+                .remedy("fit an exposure per view if the fit leaves brightness errors of whole pictures"),
+            );
+        }
+    }
+}
+
+fn pairs_of(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], a: usize) -> Vec<Pair> {
+    let view = &scene.views[a];
+    let evident = |state: PixelState| state == PixelState::Surface;
+    let hits: Vec<&Probe> = probes[a]
+        .iter()
+        .filter(|probe| probe.hit.is_some() && evident(view.states[(probe.row, probe.column)]))
+        .collect();
+    let step = (hits.len() / POINTS_PER_VIEW).max(1);
+    let points: Vec<(Vec3, Vec3, f64)> = hits
+        .iter()
+        .step_by(step)
+        .filter_map(|probe| {
+            let (point, normal, _) = surface_at(&scene.mesh, probe.hit.as_ref()?)?;
+            let value = f64::from(luminance(view.photo.radiance(probe.row, probe.column)));
+            (value > 1e-4).then_some((point, normal, value))
+        })
+        .collect();
+    let mut others: Vec<(f32, usize)> = (0..scene.views.len())
+        .filter(|&b| b != a && !probes[b].is_empty())
+        .map(|b| (view.camera.forward_in_world().dot(scene.views[b].camera.forward_in_world()), b))
+        .collect();
+    others.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
+    others.truncate(NEIGHBOURS);
+    let mut pairs = Vec::new();
+    for (_, b) in others {
+        let other = &scene.views[b];
+        let eye = other.camera.position_in_world();
+        let ratios: Vec<f64> = points
+            .iter()
+            .filter_map(|(point, normal, value)| {
+                let (place, _) = other.camera.project(*point)?;
+                let inside = place.x >= 0.0
+                    && place.y >= 0.0
+                    && place.x < other.camera.width as f32
+                    && place.y < other.camera.height as f32;
+                let to_eye = eye - *point;
+                // Grazing sights blur over many points of the surface.
+                if !inside || to_eye.dot(*normal) < 0.2 * to_eye.length() {
+                    return None;
+                }
+                let (row, column) = (place.y as usize, place.x as usize);
+                if !evident(other.states[(row, column)]) {
+                    return None;
+                }
+                let origin = bvh.offset_origin(*point, *normal, to_eye);
+                let seen = f64::from(luminance(other.photo.radiance(row, column)));
+                let visible = seen > 1e-4 && !bvh.is_occluded(&Ray { origin, direction: eye - origin, t_max: 1.0 });
+                visible.then(|| (seen / value).ln())
+            })
+            .collect();
+        if ratios.len() >= FEWEST_SHARED {
+            pairs.push(Pair { a, b, log_ratio: quantile(&ratios, 0.5), weight: (ratios.len() as f64).sqrt() });
+        }
+    }
+    pairs
+}
+
+/// Minimises Σ w (x_b - x_a - ratio)² by Gauss-Seidel sweeps, with the median of the connected views at 0.
+fn solve(count: usize, pairs: &[Pair]) -> Vec<Option<f64>> {
+    let mut neighbours: Vec<Vec<(usize, f64, f64)>> = vec![Vec::new(); count];
+    for pair in pairs {
+        neighbours[pair.a].push((pair.b, -pair.log_ratio, pair.weight));
+        neighbours[pair.b].push((pair.a, pair.log_ratio, pair.weight));
+    }
+    let mut exposures = vec![0.0; count];
+    for _ in 0..200 {
+        for view in 0..count {
+            let weight: f64 = neighbours[view].iter().map(|(_, _, weight)| weight).sum();
+            if weight > 0.0 {
+                exposures[view] =
+                    neighbours[view].iter().map(|(other, ratio, w)| w * (exposures[*other] + ratio)).sum::<f64>()
+                        / weight;
+            }
+        }
+    }
+    let connected = |view: usize| !neighbours[view].is_empty();
+    // The median, not the mean: one bad view must not make the good ones look bad.
+    let known: Vec<f64> = (0..count).filter(|&view| connected(view)).map(|view| exposures[view]).collect();
+    let middle = if known.is_empty() { 0.0 } else { quantile(&known, 0.5) };
+    (0..count).map(|view| connected(view).then(|| exposures[view] - middle)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exposures_are_recovered_from_pairs() {
+        let truth = [0.0, 0.1, -0.2, 1.5, 0.0, 0.0];
+        let mut pairs = Vec::new();
+        for a in 0..5 {
+            for b in [a + 1, (a + 2) % 5] {
+                if b < 5 && b != a {
+                    pairs.push(Pair { a, b, log_ratio: truth[b] - truth[a], weight: 1.0 + a as f64 });
+                }
+            }
+        }
+        let solved = solve(6, &pairs);
+        for view in 0..5 {
+            assert!((solved[view].unwrap() - truth[view]).abs() < 1e-6, "{solved:?}");
+        }
+        assert_eq!(solved[5], None);
+    }
+}

@@ -1,0 +1,64 @@
+//! Do the masks agree with the mesh's silhouette?
+
+use super::probe::{Probe, has_mask};
+use super::{Report, names_of};
+use crate::error::{Finding, Severity};
+use crate::math::statistics::quantile;
+use crate::scene::{PixelState, Scene};
+
+/// Below this overlap a mask is suspicious.
+const LOW_OVERLAP: f64 = 0.9;
+/// Below this median overlap the cameras are not those of the mesh.
+const FATAL_OVERLAP: f64 = 0.2;
+
+/// Intersection over union of mask and silhouette in each masked view, on the probed pixels.
+pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
+    let mut overlaps = Vec::new();
+    let mut low = Vec::new();
+    for ((view, probes), line) in scene.views.iter().zip(probes).zip(&mut report.views) {
+        if !has_mask(view) || probes.is_empty() {
+            continue;
+        }
+        let (mut both, mut either) = (0usize, 0usize);
+        for probe in probes {
+            let state = view.states[(probe.row, probe.column)];
+            if state == PixelState::Ignored {
+                continue;
+            }
+            both += usize::from(state.is_surface() && probe.hit.is_some());
+            either += usize::from(state.is_surface() || probe.hit.is_some());
+        }
+        let overlap = both as f64 / either.max(1) as f64;
+        line.mask_overlap = Some(overlap);
+        overlaps.push(overlap);
+        if overlap < LOW_OVERLAP {
+            low.push(view.name.as_str());
+        }
+    }
+    if overlaps.is_empty() {
+        return;
+    }
+    let median = quantile(&overlaps, 0.5);
+    if median < FATAL_OVERLAP {
+        report.findings.push(
+            Finding::new(Severity::Fatal, "masks-and-mesh-disagree", format!("masks and mesh overlap by {:.0} % only (median over the views)", 100.0 * median))
+                .remedy("look at the overlays: masks may be inverted (255 is object), or the cameras may be those of another mesh"),
+        );
+    } else if !low.is_empty() {
+        report.findings.push(
+            Finding::new(
+                Severity::Warning,
+                "mask-overlap-low",
+                format!(
+                    "masks and mesh overlap by less than {:.0} % in {} views: {}",
+                    100.0 * LOW_OVERLAP,
+                    low.len(),
+                    names_of(&low)
+                ),
+            )
+            .remedy(
+                "look at the overlays of these views: the mask may hold more than the mesh, or the camera may be off",
+            ),
+        );
+    }
+}
