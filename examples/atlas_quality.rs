@@ -17,8 +17,7 @@ fn load(path: &str) -> Result<Mesh, Box<dyn std::error::Error>> {
     for model in models {
         let start = mesh.positions.len() as u32;
         mesh.positions.extend(model.mesh.positions.chunks_exact(3).map(Vec3::from_slice));
-        mesh.triangles
-            .extend(model.mesh.indices.chunks_exact(3).map(|t| [t[0] + start, t[1] + start, t[2] + start]));
+        mesh.triangles.extend(model.mesh.indices.chunks_exact(3).map(|t| [t[0] + start, t[1] + start, t[2] + start]));
     }
     Ok(mesh)
 }
@@ -30,7 +29,8 @@ fn blob(triangles: usize) -> Mesh {
     let point = |row: usize, column: usize| {
         let theta = std::f32::consts::PI * (row as f32 + 1.0) / (rows + 2) as f32;
         let phi = std::f32::consts::TAU * column as f32 / columns as f32;
-        let radius = 1.0 + 0.15 * (5.0 * theta).sin() * (4.0 * phi).cos() + 0.01 * (40.0 * theta).sin() * (37.0 * phi).cos();
+        let radius =
+            1.0 + 0.15 * (5.0 * theta).sin() * (4.0 * phi).cos() + 0.01 * (40.0 * theta).sin() * (37.0 * phi).cos();
         radius * Vec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin())
     };
     let mut mesh = Mesh::default();
@@ -97,7 +97,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         keep_uv: KeepUv::Rebuild,
         ..AtlasSettings::default()
     };
-    println!("| mesh | triangles | charts | angle mean | angle 95 % | area mean | area 95 % | area in the square | texels touched | overlaps | flipped | gutter | seconds |");
+    println!(
+        "| mesh | triangles | charts | angle mean | angle 95 % | area mean | area 95 % | area in the square | texels touched | overlaps | flipped | gutter | seconds |"
+    );
     println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     for path in meshes {
         let mesh = load(path)?;

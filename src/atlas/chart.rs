@@ -133,11 +133,8 @@ impl ChartMesh {
 
     /// Parts the chart in two edge-connected halves of surface triangles: seeds far apart, each triangle to the nearer.
     pub fn halves(&self, surface: &Surface) -> [Vec<u32>; 2] {
-        let centres: Vec<DVec3> = self
-            .triangles
-            .iter()
-            .map(|&triangle| surface.corners(triangle).into_iter().sum::<DVec3>() / 3.0)
-            .collect();
+        let centres: Vec<DVec3> =
+            self.triangles.iter().map(|&triangle| surface.corners(triangle).into_iter().sum::<DVec3>() / 3.0).collect();
         let farthest = |distances: &[f64]| {
             (0..distances.len()).max_by(|&a, &b| distances[a].total_cmp(&distances[b]).then(b.cmp(&a))).unwrap_or(0)
         };

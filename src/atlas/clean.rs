@@ -144,7 +144,8 @@ impl Work {
             let collapsed = points[0] == points[1] || points[1] == points[2] || points[2] == points[0];
             // Two faces that turn their backs to each other are a sheet with two sides, not one face twice.
             let first = (0..3).min_by_key(|&corner| points[corner]).unwrap_or(0);
-            let repeated = !collapsed && !seen.insert([points[first], points[(first + 1) % 3], points[(first + 2) % 3]]);
+            let repeated =
+                !collapsed && !seen.insert([points[first], points[(first + 1) % 3], points[(first + 2) % 3]]);
             self.cleaned.faces_dissolved += usize::from(collapsed);
             self.cleaned.duplicates_dropped += usize::from(repeated);
             keep.push(!collapsed && !repeated);

@@ -75,11 +75,10 @@ pub(crate) fn try_flatten(surface: &Surface, chart: ChartMesh, limits: Limits) -
 
 /// The chart with these points, scaled to its area in space, when it is good.
 fn checked(surface: &Surface, chart: &ChartMesh, mut points: Vec<DVec2>, limits: Limits) -> Option<FlatChart> {
-    let double_areas =
-        chart.corners.iter().map(|corners| {
-            let [a, b, c] = corners.map(|vertex| points[vertex as usize]);
-            (b - a).perp_dot(c - a)
-        });
+    let double_areas = chart.corners.iter().map(|corners| {
+        let [a, b, c] = corners.map(|vertex| points[vertex as usize]);
+        (b - a).perp_dot(c - a)
+    });
     let mut sum = 0.0;
     for double_area in double_areas {
         if double_area.is_nan() || double_area <= 0.0 {
@@ -92,8 +91,11 @@ fn checked(surface: &Surface, chart: &ChartMesh, mut points: Vec<DVec2>, limits:
     points.iter_mut().for_each(|point| *point *= scale);
     let distortion = chart_distortion(surface, chart, &points);
     let good = distortion.angle_mean <= limits.angle && distortion.area_mean <= limits.area;
-    (good && !outline::wraps(chart, &points) && !outline::crosses_itself(&chart.loops, &points))
-        .then(|| FlatChart { chart: chart.clone(), points, distortion })
+    (good && !outline::wraps(chart, &points) && !outline::crosses_itself(&chart.loops, &points)).then(|| FlatChart {
+        chart: chart.clone(),
+        points,
+        distortion,
+    })
 }
 
 /// Lays every cluster flat; `label` names the cluster of each triangle.

@@ -15,7 +15,8 @@ pub(crate) fn objection(mesh: &Mesh, resolution: usize) -> Option<String> {
         return Some("the mesh has no texture coordinates".into());
     }
     let referenced = || mesh.triangles.iter().flatten().map(|&vertex| mesh.uvs[vertex as usize]);
-    if let Some(uv) = referenced().find(|uv| !(uv.cmpge(Vec2::splat(-1e-4)).all() && uv.cmple(Vec2::splat(1.0001)).all()))
+    if let Some(uv) =
+        referenced().find(|uv| !(uv.cmpge(Vec2::splat(-1e-4)).all() && uv.cmple(Vec2::splat(1.0001)).all()))
     {
         return Some(format!("a texture coordinate, {uv}, lies outside [0, 1]"));
     }

@@ -163,9 +163,8 @@ pub fn build(mesh: &Mesh, settings: &AtlasSettings, progress: &(dyn Fn(f32) + Sy
     progress(0.15);
     let charts = flatten::flatten_all(&surface, &labels, limits, &|share| progress(0.15 + 0.25 * share));
     let charts = merge::merge(&surface, charts, limits, &|share| progress(0.4 + 0.3 * share));
-    let placements = pack::pack(&charts, settings.resolution_texels, settings.gutter_texels, &|share| {
-        progress(0.7 + 0.25 * share)
-    })?;
+    let placements =
+        pack::pack(&charts, settings.resolution_texels, settings.gutter_texels, &|share| progress(0.7 + 0.25 * share))?;
     let (mesh, chart_of_triangle) = assemble(&cleaned.mesh, &charts, &placements, settings.resolution_texels);
     let atlas = finish(mesh, chart_of_triangle, cleaned.source_triangle, findings, settings);
     progress(1.0);

@@ -87,14 +87,7 @@ struct Laid {
 }
 
 /// Lays all charts at a scale (texels per world unit) into the strip.
-fn lay(
-    charts: &[FlatChart],
-    boxes: &[Boxed],
-    order: &[usize],
-    scale: f64,
-    resolution: usize,
-    gutter: usize,
-) -> Laid {
+fn lay(charts: &[FlatChart], boxes: &[Boxed], order: &[usize], scale: f64, resolution: usize, gutter: usize) -> Laid {
     let prepared: Vec<(DAffine2, [Shape; 4])> = order
         .par_iter()
         .map(|&index| {
@@ -103,8 +96,7 @@ fn lay(
             let (width, height) = ((extent.x.ceil() as usize).max(1), (extent.y.ceil() as usize).max(1));
             let slack = (DVec2::new(width as f64, height as f64) - extent) / 2.0;
             let place = DAffine2::from_mat2_translation(boxed.rotation * scale, slack - boxed.low * scale);
-            let points: Vec<DVec2> =
-                charts[index].points.iter().map(|&point| place.transform_point2(point)).collect();
+            let points: Vec<DVec2> = charts[index].points.iter().map(|&point| place.transform_point2(point)).collect();
             let triangles = charts[index].chart.corners.iter().map(|c| c.map(|vertex| points[vertex as usize]));
             let shape = Shape::new(width, height, triangles);
             let (quarter, half, last);

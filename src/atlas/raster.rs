@@ -24,7 +24,11 @@ pub(crate) fn corners_in_texels(mesh: &Mesh, triangle: usize, width: usize, heig
 pub(crate) fn touched_spans(corners: [DVec2; 3], margin: f64, mut span: impl FnMut(i64, i64, i64)) {
     let range = |low: f64, high: f64| {
         let (first, end) = ((low + margin).floor() as i64, (high - margin).ceil() as i64);
-        if first < end { (first, end) } else { ((0.5 * (low + high)).floor() as i64, (0.5 * (low + high)).floor() as i64 + 1) }
+        if first < end {
+            (first, end)
+        } else {
+            ((0.5 * (low + high)).floor() as i64, (0.5 * (low + high)).floor() as i64 + 1)
+        }
     };
     let [a, b, c] = corners;
     let (first_row, end_row) = range(a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y));

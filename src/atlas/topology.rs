@@ -58,7 +58,8 @@ impl Topology {
             findings.push(Finding::new(Severity::Note, "mesh-non-manifold", message));
         }
         if self.winding_conflicts > 0 {
-            let message = format!("faces turn against each other at {} edges, which were cut open", self.winding_conflicts);
+            let message =
+                format!("faces turn against each other at {} edges, which were cut open", self.winding_conflicts);
             findings.push(
                 Finding::new(Severity::Warning, "mesh-winding", message)
                     .remedy("make the faces consistent, or check that normals point outwards"),

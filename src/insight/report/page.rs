@@ -1,15 +1,11 @@
 //! The page: which section comes after which, and what each shows.
 
-use super::data::{ReportData, ViewLine};
-use super::images::{MOST_VIEWS_SHOWN, ReportImages, ViewPictures, views_to_show};
-use super::number::{duration, escaped, fixed, memory, percent, short, significant, whole};
-use super::{picture, tables};
+use super::data::ReportData;
+use super::images::ReportImages;
+use super::number::{duration, escaped, fixed, memory, percent, significant, whole};
+use super::{curves, gallery, tables};
 use crate::error::Severity;
-use crate::export::LossRow;
-use crate::image::{GreyImage, Image, RgbImage};
-use crate::insight::plot::{self, LinePlot, Scale, Series};
-use glam::Vec3;
-use rayon::prelude::*;
+use crate::insight::plot;
 
 const STYLE: &str = include_str!("page.css");
 
