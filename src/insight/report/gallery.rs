@@ -316,3 +316,19 @@ pub fn light(images: &ReportImages) -> String {
     }
     html
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_shrink_until_they_fit_and_keep_their_order() {
+        let bytes_of = |part: &usize, width: usize, _: u8| format!("{part}:{}", "x".repeat(width * part));
+        let encoded = within(&[1, 2, 3], 3000, bytes_of);
+        assert!(encoded.iter().map(String::len).sum::<usize>() <= 3000);
+        assert_eq!(encoded[2].len(), "3:".len() + 3 * SIZES[1].0, "the first size that fits is taken");
+        assert!(encoded[0].starts_with("1:") && encoded[2].starts_with("3:"));
+        // Nothing fits: the smallest is better than none.
+        assert_eq!(within(&[1], 0, bytes_of)[0].len(), "1:".len() + SIZES[4].0);
+    }
+}

@@ -51,22 +51,13 @@ fn key_figures(data: &ReportData) -> String {
         .or_else(|| data.aggregates.first());
     if let Some(line) = judged {
         let (raw, aligned) = (&line.score.raw, &line.score.aligned);
-        let name = line.name.trim_end_matches(" views");
-        figures.push((
-            "PSNR".into(),
-            format!("{} dB", fixed(raw.psnr_srgb_db, 2)),
-            format!("{name}; aligned {}", fixed(aligned.psnr_srgb_db, 2)),
-        ));
-        figures.push((
-            "SSIM".into(),
-            fixed(raw.ssim_srgb, 4),
-            format!("{name}; aligned {}", fixed(aligned.ssim_srgb, 4)),
-        ));
-        figures.push((
-            "RMSE, linear".into(),
-            significant(raw.rmse_linear),
-            format!("{name}; aligned {}", significant(aligned.rmse_linear)),
-        ));
+        let kind = line.name.trim_end_matches(" views");
+        let mut judged = |name: &str, value: String, aligned: String| {
+            figures.push((format!("{name}, {kind}"), value, format!("aligned {aligned}")));
+        };
+        judged("PSNR", format!("{} dB", fixed(raw.psnr_srgb_db, 2)), format!("{} dB", fixed(aligned.psnr_srgb_db, 2)));
+        judged("SSIM", fixed(raw.ssim_srgb, 4), fixed(aligned.ssim_srgb, 4));
+        judged("RMSE", significant(raw.rmse_linear), significant(aligned.rmse_linear));
     }
     let total: f64 = data.timings.iter().map(|stage| stage.seconds).filter(|seconds| seconds.is_finite()).sum();
     if !data.timings.is_empty() {
