@@ -20,9 +20,20 @@ const MOST_RELIT_PICTURES: usize = 6;
 const MAP_WIDTH: usize = 640;
 
 /// Encodes pictures at the first of [`SIZES`] at which `parts` stay below `most_bytes` together, in their order.
+///
+/// A few parts are tried first, and a size at which they foretell far too many bytes is left out: encoding all of
+/// them at each size is what takes the time.
 fn within<T: Sync>(parts: &[T], most_bytes: usize, encode: impl Fn(&T, usize, u8) -> String + Sync) -> Vec<String> {
+    let every = parts.len().div_ceil(4).max(1);
     let mut encoded = Vec::new();
-    for (width, quality) in SIZES {
+    for (index, (width, quality)) in SIZES.into_iter().enumerate() {
+        if index + 1 < SIZES.len() && parts.len() > 8 {
+            let sample: Vec<&T> = parts.iter().step_by(every).collect();
+            let bytes: usize = sample.par_iter().map(|part| encode(part, width, quality).len()).sum();
+            if bytes / sample.len() * parts.len() > most_bytes + most_bytes / 4 {
+                continue;
+            }
+        }
         encoded = parts.par_iter().map(|part| encode(part, width, quality)).collect();
         if encoded.iter().map(String::len).sum::<usize>() <= most_bytes {
             break;
@@ -36,33 +47,20 @@ pub fn views(data: &ReportData, images: &ReportImages) -> String {
     let kinds: [Vec<&ViewPictures>; 2] =
         [true, false].map(|held_out| images.views.iter().filter(|view| view.held_out == held_out).collect());
     let shown = kinds.map(|kind| views_to_show(kind.len()).into_iter().map(|index| kind[index]).collect::<Vec<_>>());
-    let differences: Vec<(&ViewPictures, GreyImage)> = shown
-        .iter()
-        .flatten()
-        .map(|view| {
-            let (photo, fit) = (picture::shrunk(&view.photo, SIZES[0].0), picture::shrunk(&view.fit, SIZES[0].0));
-            (*view, picture::encoded_difference(&photo, &fit, images.exposure_stops))
-        })
-        .collect();
-    if differences.is_empty() {
+    let shown_views = shown.concat();
+    if shown_views.is_empty() {
         return tables::empty(
             "No photograph was compared: the run has no views, or it was stopped before its first picture.",
         );
     }
     // One scale for all error pictures, so that they can be compared with each other.
-    let values: Vec<f64> = differences
-        .iter()
-        .flat_map(|(view, difference)| {
-            let mask = view.counted.as_ref().map(|mask| picture::shrunk_mask(mask, SIZES[0].0));
-            let counts = move |index: usize| mask.as_ref().is_none_or(|mask| mask.pixels().get(index) == Some(&true));
-            let pixels = difference.pixels().iter().enumerate();
-            pixels.filter(|(index, _)| counts(*index)).map(|(_, &value)| f64::from(value)).collect::<Vec<f64>>()
-        })
-        .collect();
-    let full_scale = picture::round_full_scale(&values);
-    drop(differences);
+    let values: Vec<Vec<f64>> =
+        shown_views.par_iter().map(|view| counted_differences(view, images.exposure_stops)).collect();
+    let full_scale = picture::round_full_scale(&values.concat());
 
-    let triples = within(&shown.concat(), MOST_VIEW_BYTES, |view, width, quality| {
+    let triples = within(&shown_views, MOST_VIEW_BYTES, |view, width, quality| {
+        // Training views are shown two in a row: half the size is as sharp.
+        let width = if view.held_out { width } else { (width / 2).max(160) };
         triple(view, data, images.exposure_stops, full_scale, width, quality)
     });
     let (held_out, training) = triples.split_at(shown[0].len());
@@ -94,6 +92,17 @@ pub fn views(data: &ReportData, images: &ReportImages) -> String {
         );
     }
     html
+}
+
+/// Differences over the pixels of a view that count, of a small picture: enough to choose a scale.
+fn counted_differences(view: &ViewPictures, stops: f32) -> Vec<f64> {
+    let width = SIZES[3].0;
+    let difference =
+        picture::encoded_difference(&picture::shrunk(&view.photo, width), &picture::shrunk(&view.fit, width), stops);
+    let mask = view.counted.as_ref().map(|mask| picture::shrunk_mask(mask, width));
+    let counts = |index: usize| mask.as_ref().is_none_or(|mask| mask.pixels().get(index) == Some(&true));
+    let values = difference.pixels().iter().enumerate();
+    values.filter(|(index, _)| counts(*index)).map(|(_, &value)| f64::from(value)).collect()
 }
 
 fn strip(triples: &[String], class: &str) -> String {
