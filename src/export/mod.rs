@@ -11,8 +11,6 @@ pub mod convention;
 pub mod loss_log;
 pub mod obj;
 pub mod run_folder;
-#[allow(missing_docs)]
-pub mod standin;
 
 pub use loss_log::LossRow;
 pub use run_folder::{RunFolder, RunResult};

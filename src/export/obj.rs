@@ -9,11 +9,15 @@ use glam::{Vec2, Vec3};
 use std::io::Write;
 use std::path::Path;
 
+/// Head of the line that states how many vertices and triangles follow.
+const COUNTS: &str = "# vertices and triangles:";
+
 /// Writes the mesh. Normals and texture coordinates are written when the mesh has them.
 pub fn write(path: &Path, mesh: &Mesh) -> Result<()> {
     mesh.validate()?;
     crate::files::write_atomically(path, |writer| {
         writeln!(writer, "# Patina: atlas coordinates, +y up, world units; see convention.txt")?;
+        writeln!(writer, "{COUNTS} {} {}", mesh.positions.len(), mesh.triangles.len())?;
         for p in &mesh.positions {
             writeln!(writer, "v {} {} {}", p.x, p.y, p.z)?;
         }
@@ -50,11 +54,15 @@ pub fn read(path: &Path) -> Result<Mesh> {
                 .remedy("the file is cut short or was edited: restore it, or make it again with `patina fit`")
         })?;
     }
-    // A file cut between two lines still parses: the counts tell.
-    if mesh.triangles.is_empty() {
-        return Err(Error::new(ErrorKind::Malformed, "the mesh has no triangles")
+    // A file cut between two lines still parses: the counts at its head tell.
+    let found = format!("{COUNTS} {} {}", mesh.positions.len(), mesh.triangles.len());
+    let stated = text.lines().find(|line| line.starts_with(COUNTS));
+    if mesh.triangles.is_empty() || stated.is_some_and(|stated| stated.trim_end() != found) {
+        let (vertices, triangles) = (mesh.positions.len(), mesh.triangles.len());
+        let message = format!("the mesh has only {vertices} vertices and {triangles} triangles");
+        return Err(Error::new(ErrorKind::Malformed, message)
             .at(Place::File(path.into()))
-            .remedy("the file is cut short: make it again with `patina fit`"));
+            .remedy("the file is cut short: restore it, or make it again with `patina fit`"));
     }
     mesh.validate().map_err(|error| {
         Error::new(error.kind(), format!("{}: {}", error.place(), error.message()))
@@ -127,6 +135,17 @@ mod tests {
             assert_eq!(back, mesh);
             assert_eq!(back.positions[1].z.to_bits(), mesh.positions[1].z.to_bits(), "the sign of zero");
         }
+    }
+
+    #[test]
+    fn a_file_that_is_cut_between_lines_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mesh.obj");
+        write(&path, &awkward_mesh()).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let without_last_line = &text[..=text.trim_end().rfind('\n').unwrap()];
+        crate::files::write_bytes(&path, without_last_line.as_bytes()).unwrap();
+        assert!(read(&path).unwrap_err().message().contains("only 4 vertices and 1 triangles"));
     }
 
     #[test]

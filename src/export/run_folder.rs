@@ -9,9 +9,9 @@
 //! | `loss.csv` | the loss of every step | `patina fit` |
 //! | `report.json report.html` | scores and pictures | `patina fit`, `patina compare` |
 
-use super::{LossRow, convention, loss_log, obj, standin as file};
+use super::{LossRow, convention, loss_log, obj};
 use crate::error::{Error, ErrorKind, Place, Result};
-use crate::image::{GreyImage, Image, RgbImage};
+use crate::image::{GreyImage, Image, RgbImage, file};
 use crate::light::Environment;
 use crate::material::MaterialMaps;
 use crate::scene::Mesh;

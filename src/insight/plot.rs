@@ -57,11 +57,13 @@ pub struct Bar {
 pub const STYLE: &str = include_str!("plot.css");
 
 const WIDTH: f64 = 560.0;
-const HEIGHT: f64 = 260.0;
+const HEIGHT: f64 = 272.0;
 const LEFT: f64 = 64.0;
 const RIGHT: f64 = 12.0;
-const TOP: f64 = 30.0;
+const TOP: f64 = 42.0;
 const BOTTOM: f64 = 44.0;
+/// Room above bars, for the title.
+const BAR_TOP: f64 = 28.0;
 /// Longest polyline: more points are thinned to the extremes of each bucket.
 const MOST_POINTS: usize = 800;
 const COLOURS: usize = 6;
@@ -134,10 +136,15 @@ fn logarithmic_ticks(low: f64, high: f64) -> Vec<f64> {
     let every = ((last - first) / 6).max(1);
     let inside = |value: &f64| *value >= low && *value <= high;
     let decades: Vec<f64> = (first..=last).step_by(every as usize).map(|p| 10f64.powi(p)).filter(inside).collect();
+    let parted = |parts: &[f64]| -> Vec<f64> {
+        (first..=last).flat_map(|p| parts.iter().map(move |m| m * 10f64.powi(p))).filter(inside).collect()
+    };
+    // The coarsest division that leaves at least three ticks.
     if decades.len() >= 3 {
         return decades;
     }
-    (first..=last).flat_map(|p| [1.0, 2.0, 5.0].map(|m| m * 10f64.powi(p))).filter(inside).collect()
+    let thirds = parted(&[1.0, 2.0, 5.0]);
+    if thirds.len() >= 3 { thirds } else { parted(&[1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0]) }
 }
 
 impl LinePlot {
@@ -178,7 +185,7 @@ impl LinePlot {
         {
             let at = x.place(*at);
             svg += &format!("<line class=mark x1={at:.1} x2={at:.1} y1={TOP} y2={foot} />");
-            svg += &format!("<text class=tick x={:.1} y={:.1}>{}</text>", at + 4.0, TOP + 11.0, escaped(name));
+            svg += &format!("<text class=tick x={:.1} y={:.1}>{}</text>", at + 4.0, TOP - 5.0, escaped(name));
         }
         for (index, series) in self.series.iter().enumerate() {
             svg += &line_of(series, index % COLOURS, &x, &y);
@@ -247,12 +254,12 @@ pub fn bar_svg(title: &str, bars: &[Bar]) -> Option<String> {
     let left = 16.0 + 6.6 * longest as f64;
     // Room at the right for the value.
     let axis = Axis::over(ends.chain([0.0]), Scale::Linear, (left, WIDTH - 84.0))?;
-    let height = TOP + 24.0 * bars.len() as f64 + 8.0;
+    let height = BAR_TOP + 24.0 * bars.len() as f64 + 8.0;
     let mut svg = opening(WIDTH, height, title);
     svg += &format!("<text class=label x=8 y=16>{}</text>", escaped(title));
     let zero = axis.place(0.0);
     for (index, bar) in bars.iter().enumerate() {
-        let middle = TOP + 24.0 * index as f64 + 12.0;
+        let middle = BAR_TOP + 24.0 * index as f64 + 12.0;
         let label: String = bar.label.chars().take(34).collect();
         svg += &format!(
             "<text class=tick text-anchor=end x={:.1} y={:.1}>{}</text>",
@@ -278,7 +285,7 @@ pub fn bar_svg(title: &str, bars: &[Bar]) -> Option<String> {
         }
         svg += &format!("<text class=tick x={:.1} y={:.1}>{}</text>", end + 7.0, middle + 4.0, short(bar.value));
     }
-    svg += &format!("<line class=axis x1={zero:.1} x2={zero:.1} y1={TOP} y2={:.1} />", height - 8.0);
+    svg += &format!("<line class=axis x1={zero:.1} x2={zero:.1} y1={BAR_TOP} y2={:.1} />", height - 8.0);
     svg += "</svg>";
     Some(svg)
 }
@@ -388,6 +395,7 @@ mod tests {
         assert_eq!(linear_ticks(0.0, 100.0), [0.0, 50.0, 100.0]);
         assert_eq!(logarithmic_ticks(0.005, 20.0), [0.01, 0.1, 1.0, 10.0]);
         assert_eq!(logarithmic_ticks(1.5, 30.0), [2.0, 5.0, 10.0, 20.0]);
+        assert_eq!(logarithmic_ticks(22.0, 130.0), [30.0, 40.0, 60.0, 80.0, 100.0]);
     }
 
     #[test]

@@ -6,8 +6,7 @@
 //! channel by channel, by the factor that brings it nearest to the photograph in linear least squares.
 
 use crate::error::{Error, ErrorKind, Result};
-use crate::export::standin as metrics;
-use crate::image::{Image, RgbImage};
+use crate::image::{Image, RgbImage, metrics, transfer};
 use crate::scene::PixelState;
 use glam::Vec3;
 
@@ -20,7 +19,8 @@ pub struct PictureScore {
     /// `-10 log10(mean squared difference)` of sRGB-encoded values in [0, 1], in decibels.
     #[serde(deserialize_with = "crate::export::loss_log::number_or_nan")]
     pub psnr_srgb_db: f64,
-    /// Structural similarity (Wang et al. 2004) of sRGB-encoded values, mean over counted pixels; 1 is equal.
+    /// Structural similarity (Wang et al. 2004) of the luminance of sRGB-encoded values, mean over counted pixels;
+    /// 1 is equal. Pixels that do not count are taken as equal where a window reaches them.
     #[serde(deserialize_with = "crate::export::loss_log::number_or_nan")]
     pub ssim_srgb: f64,
 }
@@ -173,21 +173,23 @@ pub fn score_view(
     let aligned_picture = scaled(picture, scale);
     let gain = exposure_stops.exp2();
     let encoded_photo = encoded(photo, gain);
-    let encoded_score = |rmse_linear: f64, picture: &RgbImage| {
+    let encoded_score = |rmse_linear: f64, picture: &RgbImage| -> Result<PictureScore> {
         if sums.pixels == 0 {
-            return PictureScore::NONE;
+            return Ok(PictureScore::NONE);
         }
-        let encoded_picture = encoded(picture, gain);
-        let rmse = AlignmentSums::of(&encoded_photo, &encoded_picture, &counted).rmse();
-        PictureScore {
-            rmse_linear,
-            psnr_srgb_db: -20.0 * rmse.log10(),
-            ssim_srgb: metrics::ssim(&encoded_photo, &encoded_picture, &counted),
+        // Windows of the similarity reach over the silhouette: what does not count is equal there.
+        let mut encoded_picture = encoded(picture, gain);
+        for (index, pixel) in encoded_picture.pixels_mut().iter_mut().enumerate() {
+            if !counted.pixels()[index] {
+                *pixel = encoded_photo.pixels()[index];
+            }
         }
+        let score = metrics::scores(&encoded_picture, &encoded_photo, Some(&counted))?;
+        Ok(PictureScore { rmse_linear, psnr_srgb_db: score.psnr, ssim_srgb: score.ssim })
     };
     Ok(ViewScores {
-        raw: encoded_score(sums.rmse(), picture),
-        aligned: encoded_score(AlignmentSums::of(photo, &aligned_picture, &counted).rmse(), &aligned_picture),
+        raw: encoded_score(sums.rmse(), picture)?,
+        aligned: encoded_score(AlignmentSums::of(photo, &aligned_picture, &counted).rmse(), &aligned_picture)?,
         scale,
         clipped_share: clipped as f64 / surface as f64,
         non_finite_pixels,
@@ -201,15 +203,10 @@ pub fn scaled(picture: &RgbImage, scale: [f64; 3]) -> RgbImage {
     picture.map(|&pixel| pixel * scale)
 }
 
-/// sRGB-encoded values in [0, 1] (IEC 61966-2-1) of linear ones times `gain`; not finite becomes 0.
+/// sRGB-encoded values in [0, 1] of linear ones times `gain`; NaN becomes 0.
 fn encoded(image: &RgbImage, gain: f32) -> RgbImage {
-    image.map(|&pixel| Vec3::from_array(pixel.to_array().map(|linear| srgb_encoded(linear * gain))))
-}
-
-/// The sRGB curve (IEC 61966-2-1) on [0, 1]; values outside are clamped, NaN becomes 0.
-pub fn srgb_encoded(linear: f32) -> f32 {
-    let linear = if linear.is_nan() { 0.0 } else { linear.clamp(0.0, 1.0) };
-    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+    let encode = |linear: f32| if linear.is_nan() { 0.0 } else { transfer::srgb_from_linear(linear * gain) };
+    image.map(|&pixel| Vec3::from_array(pixel.to_array().map(encode)))
 }
 
 /// Scores of many views together.

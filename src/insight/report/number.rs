@@ -18,14 +18,30 @@ pub fn short(value: f64) -> String {
         let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
         format!("{}e{exponent}", without_zeros(digits))
     } else {
-        let decimals = (2 - size.log10().floor() as i32).max(0) as usize;
+        let decimals = decimals_for_three_digits(size);
         without_zeros(&format!("{value:.decimals$}")).to_string()
     };
     text.replace('-', "−").replace("e−", "e-")
 }
 
+/// Decimals that show three digits of a positive number, counted after rounding: 0.0099999 is 0.0100.
+fn decimals_for_three_digits(size: f64) -> usize {
+    let rounded = format!("{size:.2e}");
+    let exponent: i32 = rounded.split_once('e').and_then(|(_, exponent)| exponent.parse().ok()).unwrap_or(0);
+    (2 - exponent).max(0) as usize
+}
+
 fn without_zeros(digits: &str) -> &str {
     if digits.contains('.') { digits.trim_end_matches('0').trim_end_matches('.') } else { digits }
+}
+
+/// Three significant digits with their trailing zeros, for columns: `0.00640`.
+pub fn significant(value: f64) -> String {
+    let size = value.abs();
+    if !(1e-4..1e6).contains(&size) {
+        return short(value);
+    }
+    fixed(value, decimals_for_three_digits(size))
 }
 
 /// A number with a fixed number of decimals; `–` for NaN, `∞` when infinite.
@@ -61,7 +77,10 @@ pub fn percent(share: f64) -> String {
         return "–".into();
     }
     let value = 100.0 * share;
-    let decimals = if value.abs() < 0.995 && value != 0.0 { 2 } else { 1 };
+    if value == 0.0 {
+        return "0 %".into();
+    }
+    let decimals = if value.abs() < 0.995 { 2 } else { 1 };
     format!("{value:.decimals$} %")
 }
 
@@ -118,8 +137,12 @@ mod tests {
             [0.421, 12.34, 59.96, 245.0, 7620.0, f64::NAN].map(duration),
             ["0.42 s", "12.3 s", "1 min 00 s", "4 min 05 s", "2 h 07 min", "–"]
         );
+        assert_eq!(
+            [0.0064, 0.009_999_99, 12.0, 1e-9, f64::NAN].map(significant),
+            ["0.00640", "0.0100", "12.0", "1e-9", "–"]
+        );
         assert_eq!([812_000_000, 3_420_000_000].map(memory), ["812 MB", "3.42 GB"]);
-        assert_eq!([0.0, 0.0012, 0.25, f64::NAN].map(percent), ["0.0 %", "0.12 %", "25.0 %", "–"]);
+        assert_eq!([0.0, 0.0012, 0.25, f64::NAN].map(percent), ["0 %", "0.12 %", "25.0 %", "–"]);
         assert_eq!(whole(1_234_567), "1\u{2009}234\u{2009}567");
         assert_eq!(escaped("<a href='x'>&"), "&lt;a href=&#39;x&#39;&gt;&amp;");
     }

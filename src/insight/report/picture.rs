@@ -1,8 +1,9 @@
 //! From linear pixels to bytes on a screen: shrinking, tone mapping, false colour, embedding.
 
-use crate::export::standin as file;
-use crate::image::{GreyImage, Image, RgbImage};
-use crate::insight::scores::srgb_encoded;
+use super::number::escaped;
+use crate::error::Result;
+use crate::image::transfer::srgb_from_linear;
+use crate::image::{GreyImage, Image, RgbImage, file};
 use crate::math::{luminance, sphere, statistics};
 use base64::Engine;
 use glam::Vec3;
@@ -27,8 +28,8 @@ pub fn shrunk(image: &RgbImage, most_width: usize) -> RgbImage {
         let rows = row * height / new_height..((row + 1) * height).div_ceil(new_height);
         let columns = column * width / new_width..((column + 1) * width).div_ceil(new_width);
         let count = (rows.len() * columns.len()).max(1) as f32;
-        let pixels = rows.flat_map(|row| columns.clone().map(move |column| (row, column)));
-        pixels.map(|place| image[place]).sum::<Vec3>() / count
+        let line = |row: usize| &image.pixels()[row * width + columns.start..row * width + columns.end];
+        rows.map(|row| line(row).iter().sum::<Vec3>()).sum::<Vec3>() / count
     })
 }
 
@@ -40,7 +41,7 @@ pub fn shrunk_mask(mask: &Image<bool>, most_width: usize) -> Image<bool> {
 /// sRGB-encoded bytes of linear values times `2^stops`.
 pub fn screen_of_linear(image: &RgbImage, stops: f32) -> ScreenImage {
     let gain = stops.exp2();
-    image.map(|&pixel| encoded_or_marked(pixel, |value| srgb_encoded(value * gain)))
+    image.map(|&pixel| encoded_or_marked(pixel, |value| srgb_from_linear(value * gain)))
 }
 
 /// Bytes of values in [0, 1] without a curve.
@@ -54,7 +55,7 @@ pub fn screen_of_light(image: &RgbImage, stops: f32) -> ScreenImage {
     image.map(|&pixel| {
         encoded_or_marked(pixel, |value| {
             let value = (value * gain).max(0.0);
-            srgb_encoded(value / (1.0 + value))
+            srgb_from_linear(value / (1.0 + value))
         })
     })
 }
@@ -98,7 +99,7 @@ fn stops_to(goal: f64, value: f64) -> f32 {
 /// Mean over the channels of the difference of sRGB-encoded values in [0, 1]; NaN where a side is not finite.
 pub fn encoded_difference(photo: &RgbImage, fit: &RgbImage, stops: f32) -> GreyImage {
     let gain = stops.exp2();
-    let encoded = |pixel: Vec3| Vec3::from_array((pixel * gain).to_array().map(srgb_encoded));
+    let encoded = |pixel: Vec3| Vec3::from_array((pixel * gain).to_array().map(srgb_from_linear));
     let (width, height) = (photo.width().min(fit.width()), photo.height().min(fit.height()));
     Image::from_fn(width, height, |row, column| {
         let (photo, fit) = (photo[(row, column)], fit[(row, column)]);
@@ -163,17 +164,24 @@ pub fn embedded_png(image: &ScreenImage, alt: &str) -> String {
     embedded(image, "png", || file::encode_png_srgb8(image), alt, class)
 }
 
-fn embedded(image: &ScreenImage, kind: &str, encode: impl FnOnce() -> Vec<u8>, alt: &str, class: &str) -> String {
-    if image.pixels().is_empty() {
-        return "<p class=empty>The picture has no pixels.</p>".into();
+fn embedded(
+    image: &ScreenImage,
+    kind: &str,
+    encode: impl FnOnce() -> Result<Vec<u8>>,
+    alt: &str,
+    class: &str,
+) -> String {
+    match encode() {
+        Ok(bytes) => format!(
+            "<img{class} width={} height={} alt=\"{}\" src=\"data:image/{kind};base64,{}\">",
+            image.width(),
+            image.height(),
+            escaped(alt),
+            base64::engine::general_purpose::STANDARD.encode(bytes)
+        ),
+        // A picture that cannot be shown is no reason to lose the report.
+        Err(error) => format!("<p class=empty>{}: {}</p>", escaped(alt), escaped(error.message())),
     }
-    format!(
-        "<img{class} width={} height={} alt=\"{}\" src=\"data:image/{kind};base64,{}\">",
-        image.width(),
-        image.height(),
-        super::number::escaped(alt),
-        base64::engine::general_purpose::STANDARD.encode(encode())
-    )
 }
 
 #[cfg(test)]
@@ -213,7 +221,7 @@ mod tests {
         assert!((stops_of_light(&light) + 3.0).abs() < 1e-4);
         assert_eq!(round_full_scale(&[0.03, f64::NAN]), 0.05);
         assert_eq!(round_full_scale(&[]), 1.0);
-        let lightness = |colour: [u8; 3]| luminance(crate::scene::photo::linear_from_srgb8(colour));
+        let lightness = |colour: [u8; 3]| luminance(crate::image::transfer::linear_from_srgb8(colour));
         let steps: Vec<f32> = (0..=70).map(|i| lightness(false_colour(i as f32 / 70.0))).collect();
         assert!(steps.windows(2).all(|pair| pair[1] >= pair[0] - 1e-4), "{steps:?}");
     }

@@ -1,7 +1,7 @@
 //! The tables of the page.
 
 use super::data::{ReportData, TruthErrors};
-use super::number::{duration, escaped, fixed, percent, short, whole};
+use super::number::{duration, escaped, fixed, percent, significant, whole};
 use crate::error::Severity;
 use crate::insight::scores::{AggregateScore, PictureScore};
 use crate::insight::truth::ErrorPair;
@@ -58,12 +58,12 @@ pub fn findings(data: &ReportData) -> String {
 
 fn score_cells(raw: &PictureScore, aligned: &PictureScore) -> Vec<String> {
     vec![
-        short(raw.rmse_linear),
-        short(aligned.rmse_linear),
+        significant(raw.rmse_linear),
+        significant(aligned.rmse_linear),
         fixed(raw.psnr_srgb_db, 2),
         fixed(aligned.psnr_srgb_db, 2),
-        fixed(raw.ssim_srgb, 3),
-        fixed(aligned.ssim_srgb, 3),
+        fixed(raw.ssim_srgb, 4),
+        fixed(aligned.ssim_srgb, 4),
     ]
 }
 
@@ -111,7 +111,7 @@ pub fn truth(truth: Option<&TruthErrors>) -> String {
         );
     };
     let pair = |name: &str, measure: &str, pair: &ErrorPair| {
-        vec![name.into(), measure.into(), short(pair.raw), short(pair.aligned), scale_text(pair.scale)]
+        vec![name.into(), measure.into(), significant(pair.raw), significant(pair.aligned), scale_text(pair.scale)]
     };
     let mut rows = Vec::new();
     if let Some(maps) = &truth.maps {
