@@ -1,14 +1,18 @@
 //! What a fit is given: mesh, cameras, photographs; their readers and the pre-flight check.
 //!
 //! [`mesh`] and [`camera`] hold the geometry, [`photo`] the pixels, [`view`](View) joins them. [`read()`] makes a scene
-//! of a folder, [`doctor`] says whether a fit can work on it. Nothing here fits or renders.
+//! of a folder, [`doctor`] says whether a fit can work on it. [`demo`] and [`study`] are scenes made in code, out of what
+//! [`synthetic`] holds. Nothing here fits or renders.
 
 pub mod camera;
+pub mod demo;
 pub mod doctor;
 pub mod mesh;
 pub mod photo;
 pub mod read;
 pub mod settings;
+pub mod study;
+pub mod synthetic;
 
 pub use camera::Camera;
 pub use mesh::Mesh;
@@ -16,8 +20,8 @@ pub use photo::{Photo, PixelState};
 pub use read::{read, read_mesh};
 pub use settings::ReadSettings;
 
-use crate::error::Finding;
-use crate::image::Image;
+use crate::error::{Error, ErrorKind, Finding, Place, Result};
+use crate::image::{Image, RgbImage};
 use crate::light::Environment;
 use crate::material::MaterialMaps;
 use glam::{DMat3, DVec3};
@@ -57,6 +61,29 @@ pub struct Scene {
     pub truth: Option<Truth>,
     /// What the reader noticed.
     pub findings: Vec<Finding>,
+}
+
+impl Scene {
+    /// Puts a linear picture in the place of a view's photo; every pixel becomes evidence, except those that are not
+    /// finite.
+    ///
+    /// # Errors
+    /// `InvalidScene` when there is no such view or the picture is not of its camera's size.
+    pub fn set_photo(&mut self, view: usize, picture: RgbImage) -> Result<()> {
+        let count = self.views.len();
+        let Some(view) = self.views.get_mut(view) else {
+            return Err(Error::new(ErrorKind::InvalidScene, format!("there is no view {view} among {count}")));
+        };
+        let (width, height) = (view.camera.width, view.camera.height);
+        if (picture.width(), picture.height()) != (width, height) {
+            let message =
+                format!("a picture of {} x {} for a camera of {width} x {height}", picture.width(), picture.height());
+            return Err(Error::new(ErrorKind::InvalidScene, message).at(Place::View(view.name.clone())));
+        }
+        view.states = picture.map(|pixel| if pixel.is_finite() { PixelState::Surface } else { PixelState::Ignored });
+        view.photo = Photo::Linear32(picture.map(|&pixel| if pixel.is_finite() { pixel } else { glam::Vec3::ZERO }));
+        Ok(())
+    }
 }
 
 /// `point_in_world = rotation * (point_in_source - origin_in_source)`. Units are kept.

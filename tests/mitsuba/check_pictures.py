@@ -1,7 +1,8 @@
 """Compares two folders of pictures by a z-test: the same names in both, variance of the mean in variance/NAME.exr.
 
 A side without variance is taken to have the other's, times --missing-variance (0 for a noiseless picture, 0.25 for one
-with four times the samples). Prints one JSON line a view and one for all; ends with 1 when a limit is passed.
+with four times the samples). A variance from K batches makes z follow Student's law: with K = 16 on both sides its
+RMS is about 1.035 and 0.5 % lie above 3; with a variance from one side only 1.07 and 0.9 %. Prints one JSON line a view and one for all; ends with 1 when a limit is passed.
 """
 import argparse
 import json

@@ -88,12 +88,17 @@ def integrator(depth, hidden):
     return mi.load_dict({"type": "path", "max_depth": depth, "rr_depth": 100000, "hide_emitters": hidden})
 
 
-def scene(folder, light):
-    """The surface and a light as a Mitsuba scene."""
-    lobe = {"type": "modct"} | {name: texture(values) for name, values in folder.maps.items()}
+def scene(folder, light, blend_log_width=False):
+    """The surface and a light as a Mitsuba scene. `blend_log_width`: taps blend ln a, as Patina's tracer does; an
+    exchange folder means r itself."""
+    maps = dict(folder.maps)
+    if blend_log_width:
+        maps["roughness"] = 0.5 * np.log(np.clip(maps["roughness"], 2.5e-5, 1.0))
+    lobe = {"type": "modct", "log_width": blend_log_width, "lobe_strength": float(folder.facts.get("lobe_strength", 1.0))}
     return mi.load_dict({
         "type": "scene",
-        "surface": {"type": "obj", "filename": str(folder.folder / "mesh.obj"), "lobe": lobe},
+        "surface": {"type": "obj", "filename": str(folder.folder / "mesh.obj"),
+                    "lobe": lobe | {name: texture(values) for name, values in maps.items()}},
         "light": {"type": "envmap", "bitmap": mi.Bitmap(nodes_of_light(light))},
     })
 

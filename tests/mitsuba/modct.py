@@ -5,7 +5,8 @@
     F = F0 + (1 - F0) (1 - h.o)^5                                       Schlick 1994
     G = g(n.i) g(n.o),  g(c) = c / (c (1 - k) + k),  k = a / 2          Smith product of Schlick's approximation
 
-`r` is what roughness.exr holds. The cosines of G cancel those below the fraction, so nothing is divided by a cosine.
+`r` is what roughness.exr holds. `lobe_strength` scales the second term: 0 takes the lobe away as a whole, which F0 = 0
+does not. With `log_width` the third texture holds ln a instead of r, so that ln a is what a bilinear tap blends. The cosines of G cancel those below the fraction, so nothing is divided by a cosine.
 
 A direction is drawn from a mixture: cosine-weighted about n, or a half vector with density D (n.h) which reflects i.
 Nothing in the mixture carries a derivative; the value of f does.
@@ -13,7 +14,7 @@ Nothing in the mixture carries a derivative; the value of f does.
 import drjit as dr
 import mitsuba as mi
 
-SMALLEST_ROUGHNESS = 1e-4
+SMALLEST_ROUGHNESS = 2.5e-5
 
 
 def lobe_class():
@@ -25,6 +26,8 @@ def lobe_class():
             self.diffuse = properties.get_texture("diffuse", 0.5)
             self.specular = properties.get_texture("specular", 0.04)
             self.roughness = properties.get_texture("roughness", 0.5)
+            self.strength = float(properties.get("lobe_strength", 1.0))
+            self.log_width = bool(properties.get("log_width", False))
             side = mi.BSDFFlags.FrontSide | mi.BSDFFlags.SpatiallyVarying
             self.m_components = [mi.BSDFFlags.DiffuseReflection | side, mi.BSDFFlags.GlossyReflection | side]
             self.m_flags = self.m_components[0] | self.m_components[1]
@@ -38,7 +41,8 @@ def lobe_class():
 
         def surface(self, si, active):
             """(rho_d, F0, r, e) at the hit."""
-            r = dr.clip(self.roughness.eval_1(si, active), SMALLEST_ROUGHNESS, 1.0)
+            stored = self.roughness.eval_1(si, active)
+            r = dr.clip(dr.exp(2.0 * stored) if self.log_width else stored, SMALLEST_ROUGHNESS, 1.0)
             return self.diffuse.eval(si, active), self.specular.eval(si, active), r, 2.0 / r - 2.0
 
         @staticmethod
@@ -60,13 +64,13 @@ def lobe_class():
             k = 0.5 * dr.sqrt(r)
             d = (e + 2.0) * dr.inv_two_pi * self.power_of_cosine(h, e)
             visibility = 0.25 / ((i.z * (1.0 - k) + k) * (o.z * (1.0 - k) + k))
-            return (rho_d * dr.inv_pi + self.schlick(f0, dr.dot(h, o)) * (d * visibility)) * o.z
+            return (rho_d * dr.inv_pi + self.schlick(f0, dr.dot(h, o)) * (self.strength * d * visibility)) * o.z
 
         def share_of_specular(self, surface, i):
             """Probability of drawing a half vector, kept off 0 and 1 so that both parts stay covered."""
             rho_d, f0, _, _ = [dr.detach(x) for x in surface]
-            s, d = mi.luminance(self.schlick(f0, i.z)), mi.luminance(rho_d)
-            return dr.clip(s / dr.maximum(s + d, 1e-6), 0.15, 0.85)
+            s, d = self.strength * mi.luminance(self.schlick(f0, i.z)), mi.luminance(rho_d)
+            return dr.clip(s / dr.maximum(s + d, 1e-6), 0.15 if self.strength > 0.0 else 0.0, 0.85)
 
         def density(self, surface, i, o):
             e = dr.detach(surface[3])

@@ -18,12 +18,13 @@ def main():
     parser.add_argument("--views", default="", help="such as 0,3,8-11")
     parser.add_argument("--light", default="env", help="env or env_heldout")
     parser.add_argument("--background", choices=["visible", "hidden"], help="default from scene.json")
+    parser.add_argument("--blend-log-width", action="store_true", help="taps blend ln a instead of r, as Patina does")
     options = parser.parse_args()
     mi, _ = ex.start()
     folder = ex.Folder(options.scene)
     depth = options.depth or folder.facts["max_depth"]
     hidden = options.background == "hidden" if options.background else not folder.background_is_visible
-    how, world = ex.integrator(depth, hidden), ex.scene(folder, folder.light(options.light))
+    how, world = ex.integrator(depth, hidden), ex.scene(folder, folder.light(options.light), options.blend_log_width)
     start, pixels = time.time(), 0
     for index in ex.chosen_views(options.views, len(folder.views)):
         view = folder.views[index]

@@ -141,6 +141,8 @@ pub fn read_pairs(path: &Path) -> Result<Pairs> {
 
 /// One entry of `cameras.json`.
 pub struct JsonView {
+    /// Marked to be kept out of the fit.
+    pub held_out: bool,
     /// The photo's file, as written.
     pub file: PathBuf,
     /// Width and height, where given.
@@ -165,6 +167,8 @@ struct ViewJson {
     height: Option<usize>,
     #[serde(rename = "K")]
     k: [[f64; 3]; 3],
+    #[serde(default)]
+    held_out: bool,
     w2c: [[f64; 4]; 4],
     #[serde(default)]
     distortion: Vec<f64>,
@@ -202,7 +206,13 @@ pub fn read_cameras_json(path: &Path) -> Result<(Vec<JsonView>, Vec<Finding>)> {
         intrinsic.copy_from_slice(view.k.as_flattened());
         let (camera, mut noticed) = camera_from_rows(&intrinsic, &extrinsic, &place)?;
         findings.append(&mut noticed);
-        views.push(JsonView { file: view.file, size: view.width.zip(view.height), camera, place });
+        views.push(JsonView {
+            held_out: view.held_out,
+            file: view.file,
+            size: view.width.zip(view.height),
+            camera,
+            place,
+        });
     }
     Ok((views, findings))
 }

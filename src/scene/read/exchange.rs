@@ -77,10 +77,12 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
             .remedy("compare maps with care: rough_pow 1 and g_mode half_alpha are the ones used here"),
         );
     }
+    let stem = |file: &Path| file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let marked: Vec<String> = cameras.iter().filter(|view| view.held_out).map(|view| stem(&view.file)).collect();
     let views = cameras
         .into_iter()
         .map(|view| {
-            let name = view.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let name = stem(&view.file);
             let coverage = folder.join("coverage").join(format!("{name}.exr"));
             SourceView {
                 photo: folder.join(&view.file),
@@ -102,7 +104,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
         default_pixel_centre: PixelCentre::Half,
         background,
         encoding: ColourEncoding::Auto,
-        held_out: None,
+        held_out: (!marked.is_empty()).then_some(marked),
         has_truth: true,
         flip_winding: false,
         findings,

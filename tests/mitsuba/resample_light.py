@@ -1,0 +1,43 @@
+"""Brings a latitude-longitude picture to 32 x 64 by exact area on the sphere: resample_light.py IN.hdr OUT.exr [--scale S].
+
+The energy through every cell is kept; --mean M scales the map to mean luminance M over the sphere.
+"""
+import argparse
+
+import numpy as np
+
+import exchange_scene as ex
+
+
+def overlaps(fine, coarse):
+    """Share of every coarse interval in every fine one: rows sum to the width of a fine interval."""
+    low = np.maximum(fine[:-1, None], coarse[None, :-1])
+    high = np.minimum(fine[1:, None], coarse[None, 1:])
+    return np.maximum(high - low, 0.0)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("source")
+    parser.add_argument("target")
+    parser.add_argument("--height", type=int, default=32)
+    parser.add_argument("--mean", type=float)
+    options = parser.parse_args()
+    ex.start("scalar_rgb")
+    fine = ex.read_exr(options.source)[..., :3].astype(np.float64)
+    rows, columns, height, width = *fine.shape[:2], options.height, 2 * options.height
+    # Heights on the sphere are even in area when counted by -cos(theta).
+    edges = lambda count: -np.cos(np.pi * np.arange(count + 1) / count)
+    down = overlaps(edges(rows), edges(height))
+    across = overlaps(np.linspace(0, 1, columns + 1), np.linspace(0, 1, width + 1))
+    energy = np.einsum("rh,rcx,cw->hwx", down, fine, across, optimize=True)
+    areas = down.sum(0)[:, None] * across.sum(0)[None, :]
+    light = energy / areas[..., None]
+    mean = (light * areas[..., None]).sum((0, 1)) / 2.0
+    if options.mean:
+        light *= options.mean / (mean @ [0.2126, 0.7152, 0.0722])
+    ex.write_exr(options.target, light)
+    print(f"{options.target}: mean {mean.round(4)}, largest {light.max():.1f}")
+
+
+main()
