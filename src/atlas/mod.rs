@@ -44,7 +44,7 @@ use std::collections::HashMap;
 use topology::Topology;
 
 /// Whether texture coordinates that a mesh came with stay.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum KeepUv {
     /// Keep them when they lie in [0, 1] and do not overlap; rebuild them otherwise.

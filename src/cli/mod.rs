@@ -1,9 +1,66 @@
 //! The command line; it holds no algorithm.
+//!
+//! [`arguments`] is what can be typed, [`fit`] drives a job and shows its events, [`commands`] holds the rest. Whatever
+//! is asked here can be asked of the library in the same words.
 
+pub mod arguments;
+pub mod commands;
+pub mod fit;
+
+use crate::error::{Error, ErrorKind};
+use arguments::{Arguments, Task};
+use clap::Parser;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-/// Runs the program on its arguments, the program's name first.
-pub fn run(_arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
-    ExitCode::SUCCESS
+/// Runs the program on its arguments, the program's name first. Exit codes: 0 done, 1 an error, 2 arguments that are
+/// not understood, 3 stopped by the user.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let arguments = match Arguments::try_parse_from(arguments) {
+        Ok(arguments) => arguments,
+        Err(usage) => {
+            let _ = usage.print();
+            return ExitCode::from(if usage.use_stderr() { 2 } else { 0 });
+        }
+    };
+    if let Some(threads) = arguments.threads {
+        // Fails only when a pool exists already, as in tests: then that one serves.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    }
+    let json = arguments.json;
+    let outcome = match arguments.task {
+        Some(Task::Demo(options)) => fit::demo(&options, json),
+        Some(Task::Fit(options)) => fit::fit(&options, json),
+        Some(Task::Resume(options)) => fit::resume(&options, json),
+        Some(Task::Check(options)) => commands::check(&options, json),
+        Some(Task::Relight(options)) => commands::relight(&options),
+        Some(Task::Render(options)) => commands::render(&options),
+        Some(Task::Compare(options)) => commands::compare(&options, json),
+        None => {
+            eprintln!("Patina has no window in this build. Try `patina demo`, or `patina --help`.");
+            return ExitCode::from(2);
+        }
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            show(&error, json);
+            ExitCode::from(if error.kind() == ErrorKind::Stopped { 3 } else { 1 })
+        }
+    }
+}
+
+fn show(error: &Error, json: bool) {
+    if json {
+        let line = serde_json::json!({
+            "event": "error",
+            "kind": format!("{:?}", error.kind()),
+            "place": error.place().to_string(),
+            "message": error.message(),
+            "remedy": error.remedy_text(),
+        });
+        println!("{line}");
+    } else {
+        eprintln!("error: {error}");
+    }
 }

@@ -168,6 +168,11 @@ impl Default for FitSettings {
 }
 
 impl FitSettings {
+    /// Whether some stage frees the specular lobe; without one, pictures are drawn without it too.
+    pub fn has_lobe(&self) -> bool {
+        self.steps == Steps::OneStep || self.steps_all > 0
+    }
+
     /// Checks every range; the error names the setting.
     pub fn validate(&self) -> Result<()> {
         let wrong = |name: &str, message: &str| {

@@ -1,1 +1,99 @@
 //! The only door between a fit and whoever watches it.
+//!
+//! A job owns a thread. [`Command`]s go in, bounded [`Event`]s come out, and a [`Slot`] holds the newest [`Snapshot`] of
+//! maps and light: a watcher that is slow misses steps, never the last state, and never slows the fit. The command line
+//! and the window drive the same job, so neither can do what the other cannot.
+//!
+//! [`prepare`] turns a scene into a surface with an atlas, [`worker`] is the thread, [`outcome`] renders, scores and
+//! writes the run folder, [`demo`] makes the built-in scene.
+
+pub mod demo;
+pub mod outcome;
+pub mod pictures;
+pub mod prepare;
+pub mod slot;
+pub mod worker;
+
+pub use prepare::RunSettings;
+pub use slot::Slot;
+pub use worker::{JobHandle, start};
+
+use crate::error::{Error, Finding};
+use crate::fit::LossRow;
+use crate::light::Environment;
+use crate::material::MaterialMaps;
+use std::path::PathBuf;
+
+/// What a watcher may ask of a job.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Command {
+    /// Hold after the step in progress.
+    Pause,
+    /// Go on.
+    Resume,
+    /// Do one step, then hold.
+    StepOnce,
+    /// Write a checkpoint after the step in progress.
+    Checkpoint,
+    /// Drop the step in progress, write a checkpoint and end.
+    Stop,
+}
+
+/// What a job tells. Progress is dropped when nobody reads it; everything else waits for a reader.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// The fit begins or goes on.
+    Started {
+        /// Steps done before.
+        steps_done: usize,
+        /// Steps of the whole fit.
+        steps_total: usize,
+    },
+    /// A step was done.
+    Progress(Progress),
+    /// Something the user should know.
+    Finding(Finding),
+    /// A checkpoint was written.
+    Checkpoint(PathBuf),
+    /// The job holds.
+    Paused,
+    /// The job goes on.
+    Resumed,
+    /// The fit is done and its pictures and files are being made; what, in a word or two.
+    Finishing(String),
+    /// Everything is written.
+    Finished(Box<crate::insight::report::ReportData>),
+    /// The job ended early as asked; the checkpoint holds its state.
+    Stopped {
+        /// Steps done.
+        steps_done: usize,
+    },
+    /// The job ended with an error; the last checkpoint stays.
+    Failed(Error),
+}
+
+/// How far a fit is.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Progress {
+    /// The newest line of the loss history.
+    pub row: LossRow,
+    /// Steps of the whole fit.
+    pub steps_total: usize,
+    /// Steps a second over the last steps.
+    pub steps_per_second: f64,
+    /// Seconds left, from the pace of the current stage and the pixels of the coming ones.
+    pub seconds_left: f64,
+}
+
+/// Maps and light at a step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Snapshot {
+    /// Steps done.
+    pub step: usize,
+    /// The maps, of the size of the stage.
+    pub maps: MaterialMaps,
+    /// The light.
+    pub environment: Environment,
+    /// The curve so far.
+    pub losses: Vec<LossRow>,
+}

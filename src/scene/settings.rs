@@ -171,7 +171,7 @@ pub enum MaskUse {
 }
 
 /// What background pixels show.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum BackgroundChoice {
     /// The environment for photographs, what the folder says for synthetic scenes.

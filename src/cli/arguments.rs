@@ -1,0 +1,263 @@
+//! What can be typed. The text of each field is its help.
+
+use crate::atlas::KeepUv;
+use crate::fit::FitSettings;
+use crate::scene::settings::{BackgroundChoice, PixelCentre, Up};
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+
+/// Turns a photographed scene into materials one can relight.
+#[derive(Debug, Parser)]
+#[command(name = "patina", version, about, max_term_width = 110)]
+pub struct Arguments {
+    /// One JSON object a line instead of text and progress bars.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Threads to work on; all processors when not given. Results do not depend on it.
+    #[arg(long, global = true)]
+    pub threads: Option<usize>,
+    /// What to do.
+    #[command(subcommand)]
+    pub task: Option<Task>,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Task {
+    /// Build the demo scene in code, photograph it, fit it, relight it, and report the error against the truth.
+    Demo(DemoOptions),
+    /// Look a scene over before a fit: findings with place and remedy, and mesh outlines over every photo.
+    Check(CheckOptions),
+    /// Fit diffuse, specular and roughness maps and the light to a scene's photographs.
+    Fit(Box<FitOptions>),
+    /// Take up a run that was stopped; the result equals that of an uninterrupted run bit for bit.
+    Resume(ResumeOptions),
+    /// Render a run under other lights.
+    Relight(RelightOptions),
+    /// Render a run from a scene's cameras, as pictures or layers in linear EXR.
+    Render(RenderOptions),
+    /// Score a run against the photographs of a scene.
+    Compare(CompareOptions),
+}
+
+/// Options of `patina demo`.
+#[derive(Debug, Args)]
+pub struct DemoOptions {
+    /// The run folder.
+    #[arg(short, long, default_value = "patina-demo")]
+    pub output: PathBuf,
+    /// Seed of the cameras, the photographs and the fit.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+}
+
+/// How a scene is read.
+#[derive(Clone, Debug, Default, Args)]
+pub struct ReadOptions {
+    /// Which axis of the data set points up: auto, or one of +x -x +y -y +z -z.
+    #[arg(long)]
+    pub up: Option<Up>,
+    /// Where the data set puts pixel centres: auto, integer or half.
+    #[arg(long)]
+    pub pixel_centre: Option<PixelCentre>,
+    /// Keep every n-th view out of the fit, to judge it; 0 keeps none.
+    #[arg(long)]
+    pub hold_out_every: Option<usize>,
+    /// Read at most so many views.
+    #[arg(long)]
+    pub max_views: Option<usize>,
+    /// Shrink photographs by this whole factor on reading.
+    #[arg(long)]
+    pub shrink: Option<usize>,
+    /// What pixels without surface show: auto, environment or black.
+    #[arg(long)]
+    pub scene_background: Option<BackgroundChoice>,
+}
+
+impl ReadOptions {
+    /// The settings of the reader.
+    pub fn settings(&self) -> crate::scene::ReadSettings {
+        let mut settings = crate::scene::ReadSettings::default();
+        if let Some(up) = self.up {
+            settings.up = up;
+        }
+        if let Some(centre) = self.pixel_centre {
+            settings.pixel_centre = centre;
+        }
+        if let Some(every) = self.hold_out_every {
+            settings.hold_out_every = every;
+        }
+        if let Some(most) = self.max_views {
+            settings.max_views = most;
+        }
+        if let Some(shrink) = self.shrink {
+            settings.shrink = shrink;
+        }
+        if let Some(background) = self.scene_background {
+            settings.background = background;
+        }
+        settings
+    }
+}
+
+/// Options of `patina check`.
+#[derive(Debug, Args)]
+pub struct CheckOptions {
+    /// The scene: a BlendedMVS folder, an exchange folder, or a `scene.toml`.
+    pub scene: PathBuf,
+    /// Folder for the pictures with outlines; none are made without it.
+    #[arg(short, long)]
+    pub output: Option<PathBuf>,
+    /// How the scene is read.
+    #[command(flatten)]
+    pub read: ReadOptions,
+}
+
+/// Options of `patina fit`.
+#[derive(Debug, Args)]
+pub struct FitOptions {
+    /// The scene: a BlendedMVS folder, an exchange folder, or a `scene.toml`.
+    pub scene: PathBuf,
+    /// The run folder.
+    #[arg(short, long)]
+    pub output: PathBuf,
+    /// A settings file as in a run folder; options on the command line win.
+    #[arg(long)]
+    pub settings: Option<PathBuf>,
+    /// A light that is known: start from this map (HDR, EXR, PFM).
+    #[arg(long)]
+    pub env: Option<PathBuf>,
+    /// Keep texture coordinates the mesh came with: auto, keep or rebuild.
+    #[arg(long)]
+    pub uv: Option<KeepUv>,
+    /// How the scene is read.
+    #[command(flatten)]
+    pub read: ReadOptions,
+    /// How the maps are fitted.
+    #[command(flatten)]
+    pub fit: FitSettings,
+}
+
+/// Options of `patina resume`.
+#[derive(Debug, Args)]
+pub struct ResumeOptions {
+    /// The run folder.
+    pub run: PathBuf,
+    /// The scene, when it has moved since.
+    #[arg(long)]
+    pub scene: Option<PathBuf>,
+}
+
+/// Options of `patina relight`.
+#[derive(Debug, Args)]
+pub struct RelightOptions {
+    /// The run folder.
+    pub run: PathBuf,
+    /// Lights: HDR or EXR files, or `noon`, `evening`, `overcast`.
+    #[arg(long, required = true, num_args = 1..)]
+    pub env: Vec<String>,
+    /// The scene whose cameras are used; the scene of the run when not given.
+    #[arg(long)]
+    pub cameras: Option<PathBuf>,
+    /// Names of the views; the first held-out ones when not given.
+    #[arg(long, num_args = 1..)]
+    pub views: Vec<String>,
+    /// Turn the light about the vertical, in degrees.
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub rotate: f32,
+    /// Keep the light as strong as its file says; otherwise its mean is matched to that of the fitted light.
+    #[arg(long)]
+    pub absolute: bool,
+    /// Paths a pixel.
+    #[arg(long, default_value_t = 64)]
+    pub samples: usize,
+    /// Surface hits on the longest path.
+    #[arg(long, default_value_t = 3)]
+    pub bounces: usize,
+    /// Shrink pictures by this whole factor.
+    #[arg(long, default_value_t = 1)]
+    pub shrink: usize,
+    /// Exposure of the PNG files, in stops.
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub exposure: f32,
+    /// Hide the light behind the surface.
+    #[arg(long)]
+    pub hide_background: bool,
+    /// Folder of the pictures; `relight` in the run folder when not given.
+    #[arg(short, long)]
+    pub output: Option<PathBuf>,
+}
+
+/// A layer of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Layer {
+    /// The picture under the run's light.
+    Shaded,
+    /// Diffuse reflectance.
+    Diffuse,
+    /// Specular reflectance F0.
+    Specular,
+    /// Roughness r = a^2.
+    Roughness,
+    /// Shading normal in the world.
+    Normal,
+    /// Share of the pixel that the surface covers.
+    Coverage,
+    /// Variance of each shaded pixel's mean, from independent groups of samples.
+    Variance,
+}
+
+/// Options of `patina render`.
+#[derive(Debug, Args)]
+pub struct RenderOptions {
+    /// The run folder; or an exchange folder with its truth, to render that.
+    pub run: PathBuf,
+    /// The scene whose cameras are used; the scene of the run when not given.
+    #[arg(long)]
+    pub cameras: Option<PathBuf>,
+    /// Layers to write, one linear EXR per view and layer.
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "shaded")]
+    pub aov: Vec<Layer>,
+    /// Names of the views; all when not given.
+    #[arg(long, num_args = 1..)]
+    pub views: Vec<String>,
+    /// Another light than the run's own, as a file or a built-in sky.
+    #[arg(long)]
+    pub env: Option<String>,
+    /// Paths a pixel.
+    #[arg(long, default_value_t = 64)]
+    pub samples: usize,
+    /// Surface hits on the longest path.
+    #[arg(long, default_value_t = 3)]
+    pub bounces: usize,
+    /// Seed of the random numbers.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Hide the light behind the surface.
+    #[arg(long)]
+    pub hide_background: bool,
+    /// How the scene is read.
+    #[command(flatten)]
+    pub read: ReadOptions,
+    /// Folder of the pictures; `render` in the run folder when not given.
+    #[arg(short, long)]
+    pub output: Option<PathBuf>,
+}
+
+/// Options of `patina compare`.
+#[derive(Debug, Args)]
+pub struct CompareOptions {
+    /// The run folder.
+    pub run: PathBuf,
+    /// The scene with the photographs.
+    pub scene: PathBuf,
+    /// Paths a pixel.
+    #[arg(long, default_value_t = 32)]
+    pub samples: usize,
+    /// Surface hits on the longest path; that of the run when not given.
+    #[arg(long)]
+    pub bounces: Option<usize>,
+    /// How the scene is read.
+    #[command(flatten)]
+    pub read: ReadOptions,
+}

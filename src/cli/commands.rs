@@ -1,0 +1,245 @@
+//! `patina check`, `relight`, `render` and `compare`.
+
+use super::arguments::{CheckOptions, CompareOptions, Layer, RelightOptions, RenderOptions};
+use crate::error::{Error, ErrorKind, Place, Result};
+use crate::export::RunFolder;
+use crate::image::{GreyImage, Image, file};
+use crate::insight::scores::{aggregate, score_view};
+use crate::job::outcome::exposure_of;
+use crate::job::pictures::{light_of, matched, parameters, relit, surface_of};
+use crate::job::prepare::RunSettings;
+use crate::render::picture::{PictureSettings, layers, render as render_picture};
+use crate::render::{Parameters, Surface};
+use crate::scene::{Background, Scene, doctor};
+use crate::trace::Bvh;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+/// Checks a scene and prints what was found.
+pub fn check(options: &CheckOptions, json: bool) -> Result<()> {
+    let scene = crate::scene::read(&options.scene, &options.read.settings())?;
+    let bvh = Bvh::build(&scene.mesh.positions, &scene.mesh.triangles)?;
+    let report = doctor::check_with(&scene, &bvh);
+    if json {
+        println!("{}", serde_json::json!({"event": "check", "findings": report.findings, "views": report.views}));
+    } else {
+        println!("{}: {} triangles, {} views", scene.name, scene.mesh.triangles.len(), scene.views.len());
+        for finding in &report.findings {
+            println!("{finding}");
+        }
+    }
+    if let Some(folder) = &options.output {
+        for (index, view) in scene.views.iter().enumerate() {
+            let picture = doctor::overlay(&scene, &bvh, index);
+            file::write_png_srgb8(&folder.join(format!("{}_outline.png", view.name)), &picture)?;
+        }
+        if !json {
+            println!("outlines over the photos: {}", folder.display());
+        }
+    }
+    if report.is_fatal() {
+        return Err(Error::new(ErrorKind::InvalidScene, "a fit of this scene cannot work")
+            .remedy("mend what is marked fatal above"));
+    }
+    Ok(())
+}
+
+/// The scene whose cameras a command uses.
+fn camera_scene(
+    folder: &RunFolder,
+    given: Option<&Path>,
+    read: Option<crate::scene::ReadSettings>,
+) -> Result<(Scene, RunSettings)> {
+    let settings: RunSettings = folder.read_settings()?;
+    let path = given.map_or_else(|| settings.scene.clone(), Path::to_path_buf);
+    if path.as_os_str().is_empty() {
+        let seed = settings.fit.seed;
+        let demo = crate::scene::demo::build(&crate::scene::demo::DemoSettings { seed, ..Default::default() })?;
+        return Ok((demo.scene, settings));
+    }
+    let read = read.unwrap_or_else(|| settings.read.clone());
+    Ok((crate::scene::read(&path, &read)?, settings))
+}
+
+/// Indices of the named views; `otherwise` chooses when none is named.
+fn chosen_views(scene: &Scene, names: &[String], otherwise: impl Fn(&Scene) -> Vec<usize>) -> Result<Vec<usize>> {
+    if names.is_empty() {
+        return Ok(otherwise(scene));
+    }
+    names
+        .iter()
+        .map(|name| {
+            scene.views.iter().position(|view| view.name == *name).ok_or_else(|| {
+                Error::new(ErrorKind::InvalidSetting, format!("the scene has no view named {name}"))
+                    .at(Place::Setting("views".into()))
+                    .remedy("names are those of the photos without their ending")
+            })
+        })
+        .collect()
+}
+
+/// Renders a run under other lights.
+pub fn relight(options: &RelightOptions) -> Result<()> {
+    let folder = RunFolder::open(&options.run)?;
+    let (scene, settings) = camera_scene(&folder, options.cameras.as_deref(), None)?;
+    let result = folder.read_result()?;
+    let (surface, own) = surface_of(&result)?;
+    let output = options.output.clone().unwrap_or_else(|| folder.path().join("relight"));
+    let views = chosen_views(&scene, &options.views, |scene| {
+        let held_out: Vec<usize> = (0..scene.views.len()).filter(|&view| scene.views[view].held_out).take(4).collect();
+        if held_out.is_empty() { (0..scene.views.len().min(4)).collect() } else { held_out }
+    })?;
+    let picture_settings = PictureSettings {
+        samples: options.samples,
+        max_bounces: options.bounces,
+        background_visible: !options.hide_background,
+        lobe_strength: if settings.fit.has_lobe() { 1.0 } else { 0.0 },
+        ..Default::default()
+    };
+    for name in &options.env {
+        let (stem, light) = light_of(name, 256)?;
+        let light = light.rotated_about_up(options.rotate.to_radians());
+        let light = if options.absolute { light } else { matched(&light, &result.environment).0 };
+        for &view in &views {
+            let camera = scene.views[view].camera.shrunk(options.shrink.max(1));
+            let picture = relit(&surface, &own, &light, &camera, view, &picture_settings, &AtomicBool::new(false));
+            let base = output.join(format!("{}_{stem}", scene.views[view].name));
+            file::write_exr_rgb(&base.with_extension("exr"), &picture.radiance)?;
+            let bytes = file::srgb8_from_linear(&picture.radiance, options.exposure);
+            file::write_png_srgb8(&base.with_extension("png"), &bytes)?;
+            println!("{}", base.with_extension("png").display());
+        }
+    }
+    Ok(())
+}
+
+/// Renders pictures and layers of a run, or of the truth of an exchange folder.
+pub fn render(options: &RenderOptions) -> Result<()> {
+    let is_run = RunFolder::open(&options.run).is_ok_and(|folder| folder.is_run());
+    let (scene, surface, mut own, strength) = if is_run {
+        let folder = RunFolder::open(&options.run)?;
+        let (scene, settings) =
+            camera_scene(&folder, options.cameras.as_deref(), Some(options.read.settings()))?;
+        let (surface, own) = surface_of(&folder.read_result()?)?;
+        (scene, surface, own, if settings.fit.has_lobe() { 1.0 } else { 0.0 })
+    } else {
+        let (scene, surface, own) = truth_of(&options.run, options)?;
+        (scene, surface, own, 1.0)
+    };
+    if let Some(name) = &options.env {
+        let (_, light) = light_of(name, 256)?;
+        own.light = light.radiance.pixels().iter().map(|radiance| radiance.to_array()).collect();
+        own.environment_size = (light.width(), light.height());
+    }
+    let output = options.output.clone().unwrap_or_else(|| options.run.join("render"));
+    let groups = if options.aov.contains(&Layer::Variance) { 8 } else { 1 };
+    let picture_settings = PictureSettings {
+        samples: options.samples.div_ceil(groups),
+        groups,
+        max_bounces: options.bounces,
+        background_visible: !options.hide_background && scene.background == Background::Environment,
+        lobe_strength: strength,
+        seed: options.seed,
+        ..Default::default()
+    };
+    for view in chosen_views(&scene, &options.views, |scene| (0..scene.views.len()).collect())? {
+        let camera = &scene.views[view].camera;
+        let name = &scene.views[view].name;
+        let path = |layer: &str| output.join(format!("{name}_{layer}.exr"));
+        let needs_light = options.aov.iter().any(|layer| matches!(layer, Layer::Shaded | Layer::Variance));
+        let shaded = needs_light.then(|| {
+            render_picture(&surface, camera, &own, view as u32, &picture_settings, &AtomicBool::new(false))
+        });
+        let flat = layers(&surface, camera, &own, 16);
+        for layer in &options.aov {
+            match (layer, &shaded) {
+                (Layer::Shaded, Some(picture)) => file::write_exr_rgb(&path("shaded"), &picture.radiance)?,
+                (Layer::Variance, Some(picture)) => {
+                    if let Some(variance) = &picture.variance {
+                        file::write_exr_rgb(&path("variance"), variance)?;
+                    }
+                }
+                (Layer::Diffuse, _) => file::write_exr_rgb(&path("diffuse"), &flat.diffuse)?,
+                (Layer::Specular, _) => file::write_exr_rgb(&path("specular"), &flat.specular)?,
+                (Layer::Roughness, _) => file::write_exr_grey(&path("roughness"), &flat.roughness)?,
+                (Layer::Normal, _) => file::write_exr_rgb(&path("normal"), &flat.normal)?,
+                (Layer::Coverage, _) => file::write_exr_grey(&path("coverage"), &flat.coverage)?,
+                (Layer::Shaded | Layer::Variance, None) => {}
+            }
+        }
+        println!("{name}");
+    }
+    Ok(())
+}
+
+fn truth_of(path: &Path, options: &RenderOptions) -> Result<(Scene, Surface, Parameters<f32>)> {
+    let scene = crate::scene::read(path, &options.read.settings())?;
+    let Some(truth) = &scene.truth else {
+        return Err(Error::new(ErrorKind::Missing, "neither a run nor a scene with its truth")
+            .at(Place::File(path.into()))
+            .remedy("name a run folder made by `patina fit` or `patina demo`"));
+    };
+    let own = parameters(&truth.maps, &truth.environment);
+    let surface = Surface::new(scene.mesh.clone())?;
+    Ok((scene, surface, own))
+}
+
+/// Scores a run against the photographs of a scene, at their full size.
+pub fn compare(options: &CompareOptions, json: bool) -> Result<()> {
+    let folder = RunFolder::open(&options.run)?;
+    let settings: RunSettings = folder.read_settings()?;
+    let scene = crate::scene::read(&options.scene, &options.read.settings())?;
+    let (surface, own) = surface_of(&folder.read_result()?)?;
+    let picture_settings = PictureSettings {
+        samples: options.samples,
+        max_bounces: options.bounces.unwrap_or(settings.fit.bounces),
+        background_visible: scene.background == Background::Environment,
+        lobe_strength: if settings.fit.has_lobe() { 1.0 } else { 0.0 },
+        ..Default::default()
+    };
+    let mut scored = Vec::new();
+    for (index, view) in scene.views.iter().enumerate() {
+        let picture =
+            render_picture(&surface, &view.camera, &own, index as u32, &picture_settings, &AtomicBool::new(false));
+        let coverage = fully_covered(&picture.coverage);
+        let photo = view.photo.to_linear();
+        let scores = score_view(&photo, &picture.radiance, &view.states, Some(&coverage), exposure_of(&scene))?;
+        if json {
+            println!("{}", serde_json::json!({"view": view.name, "held_out": view.held_out, "scores": scores}));
+        } else {
+            let kind = if view.held_out { "held out" } else { "training" };
+            println!(
+                "{:12} {kind}: RMSE {:.4}, PSNR {:.2} dB, SSIM {:.3} (aligned {:.4}, {:.2} dB, {:.3})",
+                view.name,
+                scores.raw.rmse_linear,
+                scores.raw.psnr_srgb_db,
+                scores.raw.ssim_srgb,
+                scores.aligned.rmse_linear,
+                scores.aligned.psnr_srgb_db,
+                scores.aligned.ssim_srgb
+            );
+        }
+        scored.push((view.held_out, scores));
+    }
+    for (name, held_out) in [("held-out views", true), ("training views", false)] {
+        let of_kind: Vec<_> = scored.iter().filter(|(own, _)| *own == held_out).map(|(_, scores)| scores).collect();
+        if !of_kind.is_empty() && !json {
+            let score = aggregate(of_kind);
+            println!(
+                "{name}: RMSE {:.4}, PSNR {:.2} dB, SSIM {:.3}; scale-aligned {:.4}, {:.2} dB, {:.3}",
+                score.raw.rmse_linear,
+                score.raw.psnr_srgb_db,
+                score.raw.ssim_srgb,
+                score.aligned.rmse_linear,
+                score.aligned.psnr_srgb_db,
+                score.aligned.ssim_srgb
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Pixels that the surface covers wholly.
+fn fully_covered(coverage: &GreyImage) -> Image<bool> {
+    coverage.map(|&coverage| coverage >= 0.999)
+}

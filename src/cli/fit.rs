@@ -1,0 +1,282 @@
+//! `patina demo`, `fit` and `resume`: drive a job and show its events.
+
+use super::arguments::{DemoOptions, FitOptions, ResumeOptions};
+use crate::error::{Error, ErrorKind, Place, Result};
+use crate::export::RunFolder;
+use crate::fit::{FitSettings, Fitter, checkpoint};
+use crate::insight::report::data::{ReportData, StageTime};
+use crate::job::prepare::{Prepared, RunSettings, prepare, read_scene};
+use crate::job::{self, Event, JobHandle, demo};
+use crate::light::Environment;
+use crate::render::Surface;
+use crate::scene::Scene;
+use crate::scene::demo::DemoSettings;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Runs the demo.
+pub fn demo(options: &DemoOptions, json: bool) -> Result<()> {
+    let folder = RunFolder::create(&options.output)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    stop_on_interrupt(Arc::clone(&stop));
+    let mut settings = demo::settings();
+    settings.fit.seed = options.seed;
+    let mut timings = Vec::new();
+    let bar = share_bar(json, "photographing the demo scene");
+    let demo_settings = DemoSettings { seed: options.seed, ..DemoSettings::default() };
+    let scene = demo::scene(&demo_settings, &mut timings, &stop, &|share| bar.set_position((share * 1000.0) as u64))?;
+    bar.finish_and_clear();
+    start_new(scene, Vec::new(), settings, folder, timings, stop, json)
+}
+
+/// Fits a scene.
+pub fn fit(options: &FitOptions, json: bool) -> Result<()> {
+    let settings = run_settings(options)?;
+    settings.fit.validate()?;
+    let folder = RunFolder::create(&options.output)?;
+    let mut timings = Vec::new();
+    if !json {
+        eprintln!("reading and checking {}", settings.scene.display());
+    }
+    let (scene, findings) = read_scene(&settings.scene, &settings.read, &mut timings)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    stop_on_interrupt(Arc::clone(&stop));
+    start_new(scene, findings, settings, folder, timings, stop, json)
+}
+
+fn run_settings(options: &FitOptions) -> Result<RunSettings> {
+    let mut settings = match &options.settings {
+        Some(path) => {
+            let text = std::fs::read_to_string(path).map_err(|source| Error::reading(path, source))?;
+            toml::from_str::<RunSettings>(&text).map_err(|source| {
+                Error::new(ErrorKind::Malformed, format!("settings are not understood: {}", source.message()))
+                    .at(Place::File(path.clone()))
+                    .remedy("take the settings.toml of a run folder as a pattern")
+            })?
+        }
+        None => RunSettings::default(),
+    };
+    settings.scene = absolute(&options.scene);
+    settings.known_light = options.env.as_deref().map(absolute).unwrap_or(settings.known_light);
+    if options.settings.is_none() {
+        settings.read = options.read.settings();
+        settings.fit = options.fit.clone();
+    } else {
+        // What was typed wins over the file; what was not typed equals its default.
+        settings.fit = overlaid(&settings.fit, &options.fit)?;
+    }
+    if let Some(uv) = options.uv {
+        settings.atlas.keep_uv = uv;
+    }
+    Ok(settings)
+}
+
+/// `base` with every setting of `typed` that differs from the default.
+fn overlaid(base: &FitSettings, typed: &FitSettings) -> Result<FitSettings> {
+    let mut table = toml::Table::try_from(base).unwrap_or_default();
+    let typed: toml::Table = toml::from_str(&typed.to_toml()).unwrap_or_default();
+    table.extend(typed);
+    FitSettings::from_toml(&table.to_string())
+}
+
+fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.into())
+}
+
+fn start_new(
+    scene: Scene,
+    findings: Vec<crate::Finding>,
+    settings: RunSettings,
+    folder: RunFolder,
+    timings: Vec<StageTime>,
+    stop: Arc<AtomicBool>,
+    json: bool,
+) -> Result<()> {
+    let bar = share_bar(json, "making the atlas");
+    let prepared =
+        prepare(scene, findings, &settings, timings, &|share| bar.set_position((share * 1000.0) as u64))?;
+    bar.finish_and_clear();
+    let known_light = match settings.known_light.as_os_str().is_empty() {
+        true => None,
+        false => Some(Environment::read(&settings.known_light)?.0),
+    };
+    let fitter = Fitter::new(
+        Arc::clone(&prepared.scene),
+        Arc::clone(&prepared.surface),
+        settings.fit.clone(),
+        known_light.as_ref(),
+    )?;
+    if stop.load(Ordering::Relaxed) {
+        return Err(Error::new(ErrorKind::Stopped, "stopped before the fit began"));
+    }
+    let job = job::start(prepared, fitter, settings, folder.clone())?;
+    watch(job, &folder, &stop, json)
+}
+
+/// Takes up a run.
+pub fn resume(options: &ResumeOptions, json: bool) -> Result<()> {
+    let folder = RunFolder::open(&options.run)?;
+    let mut settings: RunSettings = folder.read_settings()?;
+    let state = checkpoint::read(&folder.checkpoint_path())?;
+    let mut timings = Vec::new();
+    let stop = Arc::new(AtomicBool::new(false));
+    stop_on_interrupt(Arc::clone(&stop));
+    if let Some(scene) = &options.scene {
+        settings.scene = absolute(scene);
+    }
+    let (scene, findings) = if settings.scene.as_os_str().is_empty() {
+        let demo_settings = DemoSettings { seed: settings.fit.seed, ..DemoSettings::default() };
+        (demo::scene(&demo_settings, &mut timings, &stop, &|_| {})?, Vec::new())
+    } else {
+        read_scene(&settings.scene, &settings.read, &mut timings)?
+    };
+    let surface = Arc::new(Surface::new(crate::export::obj::read(&folder.file("mesh.obj"))?)?);
+    let scene = Arc::new(scene);
+    let fitter = Fitter::resume(Arc::clone(&scene), Arc::clone(&surface), settings.fit.clone(), state)?;
+    let prepared = Prepared { scene, surface, quality: None, findings, timings };
+    let job = job::start(prepared, fitter, settings, folder.clone())?;
+    watch(job, &folder, &stop, json)
+}
+
+/// Raises a flag on Ctrl-C; a second Ctrl-C ends the program at once.
+fn stop_on_interrupt(stop: Arc<AtomicBool>) {
+    // Fails only if a handler exists already, as in tests.
+    let _ = ctrlc::set_handler(move || {
+        if stop.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    });
+}
+
+fn share_bar(json: bool, what: &str) -> ProgressBar {
+    if json {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new(1000).with_message(what.to_string());
+    bar.set_style(ProgressStyle::with_template("{msg} [{bar:30}] {percent} %").unwrap_or(ProgressStyle::default_bar()));
+    bar
+}
+
+/// Shows the events of a job until it ends.
+fn watch(job: JobHandle, folder: &RunFolder, stop: &AtomicBool, json: bool) -> Result<()> {
+    let bar = if json { ProgressBar::hidden() } else { ProgressBar::new(0) };
+    let style = ProgressStyle::with_template("{prefix:>13} [{bar:30}] {pos}/{len} {msg}");
+    bar.set_style(style.unwrap_or(ProgressStyle::default_bar()));
+    let say = |text: String| if bar.is_hidden() { eprintln!("{text}") } else { bar.println(text) };
+    let mut last_line = std::time::Instant::now();
+    let outcome = loop {
+        if stop.load(Ordering::Relaxed) {
+            job.stop();
+        }
+        let event = match job.events.recv_timeout(std::time::Duration::from_millis(100)) {
+            Ok(event) => event,
+            Err(crossbeam_channel::RecvTimeoutError::Timeout) => continue,
+            Err(crossbeam_channel::RecvTimeoutError::Disconnected) => {
+                break Err(Error::new(ErrorKind::Internal, "the fit ended without a word"));
+            }
+        };
+        if json {
+            println!("{}", line_of(&event));
+        }
+        match event {
+            Event::Started { steps_done, steps_total } => {
+                bar.set_length(steps_total as u64);
+                bar.set_position(steps_done as u64);
+            }
+            Event::Progress(progress) => {
+                let row = &progress.row;
+                bar.set_position(row.step as u64);
+                bar.set_prefix(row.stage.clone());
+                let held_out = row.held_out_rmse.map_or(String::new(), |rmse| format!(", held-out RMSE {rmse:.4}"));
+                let rmse = row.image_loss.max(0.0).sqrt();
+                let left = crate::insight::report::number::duration(progress.seconds_left);
+                bar.set_message(format!("RMSE {rmse:.4}{held_out}, {:.1} steps/s, {left} left", progress.steps_per_second));
+                // Without a terminal a bar shows nothing: a line now and then does.
+                if !json && bar.is_hidden() && (last_line.elapsed().as_secs() >= 5 || row.held_out_rmse.is_some()) {
+                    eprintln!("{} step {} of {}: RMSE {rmse:.4}{held_out}, {left} left", row.stage, row.step, progress.steps_total);
+                    last_line = std::time::Instant::now();
+                }
+            }
+            Event::Finding(finding) if !json => say(finding.to_string()),
+            Event::Finishing(what) if !json => {
+                bar.set_prefix("writing");
+                bar.set_message(what);
+            }
+            Event::Finished(data) => break Ok(data),
+            Event::Stopped { steps_done } => {
+                break Err(Error::new(ErrorKind::Stopped, format!("stopped after {steps_done} steps"))
+                    .remedy(format!("go on with `patina resume {}`", folder.path().display())));
+            }
+            Event::Failed(error) => break Err(error),
+            _ => {}
+        }
+    };
+    bar.finish_and_clear();
+    job.join();
+    let data = outcome?;
+    if !json {
+        summarise(&data, folder);
+    }
+    Ok(())
+}
+
+fn line_of(event: &Event) -> serde_json::Value {
+    use serde_json::json;
+    match event {
+        Event::Started { steps_done, steps_total } => {
+            json!({"event": "started", "steps_done": steps_done, "steps_total": steps_total})
+        }
+        Event::Progress(progress) => json!({"event": "progress", "progress": progress}),
+        Event::Finding(finding) => json!({"event": "finding", "finding": finding}),
+        Event::Checkpoint(path) => json!({"event": "checkpoint", "path": path}),
+        Event::Paused => json!({"event": "paused"}),
+        Event::Resumed => json!({"event": "resumed"}),
+        Event::Finishing(what) => json!({"event": "finishing", "what": what}),
+        Event::Finished(data) => json!({"event": "finished", "aggregates": data.aggregates, "truth": data.truth, "timings": data.timings}),
+        Event::Stopped { steps_done } => json!({"event": "stopped", "steps_done": steps_done}),
+        Event::Failed(error) => json!({"event": "failed", "message": error.to_string()}),
+    }
+}
+
+/// Prints the scores and where to look.
+fn summarise(data: &ReportData, folder: &RunFolder) {
+    for aggregate in &data.aggregates {
+        let (raw, aligned) = (&aggregate.score.raw, &aggregate.score.aligned);
+        println!(
+            "{:15} {} views: PSNR {:.2} dB, SSIM {:.3}, RMSE {:.4} (scale-aligned: {:.2} dB, {:.3}, {:.4})",
+            aggregate.name,
+            aggregate.score.views,
+            raw.psnr_srgb_db,
+            raw.ssim_srgb,
+            raw.rmse_linear,
+            aligned.psnr_srgb_db,
+            aligned.ssim_srgb,
+            aligned.rmse_linear
+        );
+    }
+    if let Some(truth) = &data.truth {
+        println!("against the truth, raw (scale-aligned):");
+        if let Some(maps) = &truth.maps {
+            for (name, pair) in [("diffuse", maps.diffuse), ("specular", maps.specular), ("roughness", maps.roughness)] {
+                println!("  {name:12} RMSE {:.4} ({:.4})", pair.raw, pair.aligned);
+            }
+        }
+        if let Some(light) = &truth.environment {
+            println!("  light        relative L2 {:.3} ({:.3}), log RMSE {:.3} ({:.3})", light.relative_l2.raw, light.relative_l2.aligned, light.log_rmse.raw, light.log_rmse.aligned);
+            if let Some(angle) = light.brightest_angle_degrees {
+                println!("  brightest light off by {angle:.1} degrees");
+            }
+        }
+        if let Some(relit) = &truth.relit {
+            println!("  relit        RMSE {:.4} ({:.4}), PSNR {:.2} dB ({:.2} dB)", relit.raw.rmse_linear, relit.aligned.rmse_linear, relit.raw.psnr_srgb_db, relit.aligned.psnr_srgb_db);
+        }
+    }
+    let whole = data.timings.iter().map(|time| format!("{} {:.1} s", time.stage, time.seconds)).collect::<Vec<_>>();
+    println!("{}", whole.join(", "));
+    if let Some(bytes) = data.peak_memory_bytes {
+        println!("peak memory {}", crate::insight::report::number::memory(bytes));
+    }
+    println!("report: {}", folder.report_html_path().display());
+}

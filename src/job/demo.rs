@@ -1,0 +1,115 @@
+//! The built-in scene: photographs are rendered from a truth, so that every error can be measured.
+
+use super::prepare::{RunSettings, timed};
+use crate::atlas::{AtlasSettings, KeepUv};
+use crate::error::{Error, ErrorKind, Result};
+use crate::fit::FitSettings;
+use crate::insight::report::data::StageTime;
+use crate::math::random::{SampleStream, StreamKey};
+use crate::render::Surface;
+use crate::render::picture::{PictureSettings, render};
+use crate::scene::demo::{self, DemoSettings};
+use crate::scene::{Background, Scene};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::pictures::parameters;
+
+/// Paths a pixel in the photographs of the demo.
+const PHOTO_SAMPLES: usize = 48;
+
+/// Settings of the demo's fit: small maps and few steps, for a minute on two cores.
+pub fn settings() -> RunSettings {
+    RunSettings {
+        atlas: AtlasSettings { keep_uv: KeepUv::Keep, ..Default::default() },
+        fit: FitSettings {
+            map_size: DemoSettings::default().map_size,
+            steps_diffuse: 40,
+            steps_all: 70,
+            levels: 2,
+            views_per_step: 6,
+            pixels_per_step: 0,
+            samples: 4,
+            bounces: 2,
+            ..Default::default()
+        },
+        ..Default::default()
+    }
+}
+
+/// Builds the demo scene and renders its photographs. `progress` gets the share done, in [0, 1].
+pub fn scene(
+    settings: &DemoSettings,
+    timings: &mut Vec<StageTime>,
+    stop: &AtomicBool,
+    progress: &dyn Fn(f32),
+) -> Result<Scene> {
+    let demo = timed(timings, "build demo", || demo::build(settings))?;
+    let mut scene = demo.scene;
+    timed(timings, "render photographs", || photograph(&mut scene, PHOTO_SAMPLES, settings.seed, 1.0, stop, progress))?;
+    Ok(scene)
+}
+
+/// Fills the photographs and relit pictures of a scene with a known truth, by the path tracer at full depth. The paths
+/// use other random numbers than any fit, and read the finest texels only.
+pub fn photograph(
+    scene: &mut Scene,
+    samples: usize,
+    seed: u64,
+    lobe_strength: f32,
+    stop: &AtomicBool,
+    progress: &dyn Fn(f32),
+) -> Result<()> {
+    let Some(truth) = scene.truth.clone() else {
+        return Err(Error::new(ErrorKind::Internal, "a scene without truth cannot be photographed"));
+    };
+    let surface = Surface::new(scene.mesh.clone())?;
+    let lit = parameters(&truth.maps, &truth.environment);
+    let settings = PictureSettings {
+        samples,
+        max_bounces: truth.max_bounces,
+        background_visible: scene.background == Background::Environment,
+        lobe_strength,
+        seed: seed ^ 0xf0f0_1234,
+        ..Default::default()
+    };
+    let stopped = || Error::new(ErrorKind::Stopped, "stopped while photographs were rendered");
+    let count = scene.views.len();
+    for view in 0..count {
+        let picture = render(&surface, &scene.views[view].camera, &lit, view as u32, &settings, stop);
+        if stop.load(Ordering::Relaxed) {
+            return Err(stopped());
+        }
+        scene.set_photo(view, picture.radiance)?;
+        progress((view + 1) as f32 / (count + 4) as f32);
+    }
+    if let Some(relight) = scene.truth.as_mut().and_then(|truth| truth.relight.as_mut()) {
+        let lit = parameters(&truth.maps, &relight.environment);
+        let settings = PictureSettings { samples: 2 * samples, ..settings };
+        relight.pictures.clear();
+        let judged: Vec<usize> = (0..count).filter(|&view| scene.views[view].held_out).take(4).collect();
+        let judged = if judged.is_empty() { (0..count.min(4)).collect() } else { judged };
+        for view in judged {
+            let picture = render(&surface, &scene.views[view].camera, &lit, view as u32, &settings, stop);
+            if stop.load(Ordering::Relaxed) {
+                return Err(stopped());
+            }
+            relight.pictures.push((view, picture.radiance));
+        }
+    }
+    progress(1.0);
+    Ok(())
+}
+
+/// Adds sensor noise to a picture: normal, with a standard deviation of `share` of each value plus `floor`.
+pub fn with_noise(picture: &mut crate::image::RgbImage, share: f32, floor: f32, seed: u64) {
+    for (index, pixel) in picture.pixels_mut().iter_mut().enumerate() {
+        for channel in 0..3 {
+            let mut stream = SampleStream::new(StreamKey::new(seed, 0, channel, index as u32), 0);
+            let [u, v] = stream.next_pair();
+            // Box and Muller 1958.
+            let normal = (-2.0 * (1.0 - u).ln()).sqrt() * (std::f32::consts::TAU * v).cos();
+            let value = pixel[channel as usize];
+            pixel[channel as usize] = (value + normal * (share * value + floor)).max(0.0);
+        }
+    }
+}

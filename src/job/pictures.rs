@@ -1,0 +1,70 @@
+//! Pictures of a run under its own light and under others.
+
+use crate::error::Result;
+use crate::export::RunResult;
+use crate::light::Environment;
+use crate::light::sky::{SkySettings, sun_and_sky};
+use crate::material::MaterialMaps;
+use crate::material::texels::{PyramidWeights, TexelPyramid, texels_from_maps};
+use crate::render::picture::{Picture, PictureSettings, render};
+use crate::render::{Parameters, Surface};
+use crate::scene::Camera;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+/// Maps and light as the tracer reads them.
+pub fn parameters(maps: &MaterialMaps, environment: &Environment) -> Parameters<f32> {
+    let weights = PyramidWeights::flat(maps.diffuse.width(), maps.diffuse.height());
+    Parameters::new(TexelPyramid::from_base(texels_from_maps(maps), &weights), environment)
+}
+
+/// The surface and the parameters of a run folder.
+pub fn surface_of(result: &RunResult) -> Result<(Surface, Parameters<f32>)> {
+    let surface = Surface::new(result.mesh.clone())?;
+    Ok((surface, parameters(&result.maps, &result.environment)))
+}
+
+/// A light by its file, or by the name of a built-in sky: `noon`, `evening` or `overcast`.
+pub fn light_of(name: &str, height: usize) -> Result<(String, Environment)> {
+    let sky = match name {
+        "noon" => Some(SkySettings::noon()),
+        "evening" => Some(SkySettings::evening()),
+        "overcast" => Some(SkySettings::overcast()),
+        _ => None,
+    };
+    match sky {
+        Some(sky) => Ok((name.into(), sun_and_sky(2 * height, height, &sky))),
+        None => {
+            let path = Path::new(name);
+            let (environment, _) = Environment::read(path)?;
+            let stem = path.file_stem().map_or_else(|| name.into(), |stem| stem.to_string_lossy().into_owned());
+            let environment = if environment.height() > height { environment.resampled(2 * height, height) } else { environment };
+            Ok((stem, environment))
+        }
+    }
+}
+
+/// A light scaled so that its mean radiance has the luminance of another's: pictures under both are of like brightness.
+pub fn matched(light: &Environment, to: &Environment) -> (Environment, f32) {
+    let luminance = |light: &Environment| crate::math::luminance(light.mean_radiance()).max(1e-6);
+    let factor = luminance(to) / luminance(light);
+    (Environment { radiance: light.radiance.map(|radiance| *radiance * factor) }, factor)
+}
+
+/// A picture of a view under another light.
+pub fn relit(
+    surface: &Surface,
+    own: &Parameters<f32>,
+    light: &Environment,
+    camera: &Camera,
+    view: usize,
+    settings: &PictureSettings,
+    stop: &AtomicBool,
+) -> Picture {
+    let lit = Parameters {
+        texels: own.texels.clone(),
+        light: light.radiance.pixels().iter().map(|radiance| radiance.to_array()).collect(),
+        environment_size: (light.width(), light.height()),
+    };
+    render(surface, camera, &lit, view as u32, settings, stop)
+}

@@ -1,0 +1,91 @@
+//! From a scene folder to something a fit can start on.
+
+use crate::atlas::{self, AtlasQuality, AtlasSettings, covered_texels};
+use crate::error::{Error, ErrorKind, Finding, Result, Severity};
+use crate::fit::FitSettings;
+use crate::insight::report::data::StageTime;
+use crate::render::Surface;
+use crate::scene::{ReadSettings, Scene, doctor};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Everything a run was started with: `settings.toml` of the run folder.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case")]
+pub struct RunSettings {
+    /// The scene's folder or file; empty for a scene made in code.
+    pub scene: PathBuf,
+    /// A light that is known from the start; empty when none is.
+    pub known_light: PathBuf,
+    /// How the scene is read.
+    pub read: ReadSettings,
+    /// How the atlas is made.
+    pub atlas: AtlasSettings,
+    /// How the maps are fitted.
+    pub fit: FitSettings,
+}
+
+/// A scene that is ready for a fit.
+pub struct Prepared {
+    /// The scene; its mesh is as it was read.
+    pub scene: Arc<Scene>,
+    /// The surface, with the atlas.
+    pub surface: Arc<Surface>,
+    /// How good the atlas is; `None` for a resumed run.
+    pub quality: Option<AtlasQuality>,
+    /// What was noticed.
+    pub findings: Vec<Finding>,
+    /// Time of each stage so far.
+    pub timings: Vec<StageTime>,
+}
+
+/// Runs a piece of work and notes how long it took.
+pub fn timed<T>(timings: &mut Vec<StageTime>, stage: &str, work: impl FnOnce() -> T) -> T {
+    let began = Instant::now();
+    let result = work();
+    timings.push(StageTime { stage: stage.into(), seconds: began.elapsed().as_secs_f64() });
+    result
+}
+
+/// Reads and checks a scene. A finding that is fatal is an error: nothing starts a long fit on a scene that cannot work.
+pub fn read_scene(path: &Path, settings: &ReadSettings, timings: &mut Vec<StageTime>) -> Result<(Scene, Vec<Finding>)> {
+    let scene = timed(timings, "read", || crate::scene::read(path, settings))?;
+    let report = timed(timings, "check", || doctor::check(&scene));
+    let findings = report.findings;
+    if let Some(fatal) = findings.iter().find(|finding| finding.severity == Severity::Fatal) {
+        let place = if fatal.place.is_empty() { String::new() } else { format!("{}: ", fatal.place) };
+        return Err(Error::new(ErrorKind::InvalidScene, format!("the scene cannot work: {place}{}", fatal.message))
+            .remedy(fatal.remedy.clone()));
+    }
+    Ok((scene, findings))
+}
+
+/// Makes the atlas and the surface of a checked scene.
+pub fn prepare(
+    scene: Scene,
+    mut findings: Vec<Finding>,
+    settings: &RunSettings,
+    mut timings: Vec<StageTime>,
+    progress: &(dyn Fn(f32) + Sync),
+) -> Result<Prepared> {
+    // Charts keep their distance at the size the maps are stored in.
+    let atlas_settings = AtlasSettings { resolution_texels: settings.fit.map_size, ..settings.atlas.clone() };
+    let atlas = timed(&mut timings, "atlas", || atlas::build(&scene.mesh, &atlas_settings, progress))?;
+    findings.extend(atlas.findings);
+    let mesh = atlas.mesh;
+    let surface = timed(&mut timings, "tracer", || Surface::new(mesh))?;
+    Ok(Prepared {
+        scene: Arc::new(scene),
+        surface: Arc::new(surface),
+        quality: Some(atlas.quality),
+        findings,
+        timings,
+    })
+}
+
+/// Texels of a chart, at a size.
+pub fn covered(surface: &Surface, map_size: usize) -> crate::image::Image<bool> {
+    covered_texels(surface.mesh(), map_size, map_size)
+}
