@@ -191,7 +191,7 @@ fn a_flat_sheet_keeps_its_shape() {
 #[test]
 fn a_long_strip_does_not_waste_the_map() {
     let atlas = checked(&grid(400, 10, |u, v| Vec3::new(40.0 * u, v, 0.0)), &settings(512));
-    assert!(atlas.quality.share_of_area > 0.6, "{:?}", atlas.quality);
+    assert!(atlas.quality.share_of_area > 0.5, "{:?}", atlas.quality);
     assert!(atlas.quality.charts <= 24, "{:?}", atlas.quality);
 }
 

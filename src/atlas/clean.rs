@@ -8,7 +8,7 @@
 use super::topology::weld;
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::scene::Mesh;
-use glam::{DVec3, Vec2, Vec3};
+use glam::DVec3;
 use std::collections::{HashMap, HashSet};
 
 /// Rounds in which a face without height is dissolved into its neighbours; later ones are dropped, so that the loop
@@ -155,8 +155,8 @@ impl Work {
 
     fn retain(&mut self, keep: &[bool]) {
         let mut kept = 0;
-        for triangle in 0..keep.len() {
-            if keep[triangle] {
+        for (triangle, &keep) in keep.iter().enumerate() {
+            if keep {
                 self.mesh.triangles[kept] = self.mesh.triangles[triangle];
                 self.source[kept] = self.source[triangle];
                 kept += 1;
@@ -291,15 +291,15 @@ impl Work {
             name[vertex as usize] = 0;
         }
         let mut mesh = Mesh::default();
-        for vertex in 0..name.len() {
-            if name[vertex] == u32::MAX {
+        for (vertex, name) in name.iter_mut().enumerate() {
+            if *name == u32::MAX {
                 continue;
             }
-            name[vertex] = mesh.positions.len() as u32;
+            *name = mesh.positions.len() as u32;
             let point = self.point(vertex as u32) as usize;
             mesh.positions.push(self.mesh.positions[point]);
-            mesh.normals.extend(self.mesh.normals.get(vertex).copied().map(|normal: Vec3| normal));
-            mesh.uvs.extend(self.mesh.uvs.get(vertex).copied().map(|uv: Vec2| uv));
+            mesh.normals.extend(self.mesh.normals.get(vertex).copied());
+            mesh.uvs.extend(self.mesh.uvs.get(vertex).copied());
         }
         mesh.triangles =
             self.mesh.triangles.iter().map(|triangle| triangle.map(|vertex| name[vertex as usize])).collect();

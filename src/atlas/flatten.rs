@@ -32,9 +32,9 @@ pub(crate) struct Limits {
 /// Lays a set of triangles flat, in as many charts as it takes.
 pub(crate) fn flatten(surface: &Surface, triangles: Vec<u32>, limits: Limits) -> Vec<FlatChart> {
     let chart = ChartMesh::new(surface, triangles);
-    match try_flatten(surface, chart, limits) {
-        Ok(flat) => vec![flat],
-        Err(chart) => {
+    match try_flatten(surface, &chart, limits) {
+        Some(flat) => vec![flat],
+        None => {
             let [first, second] = chart.halves(surface);
             let (mut first, second) =
                 rayon::join(|| flatten(surface, first, limits), || flatten(surface, second, limits));
@@ -44,14 +44,14 @@ pub(crate) fn flatten(surface: &Surface, triangles: Vec<u32>, limits: Limits) ->
     }
 }
 
-/// Lays a chart flat, or gives it back when it has to be split.
-pub(crate) fn try_flatten(surface: &Surface, chart: ChartMesh, limits: Limits) -> Result<FlatChart, ChartMesh> {
+/// Lays a chart flat; `None` when it has to be split.
+pub(crate) fn try_flatten(surface: &Surface, chart: &ChartMesh, limits: Limits) -> Option<FlatChart> {
     if chart.genus > 0 || chart.loops.is_empty() {
-        return Err(chart);
+        return None;
     }
     if let [triangle] = chart.triangles[..] {
         let points = lscm::lay_flat(surface.corners(triangle)).unwrap_or_default().to_vec();
-        return Ok(FlatChart { chart, points });
+        return Some(FlatChart { chart: chart.clone(), points });
     }
     let mean: DVec3 =
         chart.triangles.iter().map(|&t| surface.normals[t as usize] * surface.areas[t as usize]).sum::<DVec3>();
@@ -59,17 +59,17 @@ pub(crate) fn try_flatten(surface: &Surface, chart: ChartMesh, limits: Limits) -
     let lowest = chart.triangles.iter().map(|&t| surface.normals[t as usize].dot(normal)).fold(1.0, f64::min);
     // A flat chart is its own conformal map: projecting it spares the solve.
     if lowest < 1.0 - 1e-12
-        && let Some(flat) = lscm::conformal_map(&chart).and_then(|points| checked(surface, &chart, points, limits))
+        && let Some(flat) = lscm::conformal_map(chart).and_then(|points| checked(surface, chart, points, limits))
     {
-        return Ok(flat);
+        return Some(flat);
     }
     // Seen from its mean normal nothing is flipped as long as every triangle faces that way.
     if lowest > 0.1
-        && let Some(flat) = checked(surface, &chart, lscm::project(&chart, normal), limits)
+        && let Some(flat) = checked(surface, chart, lscm::project(chart, normal), limits)
     {
-        return Ok(flat);
+        return Some(flat);
     }
-    Err(chart)
+    None
 }
 
 /// The chart with these points, scaled to its area in space, when it is good.
@@ -94,9 +94,16 @@ fn checked(surface: &Surface, chart: &ChartMesh, mut points: Vec<DVec2>, limits:
         .then(|| FlatChart { chart: chart.clone(), points })
 }
 
-/// Halves charts whose box is longer than `longest`, as long as their pieces are much shorter: one long strip would
-/// dictate the scale of the whole map. Triangles are never cut, so a chart of few long ones stays.
-pub(crate) fn split_long(surface: &Surface, charts: Vec<FlatChart>, longest: f64, limits: Limits) -> Vec<FlatChart> {
+/// Halves charts whose box is longer than `longest` until their pieces are shorter than `goal`, as long as the pieces
+/// are much shorter: one long strip would dictate the scale of the whole map. Triangles are never cut, so a chart of few
+/// long ones stays.
+pub(crate) fn split_long(
+    surface: &Surface,
+    charts: Vec<FlatChart>,
+    longest: f64,
+    goal: f64,
+    limits: Limits,
+) -> Vec<FlatChart> {
     let split = |flat: FlatChart| -> Vec<FlatChart> {
         let length = least_box(&flat.points).size.x;
         if length <= longest || flat.chart.triangles.len() < 2 {
@@ -107,7 +114,7 @@ pub(crate) fn split_long(surface: &Surface, charts: Vec<FlatChart>, longest: f64
         if pieces.iter().any(|piece| least_box(&piece.points).size.x > 0.8 * length) {
             return vec![flat];
         }
-        split_long(surface, pieces, longest, limits)
+        split_long(surface, pieces, goal, goal, limits)
     };
     charts.into_iter().flat_map(split).collect()
 }

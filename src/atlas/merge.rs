@@ -84,7 +84,7 @@ pub(crate) fn merge(
                 let mut triangles = a.flat.chart.triangles.clone();
                 triangles.extend(&b.flat.chart.triangles);
                 triangles.sort_unstable();
-                let flat = try_flatten(surface, ChartMesh::new(surface, triangles), UNION_LIMITS).ok()?;
+                let flat = try_flatten(surface, &ChartMesh::new(surface, triangles), UNION_LIMITS)?;
                 let union = Candidate::new(flat, gutter, 0);
                 let halves_fill = (a.area * a.fill + b.area * b.fill) / (a.area + b.area);
                 let crooked = union.area > large && union.fill < FILL_LEAST.min(halves_fill);

@@ -1,6 +1,6 @@
 //! From any mesh to a texture atlas: clean, cut into charts, flatten, pack.
 //!
-//! Read [`build`] first: it is the whole way in forty lines. Then, in the order of the work:
+//! Read [`build`] first: it is the whole way. Then, in the order of the work:
 //! * [`clean`] degenerate dissolve to a fixpoint;
 //! * `topology` who neighbours whom, non-manifold edges cut open;
 //! * `cluster` first charts: similar normals, compact outlines;
@@ -13,6 +13,9 @@
 //! What it refuses to do: it moves no vertex except to collapse edges that have no length, it never mirrors a chart, it
 //! makes no chart that touches another one's gutter, and it does not compute normals (a mesh without normals stays
 //! without: compute them before the surface is cut, or seams show in the shading).
+//!
+//! Known limits: gutters are kept between charts, not between two arms of one chart that come near each other; triangles
+//! are never cut, so one huge triangle stays whole; angle-based flattening is not offered.
 //!
 //! A departure from the letter of "a chart is a disk": a chart may have holes. A wall with windows lies flat as it is,
 //! and cutting it would only add borders; what its map must be (no flip, no overlap, low distortion) is checked all
@@ -167,6 +170,9 @@ pub fn build(mesh: &Mesh, settings: &AtlasSettings, progress: &(dyn Fn(f32) + Sy
     let texels_per_unit = 0.77 * settings.resolution_texels as f64 / area.sqrt();
     let charts =
         merge::merge(&surface, charts, texels_per_unit, settings.gutter_texels, &|share| progress(0.4 + 0.3 * share));
+    // A strip three times as long as wide still packs well whole.
+    let width = settings.resolution_texels as f64 / texels_per_unit;
+    let charts = flatten::split_long(&surface, charts, 1.3 * width, 0.7 * width, limits);
     let placements =
         pack::pack(&charts, settings.resolution_texels, settings.gutter_texels, &|share| progress(0.7 + 0.25 * share))?;
     let (mesh, chart_of_triangle) = assemble(&cleaned.mesh, &charts, &placements, settings.resolution_texels);
@@ -185,10 +191,10 @@ fn assemble(mesh: &Mesh, charts: &[FlatChart], placements: &[DAffine2], resoluti
         let mut name: HashMap<(u32, u32), u32> = HashMap::with_capacity(flat.points.len());
         for (&triangle, corners) in flat.chart.triangles.iter().zip(&flat.chart.corners) {
             chart_of_triangle[triangle as usize] = index as u32;
-            for corner in 0..3 {
+            for (corner, &local) in corners.iter().enumerate() {
                 let source = mesh.triangles[triangle as usize][corner];
-                let vertex = *name.entry((corners[corner], source)).or_insert_with(|| {
-                    let texel = placement.transform_point2(flat.points[corners[corner] as usize]);
+                let vertex = *name.entry((local, source)).or_insert_with(|| {
+                    let texel = placement.transform_point2(flat.points[local as usize]);
                     let uv: Vec2 = (texel / size).as_vec2();
                     made.positions.push(mesh.positions[source as usize]);
                     made.normals.extend(mesh.normals.get(source as usize));

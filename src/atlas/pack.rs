@@ -10,6 +10,7 @@ use super::shape::{Boxed, Shape, bounds, least_box};
 use crate::error::{Error, ErrorKind, Place, Result};
 use glam::{DAffine2, DMat2, DVec2};
 use rayon::prelude::*;
+use std::collections::HashMap;
 
 /// Trials of the search for the scale.
 const TRIALS: usize = 8;
@@ -95,12 +96,19 @@ fn lay(charts: &[FlatChart], boxes: &[Boxed], order: &[usize], scale: f64, resol
     let mut strip = Strip::new(resolution);
     let mut laid = Laid { placements: vec![DAffine2::IDENTITY; charts.len()], height: 0, complete: true };
     let limit = resolution * 3 / 2;
+    // Among many charts, one of the size of an earlier one need not look again where that one found no place.
+    let mut found: HashMap<(u32, u32), usize> = HashMap::new();
+    let class = |shape: &Shape| [shape.width, shape.height].map(|size| (4.0 * (size as f64).log2()) as u32).into();
     for (&index, poses) in order.iter().zip(&prepared) {
         // The pose whose top ends lowest wins; equal ones keep the first.
         let mut best: Option<(usize, usize, usize, usize)> = None;
         for (pose, (_, shape)) in poses.iter().enumerate() {
             let top = best.map_or(limit, |b| b.0 - 1);
-            if let Some((x, y)) = strip.lowest_place(shape, top) {
+            let start = match found.get(&class(shape)) {
+                Some(&row) if charts.len() > FEW_CHARTS => row.saturating_sub(shape.height),
+                _ => 0,
+            };
+            if let Some((x, y)) = strip.lowest_place(shape, start, top) {
                 best = Some((y + shape.height, pose, x, y));
             }
         }
@@ -110,6 +118,7 @@ fn lay(charts: &[FlatChart], boxes: &[Boxed], order: &[usize], scale: f64, resol
         };
         let (place, shape) = &poses[pose];
         strip.occupy(shape, x, y, gutter);
+        found.insert(class(shape), y);
         laid.height = laid.height.max(top);
         laid.placements[index] = DAffine2::from_translation(DVec2::new(x as f64, y as f64)) * *place;
     }
@@ -169,14 +178,14 @@ impl Strip {
         Strip { width, words: width.div_ceil(64), rows: Vec::new(), longest_free: Vec::new() }
     }
 
-    /// The lowest place (x, y), then leftmost, whose top `y + height` is at most `top`.
-    fn lowest_place(&self, shape: &Shape, top: usize) -> Option<(usize, usize)> {
+    /// The lowest place (x, y) from row `start`, then leftmost, whose top `y + height` is at most `top`.
+    fn lowest_place(&self, shape: &Shape, start: usize, top: usize) -> Option<(usize, usize)> {
         if shape.width > self.width || shape.height > top {
             return None;
         }
         let mut free = vec![0u64; self.words];
         let mut scratch = vec![0u64; self.words];
-        for y in 0..=(top - shape.height).min(self.rows.len()) {
+        for y in start..=(top - shape.height).min(self.rows.len()) {
             let row_at = |row: u32| self.rows.get(y + row as usize).map(|bits| (row as usize, bits));
             let too_narrow = |&row: &u32| {
                 self.longest_free.get(y + row as usize).is_some_and(|&free| free < shape.longest[row as usize])

@@ -94,9 +94,10 @@ impl Shape {
                     rows[row].push((first as u32, end as u32));
                 });
                 let centre_rows = |y: f64| (y - 0.5).ceil().clamp(0.0, height as f64) as usize;
-                for row in centre_rows(from.y.min(to.y))..centre_rows(from.y.max(to.y)) {
+                let crossed = centre_rows(from.y.min(to.y))..centre_rows(from.y.max(to.y));
+                for (row, crossings) in crossings.iter_mut().enumerate().take(crossed.end).skip(crossed.start) {
                     let share = (row as f64 + 0.5 - from.y) / (to.y - from.y);
-                    crossings[row].push(from.x + share * (to.x - from.x));
+                    crossings.push(from.x + share * (to.x - from.x));
                 }
             }
         }

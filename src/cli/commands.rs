@@ -118,8 +118,7 @@ pub fn render(options: &RenderOptions) -> Result<()> {
     let is_run = RunFolder::open(&options.run).is_ok_and(|folder| folder.is_run());
     let (scene, surface, mut own, strength) = if is_run {
         let folder = RunFolder::open(&options.run)?;
-        let (scene, settings) =
-            camera_scene(&folder, options.cameras.as_deref(), Some(options.read.settings()))?;
+        let (scene, settings) = camera_scene(&folder, options.cameras.as_deref(), Some(options.read.settings()))?;
         let (surface, own) = surface_of(&folder.read_result()?)?;
         (scene, surface, own, if settings.fit.has_lobe() { 1.0 } else { 0.0 })
     } else {
@@ -147,9 +146,8 @@ pub fn render(options: &RenderOptions) -> Result<()> {
         let name = &scene.views[view].name;
         let path = |layer: &str| output.join(format!("{name}_{layer}.exr"));
         let needs_light = options.aov.iter().any(|layer| matches!(layer, Layer::Shaded | Layer::Variance));
-        let shaded = needs_light.then(|| {
-            render_picture(&surface, camera, &own, view as u32, &picture_settings, &AtomicBool::new(false))
-        });
+        let shaded = needs_light
+            .then(|| render_picture(&surface, camera, &own, view as u32, &picture_settings, &AtomicBool::new(false)));
         let flat = layers(&surface, camera, &own, 16);
         for layer in &options.aov {
             match (layer, &shaded) {

@@ -95,8 +95,7 @@ fn start_new(
     json: bool,
 ) -> Result<()> {
     let bar = share_bar(json, "making the atlas");
-    let prepared =
-        prepare(scene, findings, &settings, timings, &|share| bar.set_position((share * 1000.0) as u64))?;
+    let prepared = prepare(scene, findings, &settings, timings, &|share| bar.set_position((share * 1000.0) as u64))?;
     bar.finish_and_clear();
     let known_light = match settings.known_light.as_os_str().is_empty() {
         true => None,
@@ -192,10 +191,16 @@ fn watch(job: JobHandle, folder: &RunFolder, stop: &AtomicBool, json: bool) -> R
                 let held_out = row.held_out_rmse.map_or(String::new(), |rmse| format!(", held-out RMSE {rmse:.4}"));
                 let rmse = row.image_loss.max(0.0).sqrt();
                 let left = crate::insight::report::number::duration(progress.seconds_left);
-                bar.set_message(format!("RMSE {rmse:.4}{held_out}, {:.1} steps/s, {left} left", progress.steps_per_second));
+                bar.set_message(format!(
+                    "RMSE {rmse:.4}{held_out}, {:.1} steps/s, {left} left",
+                    progress.steps_per_second
+                ));
                 // Without a terminal a bar shows nothing: a line now and then does.
                 if !json && bar.is_hidden() && (last_line.elapsed().as_secs() >= 5 || row.held_out_rmse.is_some()) {
-                    eprintln!("{} step {} of {}: RMSE {rmse:.4}{held_out}, {left} left", row.stage, row.step, progress.steps_total);
+                    eprintln!(
+                        "{} step {} of {}: RMSE {rmse:.4}{held_out}, {left} left",
+                        row.stage, row.step, progress.steps_total
+                    );
                     last_line = std::time::Instant::now();
                 }
             }
@@ -234,7 +239,9 @@ fn line_of(event: &Event) -> serde_json::Value {
         Event::Paused => json!({"event": "paused"}),
         Event::Resumed => json!({"event": "resumed"}),
         Event::Finishing(what) => json!({"event": "finishing", "what": what}),
-        Event::Finished(data) => json!({"event": "finished", "aggregates": data.aggregates, "truth": data.truth, "timings": data.timings}),
+        Event::Finished(data) => {
+            json!({"event": "finished", "aggregates": data.aggregates, "truth": data.truth, "timings": data.timings})
+        }
         Event::Stopped { steps_done } => json!({"event": "stopped", "steps_done": steps_done}),
         Event::Failed(error) => json!({"event": "failed", "message": error.to_string()}),
     }
@@ -259,18 +266,25 @@ fn summarise(data: &ReportData, folder: &RunFolder) {
     if let Some(truth) = &data.truth {
         println!("against the truth, raw (scale-aligned):");
         if let Some(maps) = &truth.maps {
-            for (name, pair) in [("diffuse", maps.diffuse), ("specular", maps.specular), ("roughness", maps.roughness)] {
+            for (name, pair) in [("diffuse", maps.diffuse), ("specular", maps.specular), ("roughness", maps.roughness)]
+            {
                 println!("  {name:12} RMSE {:.4} ({:.4})", pair.raw, pair.aligned);
             }
         }
         if let Some(light) = &truth.environment {
-            println!("  light        relative L2 {:.3} ({:.3}), log RMSE {:.3} ({:.3})", light.relative_l2.raw, light.relative_l2.aligned, light.log_rmse.raw, light.log_rmse.aligned);
+            println!(
+                "  light        relative L2 {:.3} ({:.3}), log RMSE {:.3} ({:.3})",
+                light.relative_l2.raw, light.relative_l2.aligned, light.log_rmse.raw, light.log_rmse.aligned
+            );
             if let Some(angle) = light.brightest_angle_degrees {
                 println!("  brightest light off by {angle:.1} degrees");
             }
         }
         if let Some(relit) = &truth.relit {
-            println!("  relit        RMSE {:.4} ({:.4}), PSNR {:.2} dB ({:.2} dB)", relit.raw.rmse_linear, relit.aligned.rmse_linear, relit.raw.psnr_srgb_db, relit.aligned.psnr_srgb_db);
+            println!(
+                "  relit        RMSE {:.4} ({:.4}), PSNR {:.2} dB ({:.2} dB)",
+                relit.raw.rmse_linear, relit.aligned.rmse_linear, relit.raw.psnr_srgb_db, relit.aligned.psnr_srgb_db
+            );
         }
     }
     let whole = data.timings.iter().map(|time| format!("{} {:.1} s", time.stage, time.seconds)).collect::<Vec<_>>();

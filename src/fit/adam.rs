@@ -68,8 +68,7 @@ impl Moments {
                 for number in 0..7 {
                     let direction = update(own[number], &mut first[number], &mut second[number], corrections);
                     let moved = texel[number] - rate_of(number) * direction;
-                    texel[number] =
-                        if number == 6 { moved.clamp(log_min, 0.0) } else { moved.clamp(0.0, 1.0) };
+                    texel[number] = if number == 6 { moved.clamp(log_min, 0.0) } else { moved.clamp(0.0, 1.0) };
                 }
                 0
             })

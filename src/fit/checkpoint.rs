@@ -107,7 +107,8 @@ pub fn read(path: &Path) -> Result<FitState> {
     };
     let count = header.map_size.saturating_mul(header.map_size);
     let state_texels = texels(count)?;
-    let mut moments = |count: usize| -> Result<Moments> { Ok(Moments { first: texels(count)?, second: texels(count)? }) };
+    let mut moments =
+        |count: usize| -> Result<Moments> { Ok(Moments { first: texels(count)?, second: texels(count)? }) };
     let texel_moments = moments(count)?;
     let light_moments = moments(header.light_texels)?;
     let gain_moments = moments(header.views)?;

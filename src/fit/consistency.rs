@@ -55,7 +55,12 @@ pub struct Agreement {
 
 impl Agreement {
     /// Agreement over base maps of `texel_count` texels. `range` is measured when `None`.
-    pub fn of<R: Real>(views: &[ViewGradient<R>], texel_count: usize, range: Option<f64>, to_f64: impl Fn(R) -> f64) -> Self {
+    pub fn of<R: Real>(
+        views: &[ViewGradient<R>],
+        texel_count: usize,
+        range: Option<f64>,
+        to_f64: impl Fn(R) -> f64,
+    ) -> Self {
         let mut mean = vec![[0.0f64; 3]; texel_count];
         let mut squares = vec![[0.0f64; 3]; texel_count];
         let mut seen_by = vec![0u16; texel_count];
@@ -82,8 +87,7 @@ impl Agreement {
             if seen_by[index] >= 2 {
                 shared_texels += 1;
                 if range > 0.0 {
-                    let variance =
-                        squares[index].iter().sum::<f64>() / 3.0 / f64::from(seen_by[index] - 1);
+                    let variance = squares[index].iter().sum::<f64>() / 3.0 / f64::from(seen_by[index] - 1);
                     let normalised = 2.0 * variance / (range * range);
                     per_texel[index] = normalised as f32;
                     sum += normalised;

@@ -146,20 +146,18 @@ impl Fitter {
     }
 
     /// Takes up a fit from a saved state.
-    pub fn resume(
-        scene: Arc<Scene>,
-        surface: Arc<Surface>,
-        settings: FitSettings,
-        state: FitState,
-    ) -> Result<Self> {
+    pub fn resume(scene: Arc<Scene>, surface: Arc<Surface>, settings: FitSettings, state: FitState) -> Result<Self> {
         let mut fitter = Fitter::prepare(scene, surface, settings)?;
         let fits = state.log_gains.len() == fitter.scene.views.len()
             && state.stage <= fitter.stages.len()
             && state.texels.len() == state.map_size * state.map_size
             && state.light.len() == 2 * fitter.settings.environment_height * fitter.settings.environment_height;
         if !fits {
-            return Err(Error::new(ErrorKind::InvalidScene, "the checkpoint belongs to another scene or other settings")
-                .remedy("resume with the scene and settings the run was started with"));
+            return Err(Error::new(
+                ErrorKind::InvalidScene,
+                "the checkpoint belongs to another scene or other settings",
+            )
+            .remedy("resume with the scene and settings the run was started with"));
         }
         fitter.state = state;
         Ok(fitter)
@@ -196,9 +194,7 @@ impl Fitter {
     fn begin_from(&mut self, values: start::StartValues, known_light: Option<&Environment>) {
         let count = self.state.map_size * self.state.map_size;
         let environment = match known_light {
-            Some(light) => {
-                light.resampled(2 * self.settings.environment_height, self.settings.environment_height)
-            }
+            Some(light) => light.resampled(2 * self.settings.environment_height, self.settings.environment_height),
             None => values.environment,
         };
         self.state.texels = vec![values.texel; count];
@@ -292,7 +288,8 @@ impl Fitter {
         self.state.step += 1;
         self.state.step_in_stage += 1;
         let look = self.settings.held_out_interval;
-        let held_out_rmse = (look > 0 && self.state.step.is_multiple_of(look)).then(|| self.held_out_rmse(&stage, stop));
+        let held_out_rmse =
+            (look > 0 && self.state.step.is_multiple_of(look)).then(|| self.held_out_rmse(&stage, stop));
         self.state.seconds += began.elapsed().as_secs_f64();
         let row = LossRow {
             step: self.state.step,
@@ -341,14 +338,22 @@ impl Fitter {
             .iter()
             .map(|target| {
                 let bytes = FirstHits::bytes(&target.camera, self.settings.samples);
-                let pays = every_pixel || target.pixel_count() * self.settings.views_per_step <= self.settings.pixels_per_step;
+                let pays =
+                    every_pixel || target.pixel_count() * self.settings.views_per_step <= self.settings.pixels_per_step;
                 if !pays || bytes > budget {
                     return None;
                 }
                 budget -= bytes;
                 let Fitter { settings, surface, .. } = self;
                 let view = target.view as u32;
-                Some(FirstHits::trace(surface, &target.camera, settings.pixel_filter, settings.samples, settings.seed, view))
+                Some(FirstHits::trace(
+                    surface,
+                    &target.camera,
+                    settings.pixel_filter,
+                    settings.samples,
+                    settings.seed,
+                    view,
+                ))
             })
             .collect()
     }
@@ -714,8 +719,8 @@ impl Fitter {
                 self.state.log_gains[view] -= rate * RATE_GAIN * direction;
             }
             // The mean logarithm stays zero: a common gain belongs to the light.
-            let mean = self.training.iter().map(|&view| self.state.log_gains[view]).sum::<f32>()
-                / self.training.len() as f32;
+            let mean =
+                self.training.iter().map(|&view| self.state.log_gains[view]).sum::<f32>() / self.training.len() as f32;
             for &view in &self.training {
                 self.state.log_gains[view] -= mean;
             }

@@ -6,7 +6,6 @@ use crate::render::accumulate::{PixelDerivative, PixelEstimate, PixelLoss};
 use crate::scene::{Background, PixelState, Scene};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-
 /// Mean squared error of one view; a sum over pixels times `weight`.
 pub struct ViewLoss<'a> {
     /// The scene.

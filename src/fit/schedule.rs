@@ -68,8 +68,7 @@ pub fn stages(settings: &FitSettings) -> Vec<Stage> {
             let map_size = if maps_grow { settings.map_size >> photo_level } else { settings.map_size };
             let steps = end - before;
             if steps > 0 {
-                let stage =
-                    Stage { kind, photo_level, map_size, steps, steps_before: before, steps_of_kind: total };
+                let stage = Stage { kind, photo_level, map_size, steps, steps_before: before, steps_of_kind: total };
                 stages.push(stage);
             }
             before = end;

@@ -236,7 +236,9 @@ impl FitSettings {
     pub fn listed(&self) -> Vec<(String, String, bool)> {
         let own = toml::Table::try_from(self).unwrap_or_default();
         let default = toml::Table::try_from(FitSettings::default()).unwrap_or_default();
-        own.into_iter().map(|(name, value)| (name.clone(), value.to_string(), default.get(&name) == Some(&value))).collect()
+        own.into_iter()
+            .map(|(name, value)| (name.clone(), value.to_string(), default.get(&name) == Some(&value)))
+            .collect()
     }
 }
 

@@ -55,8 +55,7 @@ pub fn measured(scene: &Scene, surface: &Surface, targets: &[Target], settings: 
     let width = 2 * height;
     let mut sums = vec![(Vec3::ZERO, 0.0f32); width * height];
     let mut surface_mean = (glam::DVec3::ZERO, 0u64);
-    let use_background =
-        scene.background == Background::Environment && settings.background == BackgroundEvidence::Use;
+    let use_background = scene.background == Background::Environment && settings.background == BackgroundEvidence::Use;
     for target in targets {
         // A grid of at most about 128 x 128 pixels a view is plenty for means.
         let stride = (target.camera.width.max(target.camera.height) / 128).max(1);
@@ -86,8 +85,8 @@ pub fn measured(scene: &Scene, surface: &Surface, targets: &[Target], settings: 
     let surface_mean = (surface_mean.0 / surface_mean.1.max(1) as f64).as_vec3();
     let seen: Vec<bool> = sums.iter().map(|sum| sum.1 > 0.25).collect();
     let weight = |index: usize| solid_angle_of_texel(index / width, width, height);
-    let light_seen = (0..width * height).filter(|&index| seen[index]).map(weight).sum::<f64>()
-        / (4.0 * std::f64::consts::PI);
+    let light_seen =
+        (0..width * height).filter(|&index| seen[index]).map(weight).sum::<f64>() / (4.0 * std::f64::consts::PI);
     if light_seen < 0.01 {
         let radiance = (surface_mean / 0.5).max(Vec3::splat(1e-4));
         let environment = Environment { radiance: crate::image::Image::filled(width, height, radiance) };

@@ -16,7 +16,8 @@ pub fn times_seen(scene: &Scene, surface: &Surface, map_size: usize) -> GreyImag
     let mut counts = vec![0u16; map_size * map_size];
     // A few views at once: each needs a map of bits of its own.
     for group in training.chunks(8) {
-        let seen: Vec<Vec<u64>> = group.par_iter().map(|&view| texels_of_view(scene, surface, view, map_size)).collect();
+        let seen: Vec<Vec<u64>> =
+            group.par_iter().map(|&view| texels_of_view(scene, surface, view, map_size)).collect();
         counts.par_iter_mut().enumerate().with_min_len(4096).for_each(|(index, count)| {
             *count += seen.iter().filter(|bits| bits[index / 64] >> (index % 64) & 1 == 1).count() as u16;
         });
@@ -41,9 +42,8 @@ fn texels_of_view(scene: &Scene, surface: &Surface, view: usize, map_size: usize
             if cosine <= 0.0 {
                 continue;
             }
-            let texels = camera.pixel_angle_radians() * hit.t / cosine.max(0.05).sqrt()
-                * point.uv_per_length
-                * map_size as f32;
+            let texels =
+                camera.pixel_angle_radians() * hit.t / cosine.max(0.05).sqrt() * point.uv_per_length * map_size as f32;
             let level = (texels.log2() + 0.5).clamp(0.0, map_size.trailing_zeros() as f32) as u32;
             let size = map_size >> level;
             let tap = TextureTap::at(point.uv, level, size, size);

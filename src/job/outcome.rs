@@ -5,10 +5,10 @@ use super::prepare::{Prepared, RunSettings, covered, timed};
 use crate::atlas::{AtlasQuality, dilate, nearest_covered};
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::export::{LossRow, RunFolder, RunResult};
+use crate::fit::Fitter;
 use crate::fit::fitter::FitState;
 use crate::fit::settings::BackgroundEvidence;
 use crate::fit::targets::Target;
-use crate::fit::Fitter;
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::insight::report::data::{
     Fact, NamedAggregate, NonFiniteCount, ReportData, SettingLine, TexelCounts, TruthErrors, ViewLine,
@@ -271,8 +271,7 @@ fn relit_strips(
         lights.push((name, result.environment.rotated_about_up(radians)));
     }
     for (name, light) in lights {
-        let mut strip =
-            RelitStrip { light: name, environment: Some(light.radiance.clone()), pictures: Vec::new() };
+        let mut strip = RelitStrip { light: name, environment: Some(light.radiance.clone()), pictures: Vec::new() };
         for &view in &shown {
             let level = level_of(scene, view, RELIT_PIXELS);
             let camera = scene.views[view].camera.shrunk(1 << level);
@@ -312,8 +311,7 @@ fn truth_errors(
         errors.maps = Some(map_errors(&fitted, &truth.maps, &truth.texels_seen)?);
     }
     let light = &truth.environment;
-    errors.environment =
-        Some(environment_errors(&result.environment.resampled(light.width(), light.height()), light)?);
+    errors.environment = Some(environment_errors(&result.environment.resampled(light.width(), light.height()), light)?);
     if !relit.is_empty() {
         errors.relit = Some(aggregate(&relit));
     }

@@ -38,7 +38,8 @@ pub fn light_of(name: &str, height: usize) -> Result<(String, Environment)> {
             let path = Path::new(name);
             let (environment, _) = Environment::read(path)?;
             let stem = path.file_stem().map_or_else(|| name.into(), |stem| stem.to_string_lossy().into_owned());
-            let environment = if environment.height() > height { environment.resampled(2 * height, height) } else { environment };
+            let environment =
+                if environment.height() > height { environment.resampled(2 * height, height) } else { environment };
             Ok((stem, environment))
         }
     }

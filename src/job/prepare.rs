@@ -76,13 +76,7 @@ pub fn prepare(
     findings.extend(atlas.findings);
     let mesh = atlas.mesh;
     let surface = timed(&mut timings, "tracer", || Surface::new(mesh))?;
-    Ok(Prepared {
-        scene: Arc::new(scene),
-        surface: Arc::new(surface),
-        quality: Some(atlas.quality),
-        findings,
-        timings,
-    })
+    Ok(Prepared { scene: Arc::new(scene), surface: Arc::new(surface), quality: Some(atlas.quality), findings, timings })
 }
 
 /// Texels of a chart, at a size.

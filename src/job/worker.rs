@@ -157,9 +157,10 @@ impl Worker {
         self.write_checkpoint()?;
         let fit_seconds = self.fitter.state().seconds;
         prepared.timings.push(StageTime { stage: "fit".into(), seconds: fit_seconds });
-        let data = outcome::write(&self.fitter, prepared, &self.settings, &self.folder, self.began, &self.stop, &|what| {
-            self.send(Event::Finishing(what.into()));
-        })?;
+        let data =
+            outcome::write(&self.fitter, prepared, &self.settings, &self.folder, self.began, &self.stop, &|what| {
+                self.send(Event::Finishing(what.into()));
+            })?;
         self.send(Event::Finished(Box::new(data)));
         Ok(())
     }

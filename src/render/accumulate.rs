@@ -182,13 +182,7 @@ pub fn estimate_pixel<R: Real>(
 }
 
 /// Traces the samples of a pixel into `arena`, cleared first.
-pub fn trace_pixel(
-    tracer: &PathTracer<'_>,
-    rays: &CameraRays<'_>,
-    pixel: usize,
-    key: PassKey,
-    arena: &mut PathArena,
-) {
+pub fn trace_pixel(tracer: &PathTracer<'_>, rays: &CameraRays<'_>, pixel: usize, key: PassKey, arena: &mut PathArena) {
     arena.clear();
     let samples = rays.samples();
     for sample in 0..samples {
@@ -213,8 +207,7 @@ pub fn sum_pixel<R: Real>(parameters: &Parameters<R>, arena: &PathArena, lobe_st
         escaped += usize::from(path.escaped);
     }
     let first = sums[0].map(|sum| sum * R::from_f32(1.0 / half as f32));
-    let second =
-        if samples > 1 { sums[1].map(|sum| sum * R::from_f32(1.0 / (samples - half) as f32)) } else { first };
+    let second = if samples > 1 { sums[1].map(|sum| sum * R::from_f32(1.0 / (samples - half) as f32)) } else { first };
     PixelEstimate { first, second, escaped: escaped as f32 / samples.max(1) as f32 }
 }
 

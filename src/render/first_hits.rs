@@ -63,7 +63,14 @@ impl FirstHits {
     }
 
     /// Traces the camera rays of a view; places within the pixels depend on seed and view alone.
-    pub fn trace(surface: &Surface, camera: &Camera, filter: PixelFilter, samples: usize, seed: u64, view: u32) -> Self {
+    pub fn trace(
+        surface: &Surface,
+        camera: &Camera,
+        filter: PixelFilter,
+        samples: usize,
+        seed: u64,
+        view: u32,
+    ) -> Self {
         let hits = (0..camera.width * camera.height)
             .into_par_iter()
             .flat_map_iter(|pixel| {

@@ -204,7 +204,8 @@ impl PathTracer<'_> {
 
     /// The level whose texels are about as large as the footprint of the ray's cone, by area (isotropic).
     fn mip_level(&self, bounce_index: usize, point: &SurfacePoint, ray: &Ray, distance: f32) -> u32 {
-        let cone = if bounce_index == 0 { self.settings.camera_cone_radians } else { self.settings.bounce_cone_radians };
+        let cone =
+            if bounce_index == 0 { self.settings.camera_cone_radians } else { self.settings.bounce_cone_radians };
         if cone <= 0.0 || self.proposal.levels.len() == 1 {
             return 0;
         }

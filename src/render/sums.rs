@@ -93,12 +93,7 @@ fn scale<R: Real>(a: [R; 3], factor: f32) -> [R; 3] {
 }
 
 /// Radiance along a traced path.
-pub fn radiance<R: Real>(
-    parameters: &Parameters<R>,
-    arena: &PathArena,
-    path: &PathHead,
-    lobe_strength: f32,
-) -> [R; 3] {
+pub fn radiance<R: Real>(parameters: &Parameters<R>, arena: &PathArena, path: &PathHead, lobe_strength: f32) -> [R; 3] {
     if let Some(tap) = &path.background {
         return parameters.light_at(tap);
     }
@@ -157,7 +152,9 @@ pub fn radiance_backward<R: Real>(
                 reflected[k] = scale(material.reflect(&bounce.geometry, lobe_strength), bounce.inverse_density);
                 sum = multiply(reflected[k], arriving[k]);
             }
-            if k > 0 && let Some(connection) = &vertex.connection {
+            if k > 0
+                && let Some(connection) = &vertex.connection
+            {
                 let value = material.reflect(&connection.geometry, lobe_strength);
                 sum = add(sum, scale(multiply(value, parameters.light_at(&connection.light)), connection.weight));
             }
@@ -185,7 +182,10 @@ pub fn radiance_backward<R: Real>(
         let d_value = scale(multiply(d_leaving, arriving[k]), bounce.inverse_density);
         let d_bounce = material.reflect_backward(&bounce.geometry, lobe_strength, d_value);
         let (own, more) = (d_material.to_array(), d_bounce.to_array());
-        sink.add_material(&vertex.texture, &Material::from_array(std::array::from_fn(|entry| own[entry] + more[entry])));
+        sink.add_material(
+            &vertex.texture,
+            &Material::from_array(std::array::from_fn(|entry| own[entry] + more[entry])),
+        );
         d_leaving = multiply(d_leaving, reflected[k]);
         if let Some((tap, weight)) = &bounce.escape {
             sink.add_light(tap, scale(d_leaving, *weight));
