@@ -1,6 +1,6 @@
 //! Round trips: a scene written as each kind of folder is read back as it was.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::disallowed_methods)]
 
 mod scene_fixture;
 

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use patina::scene::{Background, ReadSettings, read, settings::PixelCentre};
+use patina::scene::{Background, ReadSettings, doctor, read, settings::PixelCentre};
 use std::path::PathBuf;
 
 /// A folder beside the repository, or `None` after a printed word.
@@ -59,6 +59,21 @@ fn herzjesu_stands_upright_although_its_z_axis_points_down() {
     let (walls, _) = mean_of(&|up| up.abs() < 0.2);
     let (_, ceiling_count) = mean_of(&|up| up < -0.9);
     assert!(floor < walls && floor_count > 3 * ceiling_count, "{floor} {walls} {floor_count} {ceiling_count}");
+}
+
+#[test]
+fn both_captures_have_pixel_centres_at_integers_and_pass_the_check() {
+    for name in ["multiview/saharov_bmvs", "multiview/herzjesu8_bmvs"] {
+        let Some(folder) = shared(name) else { continue };
+        let scene = read(&folder, &ReadSettings { max_views: 8, ..Default::default() }).unwrap();
+        let measured = scene.findings.iter().find(|finding| finding.code == "pixel-centre-measured").unwrap();
+        println!("{name}: {measured}");
+        assert!(measured.message.contains("at (0, 0): "), "{measured}");
+        let report = doctor::check(&scene);
+        assert!(!report.is_fatal(), "{:#?}", report.findings);
+        assert!(report.views.iter().all(|view| view.mask_overlap.unwrap() > 0.999), "{:?}", report.views);
+        assert!(report.pixel_centre.unwrap().disagreement.unwrap()[1] < 0.01);
+    }
 }
 
 #[test]

@@ -10,6 +10,7 @@ use patina::scene::{
 use patina::trace::Bvh;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 /// Width and height of the pictures.
 pub const SIZE: (usize, usize) = (128, 96);
@@ -50,11 +51,12 @@ pub fn balls() -> Mesh {
     mesh
 }
 
-/// Cameras on a ring around the balls, that look slightly down.
+/// The first cameras of a ring of eight around the balls, that look slightly down.
 pub fn ring(count: usize) -> Vec<Camera> {
+    assert!(count <= 8);
     (0..count)
         .map(|index| {
-            let angle = 0.2 + std::f32::consts::TAU * index as f32 / count as f32;
+            let angle = 0.2 + std::f32::consts::TAU * index as f32 / 8.0;
             let eye = Vec3::new(5.0 * angle.cos(), 2.2, 5.0 * angle.sin());
             Camera::looking_at(eye, Vec3::new(0.2, 0.9, 0.1), SIZE.0, SIZE.1, 0.7)
         })
@@ -99,24 +101,28 @@ pub fn bytes_of(picture: &RgbImage) -> Image<[u8; 3]> {
     picture.map(|pixel| pixel.to_array().map(transfer::srgb8_from_linear_value))
 }
 
-/// The scene in memory, with masks.
+/// The scene in memory, with masks; at most eight views, which are rendered once.
 pub fn scene(view_count: usize) -> Scene {
+    static WHOLE: LazyLock<Scene> = LazyLock::new(render);
+    let mut scene = WHOLE.clone();
+    scene.views.truncate(view_count);
+    scene
+}
+
+fn render() -> Scene {
     let mesh = balls();
     let bvh = Bvh::build(&mesh.positions, &mesh.triangles).unwrap();
-    let views = ring(view_count)
-        .into_iter()
-        .enumerate()
-        .map(|(index, camera)| {
-            let (picture, mask) = picture(&mesh, &bvh, &camera);
-            View {
-                name: format!("{index:08}"),
-                camera,
-                photo: Photo::Srgb8(bytes_of(&picture)),
-                states: mask.map(|object| if *object { PixelState::Surface } else { PixelState::Background }),
-                held_out: false,
-            }
-        })
-        .collect();
+    let view_of = |(index, camera): (usize, Camera)| {
+        let (picture, mask) = picture(&mesh, &bvh, &camera);
+        View {
+            name: format!("{index:08}"),
+            camera,
+            photo: Photo::Srgb8(bytes_of(&picture)),
+            states: mask.map(|object| if *object { PixelState::Surface } else { PixelState::Background }),
+            held_out: false,
+        }
+    };
+    let views = ring(8).into_iter().enumerate().map(view_of).collect();
     Scene {
         name: "balls".into(),
         folder: None,

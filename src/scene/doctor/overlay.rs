@@ -58,7 +58,10 @@ pub fn overlay(scene: &Scene, bvh: &Bvh, view: usize) -> Image<[u8; 3]> {
                 if here != view.states[(r, c)].is_surface() {
                     picture[(row, column)] = MASK_COLOUR;
                 }
-                if let Some(colour) = edge_between(sight(row, column), sight(r, c), &view.camera.position_in_world()) {
+                // The outer silhouette is drawn over all other lines.
+                if let Some(colour) = edge_between(sight(row, column), sight(r, c), &view.camera.position_in_world())
+                    && picture[(row, column)] != SILHOUETTE_COLOUR
+                {
                     picture[(row, column)] = colour;
                 }
             }

@@ -50,10 +50,12 @@ fn load(text: &str, path: &Path) -> Result<SourceMesh> {
                 .at(Place::File(path.into()))
                 .remedy("export the mesh again; a group may only use vertices listed before its end")
         })?;
-    let all = |has: fn(&tobj::Mesh) -> bool| {
-        models.iter().filter(|model| !model.mesh.indices.is_empty()).all(|model| has(&model.mesh))
+    // Where only some corners of a group have an attribute, `tobj` lists it for those alone: it cannot be assigned.
+    let complete = |length: fn(&tobj::Mesh) -> usize| {
+        models.iter().all(|model| length(&model.mesh) == model.mesh.positions.len() / 3)
     };
-    let (with_normals, with_uvs) = (all(|mesh| !mesh.normals.is_empty()), all(|mesh| !mesh.texcoords.is_empty()));
+    let with_normals = complete(|mesh| mesh.normals.len() / 3);
+    let with_uvs = complete(|mesh| mesh.texcoords.len() / 2);
     let mut result = SourceMesh::default();
     for tobj::Model { mesh, .. } in &models {
         let first = super::mesh_file::vertex_index(result.positions.len(), path)?;
