@@ -6,7 +6,6 @@
 //! [`Scene::set_photo`].
 
 use super::synthetic::bake::{Reflectance, SurfacePoint, bake};
-use super::synthetic::daylight::Daylight;
 use super::synthetic::layout::{PartChart, lay_out};
 use super::synthetic::orbit::Orbit;
 use super::synthetic::shapes::{self, Chart};
@@ -14,6 +13,8 @@ use super::synthetic::{finish, seen};
 use super::{Background, Camera, Photo, PixelState, Scene, Truth, TruthRelight, View, WorldFromSource};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::image::Image;
+use crate::light::Environment;
+use crate::light::sky::{SkySettings, sun_and_sky};
 use glam::{DVec2, Quat, Vec3};
 
 /// What the demo is made with.
@@ -136,6 +137,28 @@ fn parts() -> Vec<Part> {
     ]
 }
 
+/// The light of the photos of scenes made in code: a clear morning, the sun 38 degrees high and soft enough for 32 rows.
+pub(super) fn morning() -> Environment {
+    let settings = SkySettings {
+        sun_elevation_radians: 38f32.to_radians(),
+        sun_azimuth_radians: 50f32.to_radians(),
+        sun_radius_radians: 3f32.to_radians(),
+        ..SkySettings::noon()
+    };
+    sun_and_sky(2 * LIGHT_HEIGHT, LIGHT_HEIGHT, &settings)
+}
+
+/// The light they are relit under: a low warm sun on another side.
+pub(super) fn evening() -> Environment {
+    let settings = SkySettings {
+        sun_elevation_radians: 14f32.to_radians(),
+        sun_azimuth_radians: 245f32.to_radians(),
+        irradiance: 0.6 * std::f32::consts::PI,
+        ..SkySettings::evening()
+    };
+    sun_and_sky(2 * LIGHT_HEIGHT, LIGHT_HEIGHT, &settings)
+}
+
 /// Builds the demo scene.
 ///
 /// # Errors
@@ -169,7 +192,6 @@ pub fn build(settings: &DemoSettings) -> Result<DemoScene> {
     let views = views_of(&orbit, settings.views, settings.held_out, settings.seed)?;
     let cameras: Vec<Camera> = views.iter().filter(|view| !view.held_out).map(|view| view.camera).collect();
     let texels_seen = seen::texels_seen(&joined.mesh, &cameras, size, size, SEEN_SAMPLES)?;
-    let light = |daylight: Daylight| daylight.environment(2 * LIGHT_HEIGHT, LIGHT_HEIGHT);
     let scene = Scene {
         name: "demo".into(),
         folder: None,
@@ -180,8 +202,8 @@ pub fn build(settings: &DemoSettings) -> Result<DemoScene> {
         truth: Some(Truth {
             maps: baked.maps,
             texels_seen,
-            environment: light(Daylight::morning()),
-            relight: Some(TruthRelight { environment: light(Daylight::evening()), pictures: Vec::new() }),
+            environment: morning(),
+            relight: Some(TruthRelight { environment: evening(), pictures: Vec::new() }),
             max_bounces: MAX_BOUNCES,
         }),
         findings: Vec::new(),

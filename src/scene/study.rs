@@ -2,9 +2,8 @@
 //!
 //! The shapes of the vase and the sphere are made here; the cow and the teddy take any mesh with texture coordinates.
 
-use super::demo::views_of;
+use super::demo::{evening, morning, views_of};
 use super::synthetic::bake::{Reflectance, SurfacePoint, bake};
-use super::synthetic::daylight::Daylight;
 use super::synthetic::layout::{PartChart, lay_out};
 use super::synthetic::orbit::Orbit;
 use super::synthetic::{finish, seen, shapes};
@@ -166,8 +165,8 @@ pub fn build(kind: StudyKind, mut mesh: Mesh, settings: &StudySettings) -> Resul
         truth: Some(Truth {
             maps: baked.maps,
             texels_seen,
-            environment: Daylight::morning().environment(64, 32),
-            relight: Some(TruthRelight { environment: Daylight::evening().environment(64, 32), pictures: Vec::new() }),
+            environment: morning(),
+            relight: Some(TruthRelight { environment: evening(), pictures: Vec::new() }),
             max_bounces: MAX_BOUNCES,
         }),
         findings: Vec::new(),
