@@ -4,7 +4,7 @@
 //! little-endian `f32` in a fixed order, then eight bytes with a checksum over all before them.
 
 use super::adam::Moments;
-use super::fitter::{FitState, LossRow};
+use super::state::{FitState, LossRow};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::files::write_atomically;
 use crate::material::texels::Texel;

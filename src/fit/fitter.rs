@@ -4,92 +4,24 @@
 //! it changes is in [`FitState`]; so a fit that is saved and taken up again goes on bit for bit as if it had not been
 //! interrupted.
 
-use super::adam::{Moments, TexelRates};
-use super::consistency::{Agreement, ViewGradient, released_factor};
+use super::adam::Moments;
 use super::gauge::GaugeRule;
-use super::loss::ViewLoss;
-use super::schedule::{Stage, StageKind, stages};
-use super::settings::{BackgroundEvidence, Consistency, FitSettings, Start};
+use super::held_out::held_out_targets;
+use super::schedule::{Stage, stages};
+use super::settings::{FitSettings, Start};
 use super::start;
+use super::state::{FitState, LossRow};
 use super::targets::{Target, targets};
-use crate::atlas::covered_texels;
-use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
-use crate::light::{Environment, EnvironmentSampler};
+use super::work::StageWork;
+use crate::error::{Error, ErrorKind, Finding, Result, Severity};
+use crate::light::Environment;
 use crate::material::MaterialMaps;
-use crate::material::texels::{PyramidWeights, Texel, TexelPyramid, maps_from_texels};
-use crate::math::random::{SequentialRandom, mix};
-use crate::math::real::Dual;
-use crate::math::sphere::solid_angle_of_texel;
-use crate::render::accumulate::{PassKey, PassTotals, accumulate, estimate_pixel};
-use crate::render::first_hits::{CameraRays, FirstHits};
-use crate::render::{Parameters, PathArena, PathSettings, PathTracer, Surface};
+use crate::material::texels::{PyramidWeights, TexelPyramid, maps_from_texels};
+use crate::render::{Parameters, Surface};
 use crate::scene::Scene;
-use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
-
-/// Side of the square tiles in which pixels of a view are drawn.
-const TILE_PIXELS: usize = 16;
-/// Step size of the logarithm of a view's gain.
-const RATE_GAIN: f32 = 0.01;
-/// Pixels of a held-out view that the curve looks at.
-const HELD_OUT_PIXELS: usize = 20_000;
-/// A fit ends with an error when more than this share of a step's pixels is not finite.
-const MAX_NON_FINITE_SHARE: f64 = 0.01;
-
-/// One line of the loss history.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct LossRow {
-    /// Step, counted from 1 over all stages.
-    pub step: usize,
-    /// Name of the stage.
-    pub stage: String,
-    /// Seconds of work since the fit began, pauses left out.
-    pub seconds: f64,
-    /// The loss that was minimised.
-    pub loss: f64,
-    /// Its part from the pictures: mean squared error in linear radiance. Unbiased, hence now and then below zero.
-    pub image_loss: f64,
-    /// Disagreement of the views in [0, 1]; 0 when it is not measured.
-    pub consistency: f64,
-    /// Root mean squared error over held-out views, in the steps that look at them.
-    pub held_out_rmse: Option<f64>,
-}
-
-/// Everything a fit changes: what a checkpoint holds.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct FitState {
-    /// Index of the stage.
-    pub stage: usize,
-    /// Steps done in the stage.
-    pub step_in_stage: usize,
-    /// Steps done in all.
-    pub step: usize,
-    /// Width and height of the maps.
-    pub map_size: usize,
-    /// Texels of the maps.
-    pub texels: Vec<Texel<f32>>,
-    /// Moments of the texels.
-    pub moments: Moments,
-    /// Radiance of the light's texels.
-    pub light: Vec<[f32; 3]>,
-    /// Moments of the light.
-    pub light_moments: Moments,
-    /// Logarithm of each view's gain.
-    pub log_gains: Vec<f32>,
-    /// Moments of the gains.
-    pub gain_moments: Moments,
-    /// The curve so far.
-    pub losses: Vec<LossRow>,
-    /// Non-finite numbers by name and count.
-    pub non_finite: Vec<(String, u64)>,
-    /// What happened that the user should know.
-    pub events: Vec<String>,
-    /// Seconds of work so far.
-    pub seconds: f64,
-}
 
 /// What a step did.
 #[derive(Clone, Debug, PartialEq)]
@@ -104,23 +36,14 @@ pub enum StepOutcome {
 
 /// A fit in progress.
 pub struct Fitter {
-    scene: Arc<Scene>,
-    surface: Arc<Surface>,
-    settings: FitSettings,
-    stages: Vec<Stage>,
-    training: Vec<usize>,
-    held_out: Vec<Target>,
-    state: FitState,
-    work: Option<StageWork>,
-}
-
-/// What a stage needs and no checkpoint holds: all of it follows from scene, settings and state.
-struct StageWork {
-    weights: PyramidWeights,
-    parameters: Parameters<f32>,
-    gradient: Parameters<f32>,
-    targets: Vec<Target>,
-    first_hits: Vec<Option<FirstHits>>,
+    pub(super) scene: Arc<Scene>,
+    pub(super) surface: Arc<Surface>,
+    pub(super) settings: FitSettings,
+    pub(super) stages: Vec<Stage>,
+    pub(super) training: Vec<usize>,
+    pub(super) held_out: Vec<Target>,
+    pub(super) state: FitState,
+    pub(super) work: Option<StageWork>,
 }
 
 impl Fitter {
@@ -170,28 +93,18 @@ impl Fitter {
             return Err(Error::new(ErrorKind::InvalidScene, "no view is left to fit to")
                 .remedy("hold out fewer views: --hold-out-every 0 keeps them all"));
         }
-        let held_out = (0..scene.views.len())
-            .filter(|&view| scene.views[view].held_out)
-            .map(|view| {
-                let camera = &scene.views[view].camera;
-                let mut level = 0;
-                while (camera.width >> level) * (camera.height >> level) > HELD_OUT_PIXELS {
-                    level += 1;
-                }
-                Target::new(&scene, view, level)
-            })
-            .collect();
+        let held_out = held_out_targets(&scene);
         let stages = stages(&settings);
         Ok(Fitter { scene, surface, stages, settings, training, held_out, state: FitState::default(), work: None })
     }
 
-    fn measured_start(&self) -> start::StartValues {
+    pub(super) fn measured_start(&self) -> start::StartValues {
         let level = self.stages[0].photo_level;
         let targets = targets(&self.scene, &self.training, level);
         start::measured(&self.scene, &self.surface, &targets, &self.settings)
     }
 
-    fn begin_from(&mut self, values: start::StartValues, known_light: Option<&Environment>) {
+    pub(super) fn begin_from(&mut self, values: start::StartValues, known_light: Option<&Environment>) {
         let count = self.state.map_size * self.state.map_size;
         let environment = match known_light {
             Some(light) => light.resampled(2 * self.settings.environment_height, self.settings.environment_height),
@@ -303,6 +216,7 @@ impl Fitter {
         self.state.losses.push(row.clone());
         Ok(StepOutcome::Stepped(row))
     }
+<<<<<<< HEAD
 
     /// Prepares what a stage needs, once.
     fn enter(&mut self, stage: &Stage) {
@@ -817,4 +731,6 @@ fn doubled(texels: &[Texel<f32>], size: usize) -> Vec<Texel<f32>> {
             texels[row / 2 * size + column / 2]
         })
         .collect()
+=======
+>>>>>>> hard
 }

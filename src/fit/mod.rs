@@ -3,20 +3,30 @@
 //! Read in this order: [`settings`] says what can be chosen, [`schedule`] turns it into stages, [`targets`] holds the
 //! photographs at the resolution of a stage, [`loss`] compares a pixel with its photo, [`consistency`] compares the
 //! gradients of views, [`adam`] moves the numbers, and [`fitter`] is the loop body: one call, one step.
+//! Its parts stand in the order they run: `work` prepares a stage, `batch` picks views and pixels, `gradient` adds them
+//! up, `weigh` applies consistency, `advance` moves the numbers, `held_out` judges them. [`state`] is all they change.
 //! [`start`] chooses where to begin, [`gauge`] names the freedom that photographs leave, [`checkpoint`] saves it all.
 //!
 //! A fit knows nothing of threads that watch it, of files it came from or of windows: that is `job`.
 
 pub mod adam;
+mod advance;
+mod batch;
 pub mod checkpoint;
 pub mod consistency;
 pub mod fitter;
 pub mod gauge;
+mod gradient;
+mod held_out;
 pub mod loss;
 pub mod schedule;
 pub mod settings;
 pub mod start;
+pub mod state;
 pub mod targets;
+mod weigh;
+mod work;
 
-pub use fitter::{Fitter, LossRow, StepOutcome};
+pub use fitter::{Fitter, StepOutcome};
 pub use settings::FitSettings;
+pub use state::{FitState, LossRow};

@@ -1,0 +1,89 @@
+//! From a summed gradient to moved numbers, and away from a start that has none.
+
+use super::adam::TexelRates;
+use super::fitter::Fitter;
+use super::gradient::StepSums;
+use super::schedule::{Stage, StageKind};
+use super::settings::Start;
+use crate::math::sphere::solid_angle_of_texel;
+
+/// Step size of the logarithm of a view's gain.
+const RATE_GAIN: f32 = 0.01;
+
+impl Fitter {
+    /// Detects the paper's start, where every gradient is exactly zero, and leaves it. `true` when it did.
+    pub(super) fn leave_saddle(&mut self) -> bool {
+        if self.settings.start != Start::Paper {
+            return false;
+        }
+        let Some(work) = &self.work else { return false };
+        let still = work.gradient.texels.levels[0].texels.iter().all(|texel| texel[..6].iter().all(|&d| d == 0.0))
+            && work.gradient.light.iter().flatten().all(|&d| d == 0.0);
+        if !still || self.state.events.iter().any(|event| event.contains("saddle")) {
+            return false;
+        }
+        self.state.events.push(
+            "The start of diffuse 0 and light 0 is a saddle: the gradient is exactly zero (norm 0). It was left by the \
+             measured start: light from the photographs, one grey for the surface."
+                .into(),
+        );
+        let values = self.measured_start();
+        self.begin_from(values, None);
+        true
+    }
+
+    /// Moves texels, light and gains along the summed gradient.
+    pub(super) fn move_parameters(&mut self, stage: &Stage, sums: &StepSums) {
+        let Some(work) = &mut self.work else { return };
+        let rate = stage.rate(self.state.step_in_stage, self.settings.final_rate);
+        let free = if stage.kind == StageKind::All { rate } else { 0.0 };
+        let rates = TexelRates {
+            diffuse: rate * self.settings.rate_diffuse,
+            specular: free * self.settings.rate_specular,
+            log_width: free * self.settings.rate_roughness,
+        };
+        let base = &mut work.gradient.texels.levels[0].texels;
+        let texels = self.state.moments.step_texels(&mut self.state.texels, base, rates);
+        let mut light = 0;
+        if self.settings.fixed_light {
+            work.gradient.light.fill([0.0; 3]);
+        } else {
+            let mean = mean_radiance(&self.state.light, work.parameters.environment_size);
+            let rate = rate * self.settings.rate_light;
+            light = self.state.light_moments.step_light(&mut self.state.light, &mut work.gradient.light, mean, rate);
+        }
+        work.parameters.texels.levels[0].texels.clone_from(&self.state.texels);
+        work.parameters.texels.rebuild(&work.weights);
+        work.parameters.light.clone_from(&self.state.light);
+        if self.settings.exposure {
+            for &(view, d_gain) in &sums.gain_derivatives {
+                let gain = self.state.log_gains[view].exp();
+                let direction = self.state.gain_moments.direction_of(view, d_gain * gain);
+                self.state.log_gains[view] -= rate * RATE_GAIN * direction;
+            }
+            // The mean logarithm stays zero: a common gain belongs to the light.
+            let mean =
+                self.training.iter().map(|&view| self.state.log_gains[view]).sum::<f32>() / self.training.len() as f32;
+            for &view in &self.training {
+                self.state.log_gains[view] -= mean;
+            }
+        }
+        for (name, count) in [("gradient of a texel", texels), ("gradient of the light", light)] {
+            if count > 0 {
+                self.state.count_non_finite(name.into(), count as u64);
+            }
+        }
+    }
+}
+
+/// Mean over the sphere of directions and the channels.
+fn mean_radiance(light: &[[f32; 3]], (width, height): (usize, usize)) -> f32 {
+    let sum: f64 = light
+        .iter()
+        .enumerate()
+        .map(|(index, radiance)| {
+            solid_angle_of_texel(index / width, width, height) * f64::from(radiance.iter().sum::<f32>())
+        })
+        .sum();
+    (sum / 3.0 / (4.0 * std::f64::consts::PI)) as f32
+}

@@ -1,0 +1,201 @@
+//! The gradient of a step: pixels of several views, traced and added up.
+
+use super::batch::{pixels_of_visit, views_of_step};
+use super::consistency::ViewGradient;
+use super::fitter::Fitter;
+use super::loss::ViewLoss;
+use super::schedule::Stage;
+use super::settings::{BackgroundEvidence, Consistency};
+use super::targets::Target;
+use super::work::StageWork;
+use crate::error::{Error, ErrorKind, Place, Result};
+use crate::light::EnvironmentSampler;
+use crate::material::texels::{Level, TexelPyramid};
+use crate::render::accumulate::{PassKey, PassTotals, accumulate};
+use crate::render::first_hits::{CameraRays, FirstHits};
+use crate::render::{Parameters, PathSettings, PathTracer};
+use crate::scene::Background;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A fit ends with an error when more than this share of a step's pixels is not finite.
+const MAX_NON_FINITE_SHARE: f64 = 0.01;
+
+/// What a step added up beside its gradient.
+#[derive(Clone, Debug, Default)]
+pub(super) struct StepSums {
+    /// The loss that is minimised.
+    pub loss: f64,
+    /// Its part from the pictures.
+    pub image_loss: f64,
+    /// Disagreement of the views in [0, 1].
+    pub consistency: f64,
+    /// View and derivative of the loss by its gain.
+    pub gain_derivatives: Vec<(usize, f32)>,
+}
+
+impl Fitter {
+    /// Adds up the gradient of a step into the stage's gradient, on the base level. `None` when stopped.
+    pub(super) fn sum_gradient(&mut self, stage: &Stage, stop: &AtomicBool) -> Result<Option<StepSums>> {
+        let views =
+            views_of_step(self.settings.seed, self.training.len(), self.settings.views_per_step, self.state.step);
+        let Some(mut work) = self.work.take() else {
+            return Err(Error::new(ErrorKind::Internal, "a step began before its stage"));
+        };
+        let outcome = self.sum_gradient_of(&mut work, &views, stage, stop);
+        if !matches!(outcome, Ok(Some(_))) {
+            // Drop the half-made gradient.
+            clear(&mut work.gradient);
+        }
+        self.work = Some(work);
+        outcome
+    }
+
+    fn sum_gradient_of(
+        &mut self,
+        work: &mut StageWork,
+        views: &[(usize, usize)],
+        stage: &Stage,
+        stop: &AtomicBool,
+    ) -> Result<Option<StepSums>> {
+        let separate = self.settings.consistency != Consistency::None;
+        let share = 1.0 / views.len() as f32;
+        let sampler = EnvironmentSampler::new(&work.parameters.environment());
+        let quota = if separate { 0 } else { self.settings.pixels_per_step.div_ceil(views.len()) };
+        let quota = if self.settings.pixels_per_step == 0 { 0 } else { quota };
+        let mut sums = StepSums::default();
+        let mut view_gradients: Vec<ViewGradient<f32>> = Vec::new();
+        let mut total: Option<Parameters<f32>> = None;
+        for &(slot, visit) in views {
+            let StageWork { weights, parameters, gradient, targets, first_hits } = &mut *work;
+            let target = &targets[slot];
+            let pixels = pixels_of_visit(self.settings.seed, target, visit, quota);
+            let tracer = self.tracer(stage, parameters, &sampler, target);
+            let rays = self.rays(target, &first_hits[slot]);
+            let weight = if separate { 1.0 } else { share } / (3.0 * pixels.len() as f32);
+            let loss = self.view_loss(target, weight);
+            let key = self.pass_key(target);
+            let totals = accumulate(&tracer, &rays, &pixels, key, parameters, &loss, gradient, stop);
+            if stop.load(Ordering::Relaxed) {
+                return Ok(None);
+            }
+            sums.gain_derivatives.push((target.view, loss.gain_derivative() * if separate { share } else { 1.0 }));
+            self.note_non_finite(target, &totals, pixels.len())?;
+            sums.image_loss += f64::from(totals.loss) * if separate { f64::from(share) } else { 1.0 };
+            if separate {
+                gradient.texels.pull_down(weights);
+                view_gradients.push(ViewGradient::collect(&gradient.texels.levels[0].texels));
+                let total = total.get_or_insert_with(|| Parameters {
+                    texels: TexelPyramid {
+                        levels: vec![Level {
+                            width: stage.map_size,
+                            height: stage.map_size,
+                            texels: vec![[0.0; 8]; stage.map_size * stage.map_size],
+                        }],
+                    },
+                    light: vec![[0.0; 3]; gradient.light.len()],
+                    environment_size: gradient.environment_size,
+                });
+                add_scaled(total, gradient, share);
+                clear(gradient);
+            }
+        }
+        match total {
+            None => work.gradient.texels.pull_down(&work.weights),
+            Some(total) => {
+                work.gradient.texels.levels[0].texels.clone_from(&total.texels.levels[0].texels);
+                work.gradient.light.clone_from(&total.light);
+            }
+        }
+        sums.loss = sums.image_loss;
+        if separate && !self.weigh_by_consistency(work, views, &view_gradients, stage, &sampler, &mut sums, stop) {
+            return Ok(None);
+        }
+        Ok(Some(sums))
+    }
+
+    pub(super) fn tracer<'a>(
+        &'a self,
+        stage: &Stage,
+        parameters: &'a Parameters<f32>,
+        sampler: &'a EnvironmentSampler,
+        target: &Target,
+    ) -> PathTracer<'a> {
+        PathTracer {
+            surface: &self.surface,
+            proposal: &parameters.texels,
+            light: sampler,
+            environment_size: parameters.environment_size,
+            settings: PathSettings {
+                max_bounces: self.settings.bounces,
+                lobe_strength: stage.lobe_strength(self.state.step_in_stage, self.settings.lobe_ramp),
+                background_visible: self.scene.background == Background::Environment,
+                // Samples share a pixel between them.
+                camera_cone_radians: target.camera.pixel_angle_radians() / (self.settings.samples as f32).sqrt(),
+                bounce_cone_radians: 0.1,
+            },
+        }
+    }
+
+    pub(super) fn rays<'a>(&'a self, target: &'a Target, first_hits: &'a Option<FirstHits>) -> CameraRays<'a> {
+        let filter = self.settings.pixel_filter;
+        match first_hits {
+            Some(first_hits) => CameraRays::cached(&self.surface, &target.camera, filter, first_hits),
+            None => CameraRays::fresh(&self.surface, &target.camera, filter, self.settings.samples),
+        }
+    }
+
+    pub(super) fn view_loss<'a>(&'a self, target: &'a Target, weight: f32) -> ViewLoss<'a> {
+        let gain = self.state.log_gains[target.view].exp();
+        let use_background = self.settings.background == BackgroundEvidence::Use;
+        ViewLoss::new(&self.scene, target, weight, gain, use_background)
+    }
+
+    pub(super) fn pass_key(&self, target: &Target) -> PassKey {
+        PassKey { seed: self.settings.seed, step: self.state.step as u32, view: target.view as u32 }
+    }
+
+    /// Counts pixels that were not finite; too many of them end the fit.
+    fn note_non_finite(&mut self, target: &Target, totals: &PassTotals<f32>, pixels: usize) -> Result<()> {
+        let Some(pixel) = totals.first_non_finite else { return Ok(()) };
+        let (row, column) = (pixel / target.camera.width, pixel % target.camera.width);
+        let name = self.scene.views[target.view].name.clone();
+        self.state.count_non_finite(
+            format!("radiance in view {name}, first at row {row} column {column}"),
+            totals.non_finite_pixels,
+        );
+        if totals.non_finite_pixels as f64 > MAX_NON_FINITE_SHARE * pixels as f64 {
+            return Err(Error::new(
+                ErrorKind::NonFinite,
+                format!("{} of {pixels} pixels of a step are not finite", totals.non_finite_pixels),
+            )
+            .at(Place::Pixel { view: name, row, column })
+            .remedy("the last checkpoint is good: resume from it with smaller rates"));
+        }
+        Ok(())
+    }
+}
+
+fn clear(gradient: &mut Parameters<f32>) {
+    for level in &mut gradient.texels.levels {
+        level.texels.par_iter_mut().with_min_len(1 << 14).for_each(|texel| *texel = [0.0; 8]);
+    }
+    gradient.light.fill([0.0; 3]);
+}
+
+fn add_scaled(total: &mut Parameters<f32>, part: &Parameters<f32>, factor: f32) {
+    let (total_texels, part_texels) = (&mut total.texels.levels[0].texels, &part.texels.levels[0].texels);
+    total_texels.par_iter_mut().zip(part_texels).with_min_len(1 << 14).for_each(|(total, part)| {
+        if part[7] != 0.0 {
+            for number in 0..7 {
+                total[number] += factor * part[number];
+            }
+            total[7] += part[7];
+        }
+    });
+    for (total, part) in total.light.iter_mut().zip(&part.light) {
+        for channel in 0..3 {
+            total[channel] += factor * part[channel];
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! The views that judge a fit: none of their pixels ever moves a number.
+
+use super::fitter::Fitter;
+use super::schedule::Stage;
+use super::targets::Target;
+use crate::light::EnvironmentSampler;
+use crate::render::PathArena;
+use crate::render::accumulate::{PassKey, estimate_pixel};
+use crate::render::first_hits::CameraRays;
+use crate::scene::Scene;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Pixels of a held-out view that the curve looks at.
+const HELD_OUT_PIXELS: usize = 20_000;
+
+/// The held-out views of a scene, shrunk to a size at which looking at them costs little.
+pub(super) fn held_out_targets(scene: &Scene) -> Vec<Target> {
+    (0..scene.views.len())
+        .filter(|&view| scene.views[view].held_out)
+        .map(|view| {
+            let camera = &scene.views[view].camera;
+            let mut level = 0;
+            while (camera.width >> level) * (camera.height >> level) > HELD_OUT_PIXELS {
+                level += 1;
+            }
+            Target::new(scene, view, level)
+        })
+        .collect()
+}
+
+impl Fitter {
+    /// Root mean squared error over the held-out views, on shrunken photographs. `None` without such views.
+    pub(super) fn held_out_rmse(&self, stage: &Stage, stop: &AtomicBool) -> Option<f64> {
+        let work = self.work.as_ref()?;
+        let sampler = EnvironmentSampler::new(&work.parameters.environment());
+        let (mut sum, mut count) = (0.0f64, 0.0f64);
+        for target in &self.held_out {
+            let tracer = self.tracer(stage, &work.parameters, &sampler, target);
+            let rays = CameraRays::fresh(&self.surface, &target.camera, self.settings.pixel_filter, 4);
+            let key = PassKey { seed: self.settings.seed ^ 0xe7a1, step: 0, view: target.view as u32 };
+            let errors: Vec<Option<f64>> = (0..target.pixel_count())
+                .into_par_iter()
+                .map_init(PathArena::default, |arena, pixel| {
+                    let (photo, state) = target.at(&self.scene, pixel);
+                    if stop.load(Ordering::Relaxed) || !state.is_surface() || state.is_clipped() {
+                        return None;
+                    }
+                    let estimate = estimate_pixel(&tracer, &rays, pixel, key, &work.parameters, arena);
+                    let error = (0..3)
+                        .map(|c| f64::from((estimate.first[c] - photo[c]) * (estimate.second[c] - photo[c])))
+                        .sum::<f64>();
+                    (estimate.escaped == 0.0 && error.is_finite()).then_some(error / 3.0)
+                })
+                .collect();
+            for error in errors.into_iter().flatten() {
+                sum += error;
+                count += 1.0;
+            }
+        }
+        (count > 0.0).then(|| (sum / count).max(0.0).sqrt())
+    }
+}

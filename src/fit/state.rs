@@ -1,0 +1,67 @@
+//! What a fit changes, and its history: all that a checkpoint holds.
+
+use super::adam::Moments;
+use crate::material::texels::Texel;
+use serde::{Deserialize, Serialize};
+
+/// One line of the loss history.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LossRow {
+    /// Step, counted from 1 over all stages.
+    pub step: usize,
+    /// Name of the stage.
+    pub stage: String,
+    /// Seconds of work since the fit began, pauses left out.
+    pub seconds: f64,
+    /// The loss that was minimised.
+    pub loss: f64,
+    /// Its part from the pictures: mean squared error in linear radiance. Unbiased, hence now and then below zero.
+    pub image_loss: f64,
+    /// Disagreement of the views in [0, 1]; 0 when it is not measured.
+    pub consistency: f64,
+    /// Root mean squared error over held-out views, in the steps that look at them.
+    pub held_out_rmse: Option<f64>,
+}
+
+/// Everything a fit changes: what a checkpoint holds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FitState {
+    /// Index of the stage.
+    pub stage: usize,
+    /// Steps done in the stage.
+    pub step_in_stage: usize,
+    /// Steps done in all.
+    pub step: usize,
+    /// Width and height of the maps.
+    pub map_size: usize,
+    /// Texels of the maps.
+    pub texels: Vec<Texel<f32>>,
+    /// Moments of the texels.
+    pub moments: Moments,
+    /// Radiance of the light's texels.
+    pub light: Vec<[f32; 3]>,
+    /// Moments of the light.
+    pub light_moments: Moments,
+    /// Logarithm of each view's gain.
+    pub log_gains: Vec<f32>,
+    /// Moments of the gains.
+    pub gain_moments: Moments,
+    /// The curve so far.
+    pub losses: Vec<LossRow>,
+    /// Non-finite numbers by name and count.
+    pub non_finite: Vec<(String, u64)>,
+    /// What happened that the user should know.
+    pub events: Vec<String>,
+    /// Seconds of work so far.
+    pub seconds: f64,
+}
+
+impl FitState {
+    /// Counts numbers that were not finite, under a name that says where and what they were.
+    pub(super) fn count_non_finite(&mut self, name: String, count: u64) {
+        match self.non_finite.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, total)) => *total += count,
+            None => self.non_finite.push((name, count)),
+        }
+    }
+}

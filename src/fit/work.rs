@@ -1,0 +1,86 @@
+//! What a stage keeps between its steps: mip chains, photographs at its resolution, first hits.
+
+use super::adam::Moments;
+use super::fitter::Fitter;
+use super::schedule::Stage;
+use super::settings::Consistency;
+use super::targets::{Target, targets};
+use crate::atlas::covered_texels;
+use crate::material::texels::{PyramidWeights, Texel, TexelPyramid};
+use crate::render::Parameters;
+use crate::render::first_hits::FirstHits;
+
+/// What a stage needs and no checkpoint holds: all of it follows from scene, settings and state.
+pub(super) struct StageWork {
+    pub weights: PyramidWeights,
+    pub parameters: Parameters<f32>,
+    pub gradient: Parameters<f32>,
+    pub targets: Vec<Target>,
+    pub first_hits: Vec<Option<FirstHits>>,
+}
+
+impl Fitter {
+    /// Prepares what a stage needs, once.
+    pub(super) fn enter(&mut self, stage: &Stage) {
+        if self.work.is_some() {
+            return;
+        }
+        while self.state.map_size < stage.map_size {
+            self.state.texels = doubled(&self.state.texels, self.state.map_size);
+            self.state.map_size *= 2;
+            self.state.moments = Moments::zeros(self.state.texels.len());
+        }
+        let covered = covered_texels(self.surface.mesh(), stage.map_size, stage.map_size);
+        // Levels of the chain beyond the footprints of shrunken photographs serve bounced rays.
+        let weights = PyramidWeights::new(&covered, 6);
+        let texels = TexelPyramid::from_base(self.state.texels.clone(), &weights);
+        let parameters = Parameters::new(texels, &self.environment());
+        let gradient = Parameters {
+            texels: TexelPyramid::zeros(&weights),
+            light: vec![[0.0; 3]; self.state.light.len()],
+            environment_size: parameters.environment_size,
+        };
+        let targets = targets(&self.scene, &self.training, stage.photo_level);
+        let first_hits = self.cache_first_hits(&targets);
+        self.work = Some(StageWork { weights, parameters, gradient, targets, first_hits });
+    }
+
+    /// Traces first hits for as many views as the memory budget holds, when each view is likely to be visited often
+    /// enough to pay for them.
+    fn cache_first_hits(&self, targets: &[Target]) -> Vec<Option<FirstHits>> {
+        let mut budget = self.settings.first_hits_mib << 20;
+        let every_pixel = self.settings.pixels_per_step == 0 || self.settings.consistency != Consistency::None;
+        targets
+            .iter()
+            .map(|target| {
+                let bytes = FirstHits::bytes(&target.camera, self.settings.samples);
+                let pays =
+                    every_pixel || target.pixel_count() * self.settings.views_per_step <= self.settings.pixels_per_step;
+                if !pays || bytes > budget {
+                    return None;
+                }
+                budget -= bytes;
+                let Fitter { settings, surface, .. } = self;
+                let view = target.view as u32;
+                Some(FirstHits::trace(
+                    surface,
+                    &target.camera,
+                    settings.pixel_filter,
+                    settings.samples,
+                    settings.seed,
+                    view,
+                ))
+            })
+            .collect()
+    }
+}
+
+/// Maps of twice the size: each texel becomes four.
+fn doubled(texels: &[Texel<f32>], size: usize) -> Vec<Texel<f32>> {
+    (0..4 * size * size)
+        .map(|index| {
+            let (row, column) = (index / (2 * size), index % (2 * size));
+            texels[row / 2 * size + column / 2]
+        })
+        .collect()
+}
