@@ -6,8 +6,8 @@ use crate::atlas::{AtlasQuality, dilate, nearest_covered};
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::export::{LossRow, RunFolder, RunResult};
 use crate::fit::Fitter;
-use crate::fit::fitter::FitState;
 use crate::fit::settings::BackgroundEvidence;
+use crate::fit::state::FitState;
 use crate::fit::targets::Target;
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::insight::report::data::{

@@ -43,10 +43,11 @@ impl SampleStream {
         let hash = mix(self.key ^ u64::from(self.dimension).wrapping_mul(0xd134_2543_de82_ef95));
         self.dimension += 1;
         let (low, high) = (hash as u32, (hash >> 32) as u32);
-        // Shuffle the order of samples, then scramble each coordinate of the Sobol point.
-        let index = nested_uniform_scramble(self.sample, low);
-        let x = nested_uniform_scramble(index.reverse_bits(), high);
-        let y = nested_uniform_scramble(sobol_second(index), low.rotate_left(16) ^ high);
+        // Shuffle the order of samples, then scramble each coordinate of the Sobol point. The first coordinate is the
+        // index with its bits reversed, the second is made with its bits reversed: that saves reversals.
+        let index = laine_karras(self.sample.reverse_bits(), low).reverse_bits();
+        let x = laine_karras(index, high).reverse_bits();
+        let y = laine_karras(sobol_second_reversed(index), low.rotate_left(16) ^ high).reverse_bits();
         [unit_float(x), unit_float(y)]
     }
 }
@@ -56,29 +57,29 @@ fn unit_float(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
-/// Second dimension of the Sobol sequence; the first is the bit reversal of the index.
-fn sobol_second(mut index: u32) -> u32 {
-    let mut direction = 1u32 << 31;
+/// Second dimension of the Sobol sequence with its bits reversed; the first is the bit reversal of the index.
+fn sobol_second_reversed(mut index: u32) -> u32 {
+    let mut direction = 1u32;
     let mut result = 0;
     while index != 0 {
         if index & 1 == 1 {
             result ^= direction;
         }
         index >>= 1;
-        direction ^= direction >> 1;
+        direction ^= direction << 1;
     }
     result
 }
 
-/// Owen scrambling by a hash in which each bit depends on the bits above it only (Burley 2020, listing 3).
-fn nested_uniform_scramble(value: u32, seed: u32) -> u32 {
-    let mut bits = value.reverse_bits();
-    bits = bits.wrapping_add(seed);
+/// A hash in which each bit depends on the bits below it only: between two bit reversals it is an Owen scrambling
+/// (Laine and Karras 2011, with the constants of Burley 2020, listing 3).
+fn laine_karras(value: u32, seed: u32) -> u32 {
+    let mut bits = value.wrapping_add(seed);
     bits ^= bits.wrapping_mul(0x6c50_b47c);
     bits ^= bits.wrapping_mul(0xb82f_1e52);
     bits ^= bits.wrapping_mul(0xc7af_e638);
     bits ^= bits.wrapping_mul(0x8d22_f6e6);
-    bits.reverse_bits()
+    bits
 }
 
 /// The finaliser of SplitMix64 (Steele, Lea and Flood 2014): a bijection that spreads every bit.
