@@ -49,6 +49,9 @@ pub struct DemoOptions {
     /// Seed of the cameras, the photographs and the fit.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// A TOML file of fit settings that differ from the demo's, such as `consistency = "exact"`.
+    #[arg(long)]
+    pub settings: Option<PathBuf>,
 }
 
 /// How a scene is read.

@@ -93,6 +93,7 @@ pub fn relight(options: &RelightOptions) -> Result<()> {
         samples: options.samples,
         max_bounces: options.bounces,
         background_visible: !options.hide_background,
+        two_sided: scene.truth.is_none(),
         lobe_strength: if settings.fit.has_lobe() { 1.0 } else { 0.0 },
         ..Default::default()
     };
@@ -137,6 +138,7 @@ pub fn render(options: &RenderOptions) -> Result<()> {
         groups,
         max_bounces: options.bounces,
         background_visible: !options.hide_background && scene.background == Background::Environment,
+        two_sided: scene.truth.is_none(),
         lobe_strength: strength,
         seed: options.seed,
         ..Default::default()
@@ -192,6 +194,7 @@ pub fn compare(options: &CompareOptions, json: bool) -> Result<()> {
         samples: options.samples,
         max_bounces: options.bounces.unwrap_or(settings.fit.bounces),
         background_visible: scene.background == Background::Environment,
+        two_sided: scene.truth.is_none(),
         lobe_strength: if settings.fit.has_lobe() { 1.0 } else { 0.0 },
         ..Default::default()
     };

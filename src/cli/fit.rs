@@ -23,6 +23,16 @@ pub fn demo(options: &DemoOptions, json: bool) -> Result<()> {
     stop_on_interrupt(Arc::clone(&stop));
     let mut settings = demo::settings();
     settings.fit.seed = options.seed;
+    if let Some(path) = &options.settings {
+        let text = std::fs::read_to_string(path).map_err(|source| Error::reading(path, source))?;
+        let changes: toml::Table = toml::from_str(&text).map_err(|source| {
+            Error::new(ErrorKind::Malformed, format!("not a settings file: {}", source.message()))
+                .at(Place::File(path.clone()))
+        })?;
+        let mut table = toml::Table::try_from(&settings.fit).unwrap_or_default();
+        table.extend(changes);
+        settings.fit = FitSettings::from_toml(&table.to_string())?;
+    }
     let mut timings = Vec::new();
     let bar = share_bar(json, "photographing the demo scene");
     let demo_settings = DemoSettings { seed: options.seed, ..DemoSettings::default() };

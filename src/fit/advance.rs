@@ -3,6 +3,7 @@
 use super::adam::TexelRates;
 use super::fitter::Fitter;
 use super::gradient::StepSums;
+use super::light_prior;
 use super::schedule::{Stage, StageKind};
 use super::settings::Start;
 use crate::math::sphere::solid_angle_of_texel;
@@ -50,6 +51,9 @@ impl Fitter {
         } else {
             let mean = mean_radiance(&self.state.light, work.parameters.environment_size);
             let rate = rate * self.settings.rate_light;
+            let (weight, d_light) = (self.settings.light_smoothness, &mut work.gradient.light);
+            let size = work.parameters.environment_size;
+            light_prior::add_gradient(&self.state.light, size, mean, weight, d_light);
             light = self.state.light_moments.step_light(&mut self.state.light, &mut work.gradient.light, mean, rate);
         }
         work.parameters.texels.levels[0].texels.clone_from(&self.state.texels);

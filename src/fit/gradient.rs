@@ -130,6 +130,7 @@ impl Fitter {
                 max_bounces: self.settings.bounces,
                 lobe_strength: stage.lobe_strength(self.state.step_in_stage, self.settings.lobe_ramp),
                 background_visible: self.scene.background == Background::Environment,
+                two_sided: false,
                 // Samples share a pixel between them.
                 camera_cone_radians: target.camera.pixel_angle_radians() / (self.settings.samples as f32).sqrt(),
                 bounce_cone_radians: 0.1,

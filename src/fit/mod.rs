@@ -18,6 +18,7 @@ pub mod fitter;
 pub mod gauge;
 mod gradient;
 mod held_out;
+pub mod light_prior;
 pub mod loss;
 pub mod schedule;
 pub mod settings;

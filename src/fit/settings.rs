@@ -121,6 +121,9 @@ pub struct FitSettings {
     /// Step size of the light, relative to its mean plus the texel's own radiance.
     #[arg(long, default_value_t = FitSettings::default().rate_light)]
     pub rate_light: f32,
+    /// Weight of the wish for a smooth light, for texels that no pixel says much of; 0 leaves it out.
+    #[arg(long, default_value_t = FitSettings::default().light_smoothness)]
+    pub light_smoothness: f32,
     /// Step sizes fall along a cosine to this share at the end of each of the two steps.
     #[arg(long, default_value_t = FitSettings::default().final_rate)]
     pub final_rate: f32,
@@ -158,7 +161,8 @@ impl Default for FitSettings {
             rate_diffuse: 0.03,
             rate_specular: 0.015,
             rate_roughness: 0.04,
-            rate_light: 0.03,
+            rate_light: 0.1,
+            light_smoothness: 0.02,
             final_rate: 0.05,
             lobe_ramp: 20,
             first_hits_mib: 1024,

@@ -28,8 +28,12 @@ use std::time::Instant;
 const HELD_OUT_PIXELS: usize = 400_000;
 /// Pixels of a training view in the report, at most.
 const TRAINING_PIXELS: usize = 60_000;
-/// Paths a pixel in the report's pictures.
-const PICTURE_SAMPLES: usize = 16;
+/// Paths a pixel in the report's pictures of held-out views.
+const HELD_OUT_SAMPLES: usize = 32;
+/// Paths a pixel in the report's pictures of training views.
+const TRAINING_SAMPLES: usize = 8;
+/// Paths a pixel in relit pictures.
+const RELIT_SAMPLES: usize = 16;
 /// Pixels of a relit picture, at most.
 const RELIT_PIXELS: usize = 130_000;
 
@@ -162,6 +166,8 @@ fn picture_settings(scene: &Scene, settings: &RunSettings, samples: usize) -> Pi
         filter: settings.fit.pixel_filter,
         background_visible: scene.background == Background::Environment,
         lobe_strength: if settings.fit.has_lobe() { 1.0 } else { 0.0 },
+        // A scan has holes through which its inside shows; a scene with a truth is drawn as its truth was.
+        two_sided: scene.truth.is_none(),
         seed: settings.fit.seed ^ 0x5c0e,
         ..Default::default()
     }
@@ -175,10 +181,11 @@ fn score_views(
     stop: &AtomicBool,
 ) -> Result<Vec<ScoredView>> {
     let scene = fitter.scene().as_ref();
-    let picture_settings = picture_settings(scene, settings, PICTURE_SAMPLES);
     let mut scored = Vec::with_capacity(scene.views.len());
     for (index, view) in scene.views.iter().enumerate() {
-        let most = if view.held_out { HELD_OUT_PIXELS } else { TRAINING_PIXELS };
+        let (most, samples) =
+            if view.held_out { (HELD_OUT_PIXELS, HELD_OUT_SAMPLES) } else { (TRAINING_PIXELS, TRAINING_SAMPLES) };
+        let picture_settings = picture_settings(scene, settings, samples);
         let target = Target::new(scene, index, level_of(scene, index, most));
         let gain = fitter.state().log_gains[index].exp();
         let mut picture = render(surface, &target.camera, own, index as u32, &picture_settings, stop);
@@ -233,7 +240,7 @@ fn relit_strips(
     let mut strips = Vec::new();
     let mut errors = Vec::new();
     if let Some(truth) = scene.truth.as_ref().and_then(|truth| truth.relight.as_ref()) {
-        let own_settings = picture_settings(scene, settings, 2 * PICTURE_SAMPLES);
+        let own_settings = picture_settings(scene, settings, 2 * RELIT_SAMPLES);
         let mut strip = RelitStrip {
             light: "a light that no photo shows".into(),
             environment: Some(truth.environment.radiance.clone()),
@@ -260,7 +267,7 @@ fn relit_strips(
     order.sort_by_key(|&view| !scene.views[view].held_out);
     let shown: Vec<usize> = order.iter().copied().step_by((order.len() / 3).max(1)).take(3).collect();
     let relight_settings =
-        PictureSettings { background_visible: true, ..picture_settings(scene, settings, 2 * PICTURE_SAMPLES) };
+        PictureSettings { background_visible: true, ..picture_settings(scene, settings, RELIT_SAMPLES) };
     let turned = |degrees: f32| (format!("the fitted light turned by {degrees} degrees"), degrees.to_radians());
     let mut lights = Vec::new();
     for name in ["noon", "evening", "overcast"] {

@@ -8,7 +8,7 @@
 //! joined by multiple importance sampling with the power heuristic (Veach 1997, eq. 9.13 with beta = 2).
 //!
 //! Shading normals: the lobe is zero unless light and viewer are above both the shading and the geometric horizon, so
-//! no light leaks through a surface at the terminator; surfaces are one-sided.
+//! no light leaks through a surface at the terminator.
 
 use super::surface::{Surface, SurfacePoint};
 use crate::light::EnvironmentSampler;
@@ -31,6 +31,9 @@ pub struct PathSettings {
     pub lobe_strength: f32,
     /// Whether a camera ray that meets nothing sees the environment.
     pub background_visible: bool,
+    /// Whether the back of a triangle reflects like its front; otherwise it is black. Scans have holes through which
+    /// their inside shows: pictures are better with both sides, but only fronts are evidence for a fit.
+    pub two_sided: bool,
     /// Angle a camera ray stands for, in radians: sets the mip level of first hits. 0 always reads the finest level.
     pub camera_cone_radians: f32,
     /// Angle a bounced ray stands for, in radians: sets the mip level of later hits. 0 always reads the finest level.
@@ -139,8 +142,12 @@ impl PathTracer<'_> {
         let mut ray = *camera_ray;
         let mut hit = first_hit;
         for bounce_index in 0..max_bounces {
-            let point = self.surface.point(&hit);
             let towards_viewer = -ray.direction;
+            let point = if self.settings.two_sided {
+                self.surface.point_facing(&hit, towards_viewer)
+            } else {
+                self.surface.point(&hit)
+            };
             if point.geometric_normal.dot(towards_viewer) <= 0.0 || point.shading_normal.dot(towards_viewer) <= 0.0 {
                 return;
             }

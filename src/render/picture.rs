@@ -28,6 +28,8 @@ pub struct PictureSettings {
     pub lobe_strength: f32,
     /// Whether the environment shows behind the surface.
     pub background_visible: bool,
+    /// Whether the back of a triangle reflects like its front; otherwise it is black.
+    pub two_sided: bool,
     /// Seed of the random numbers.
     pub seed: u64,
 }
@@ -41,6 +43,7 @@ impl Default for PictureSettings {
             max_bounces: 3,
             lobe_strength: 1.0,
             background_visible: true,
+            two_sided: false,
             seed: 1,
         }
     }
@@ -78,6 +81,7 @@ pub fn render(
             max_bounces: settings.max_bounces,
             lobe_strength: settings.lobe_strength,
             background_visible: settings.background_visible,
+            two_sided: settings.two_sided,
             camera_cone_radians: 0.0,
             bounce_cone_radians: 0.0,
         },

@@ -86,6 +86,16 @@ impl Surface {
         }
     }
 
+    /// The surface at a hit, with both normals turned to the side of a direction that leaves it.
+    pub fn point_facing(&self, hit: &Hit, direction: Vec3) -> SurfacePoint {
+        let mut point = self.point(hit);
+        if point.geometric_normal.dot(direction) < 0.0 {
+            point.geometric_normal = -point.geometric_normal;
+            point.shading_normal = -point.shading_normal;
+        }
+        point
+    }
+
     /// Whether light from infinity along a unit direction is blocked from a point.
     pub fn is_shadowed(&self, point: &SurfacePoint, direction: Vec3) -> bool {
         self.bvh.is_occluded(&self.ray_from(point, direction))
