@@ -75,28 +75,35 @@ impl Moments {
             .sum()
     }
 
-    /// Moves the light. A texel's step is `rate (mean + L)`, so that a sun grows by a share of itself while a dark
-    /// texel still moves; `mean` is the mean radiance. Values stay at or above zero. Clears the gradient and returns
-    /// the number of gradients that were not finite.
+    /// Moves the light along relative steps: `L += rate (mean + L) direction`, so that a sun grows by a share of itself
+    /// while a dark texel still moves. The second moment is half the texel's own and half that of all texels together:
+    /// a texel of which the step says little moves little, where plain Adam would give its noise a full step. Values
+    /// stay at or above zero. Clears the gradient and returns the number of gradients that were not finite.
     pub fn step_light(&mut self, light: &mut [[f32; 3]], gradient: &mut [[f32; 3]], mean: f32, rate: f32) -> usize {
         let mut left_out = 0;
-        for (index, (radiance, gradient)) in light.iter_mut().zip(gradient).enumerate() {
+        let mut touched = vec![None; light.len()];
+        for (index, gradient) in gradient.iter_mut().enumerate() {
             let own = std::mem::take(gradient);
-            if own == [0.0; 3] {
-                continue;
-            }
-            if !own.iter().all(|value| value.is_finite()) {
+            if own.iter().all(|value| value.is_finite()) {
+                let corrections = count_update(&mut self.first[index]);
+                for channel in 0..3 {
+                    // The derivative by a relative change of the texel.
+                    let relative = own[channel] * (mean + light[index][channel]);
+                    accumulate(relative, &mut self.first[index][channel], &mut self.second[index][channel]);
+                }
+                touched[index] = Some(corrections);
+            } else {
                 left_out += 1;
-                continue;
             }
-            let corrections = count_update(&mut self.first[index]);
+        }
+        let second = self.second.iter().flat_map(|second| &second[..3]).map(|&value| f64::from(value));
+        let shared = (second.sum::<f64>() / (3 * light.len().max(1)) as f64) as f32;
+        for (index, radiance) in light.iter_mut().enumerate() {
+            let Some(corrections) = touched[index] else { continue };
             for channel in 0..3 {
-                let direction = update(
-                    own[channel],
-                    &mut self.first[index][channel],
-                    &mut self.second[index][channel],
-                    corrections,
-                );
+                let second = 0.5 * (self.second[index][channel] + shared);
+                let direction =
+                    self.first[index][channel] * corrections.0 / ((second * corrections.1).sqrt() + EPSILON);
                 radiance[channel] = (radiance[channel] - rate * (mean + radiance[channel]) * direction).max(0.0);
             }
         }
@@ -117,9 +124,14 @@ fn count_update(first: &mut Texel<f32>) -> (f32, f32) {
 }
 
 #[inline(always)]
-fn update(gradient: f32, first: &mut f32, second: &mut f32, corrections: (f32, f32)) -> f32 {
+fn accumulate(gradient: f32, first: &mut f32, second: &mut f32) {
     *first = BETA_ONE * *first + (1.0 - BETA_ONE) * gradient;
     *second = BETA_TWO * *second + (1.0 - BETA_TWO) * gradient * gradient;
+}
+
+#[inline(always)]
+fn update(gradient: f32, first: &mut f32, second: &mut f32, corrections: (f32, f32)) -> f32 {
+    accumulate(gradient, first, second);
     let scale = (*second * corrections.1).sqrt();
     *first * corrections.0 / (scale + EPSILON)
 }
