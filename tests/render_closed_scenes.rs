@@ -52,6 +52,12 @@ fn cube(half: f32, inwards: bool) -> Mesh {
     quads(&sides)
 }
 
+/// A horizontal square about the origin that faces up.
+fn square_of_half_side(half: f32) -> Mesh {
+    let corner = |x: f32, z: f32| Vec3::new(half * x, 0.0, half * z);
+    quads(&[[corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)]])
+}
+
 /// A sphere about the origin with true normals.
 fn sphere(radius: f32, rows: usize, columns: usize) -> Mesh {
     let mut mesh = Mesh::default();
@@ -162,7 +168,18 @@ fn a_white_lobe_never_returns_more_than_it_gets() {
         }
         last = mean;
     }
-    assert!(last > 0.8, "single scattering loses some, not most: {last}");
+
+    // At r = 1 the distribution is constant; seen head-on the reflected share is the integral of c / q(c) over c, with
+    // q(c) = (c + 1) / 2, divided by 2: 1 - ln 2.
+    let square = square_of_half_side(1.0);
+    let camera = camera_at(Vec3::new(0.0, 40.0, 0.01), Vec3::ZERO, 8, 1.0);
+    let material = Material::from_maps(Vec3::ZERO, Vec3::ONE, 1.0);
+    let settings = PictureSettings { samples: 256, groups: 4, max_bounces: 1, ..PictureSettings::default() };
+    let own = picture(&square, &camera, &uniform(material, &constant_light(2.0)), &settings);
+    let (mean, error) = mean_and_error(&own, |coverage| coverage == 1.0);
+    let expected = 2.0 * (1.0 - std::f64::consts::LN_2);
+    assert!((mean - expected).abs() < 4.0 * error + 1e-3 * expected, "{mean} +- {error}, expected {expected}");
+    assert!(error < 5e-3 * expected);
 }
 
 #[test]
@@ -268,12 +285,7 @@ fn a_one_texel_sun_of_a_million_is_finite_and_unbiased() {
 fn a_lambertian_square_under_a_sun_has_the_irradiance_of_the_environment() {
     let mut light = Environment::constant(64, 32, Vec3::new(0.2, 0.4, 0.8));
     light.radiance[(6, 40)] = Vec3::new(3e3, 2e3, 1e3);
-    let square = quads(&[[
-        Vec3::new(-1.0, 0.0, -1.0),
-        Vec3::new(-1.0, 0.0, 1.0),
-        Vec3::new(1.0, 0.0, 1.0),
-        Vec3::new(1.0, 0.0, -1.0),
-    ]]);
+    let square = square_of_half_side(1.0);
     let camera = camera_at(Vec3::new(0.3, 3.0, 0.2), Vec3::ZERO, 8, 20.0);
     let settings =
         PictureSettings { samples: 256, groups: 8, max_bounces: 2, lobe_strength: 0.0, ..PictureSettings::default() };
@@ -289,12 +301,7 @@ fn a_lambertian_square_under_a_sun_has_the_irradiance_of_the_environment() {
 fn every_corner_of_the_material_is_finite_even_at_grazing_views() {
     let mut light = Environment::constant(16, 8, Vec3::splat(1.0));
     light.radiance[(2, 3)] = Vec3::splat(1e5);
-    let square = quads(&[[
-        Vec3::new(-9.0, 0.0, -9.0),
-        Vec3::new(-9.0, 0.0, 9.0),
-        Vec3::new(9.0, 0.0, 9.0),
-        Vec3::new(9.0, 0.0, -9.0),
-    ]]);
+    let square = square_of_half_side(9.0);
     let mut scene = square.clone();
     let ball = sphere(1.0, 16, 32);
     let first = scene.positions.len() as u32;
@@ -378,7 +385,7 @@ fn tracer<'a>(
     }
 }
 
-/// Half of the squared distance to a grey of 0.3.
+/// The squared distance to a grey of 0.3, as a product of the two estimates.
 struct ToGrey;
 
 impl PixelLoss<f32> for ToGrey {
