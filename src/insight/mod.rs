@@ -4,10 +4,11 @@
 //! and light with a known truth, [`report`] makes the one page that shows it all, [`study`] gathers numbers over seeds.
 //! Every score comes twice, raw and scale-aligned, because reflectance times c with light over c is the same picture.
 //!
-//! [`coverage`] counts which texels photographs see.
+//! [`coverage`] counts which texels photographs see. [`audit`] checks derivatives against differences.
 //!
 //! What this folder refuses to do: it changes no map, and scores only pictures that are handed to it.
 
+pub mod audit;
 pub mod coverage;
 pub mod memory;
 pub mod plot;

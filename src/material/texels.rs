@@ -120,6 +120,19 @@ impl PyramidWeights {
         self.coverage[0][index] > 0.0
     }
 
+    /// (level, index) of a base texel and of the texels of coarser levels that it has a share in, from fine to coarse.
+    pub fn ancestors(&self, base_index: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let (row, column) = (base_index / self.sizes[0].0, base_index % self.sizes[0].0);
+        let index = move |level: usize| (row >> level) * self.sizes[level].0 + (column >> level);
+        let has_share = move |level: usize| {
+            let own = index(level - 1);
+            self.shares(level - 1, index(level)).iter().any(|&(child, share)| child == own && share > 0.0)
+        };
+        (0..self.sizes.len())
+            .take_while(move |&level| level == 0 || has_share(level))
+            .map(move |level| (level, index(level)))
+    }
+
     /// The share each of a parent's four children has in it. A parent without coverage averages its children evenly.
     fn shares(&self, level: usize, parent: usize) -> [(usize, f32); 4] {
         let own = children(parent, self.sizes[level].0);
@@ -127,6 +140,18 @@ impl PyramidWeights {
         let sum: f32 = coverage.iter().sum();
         std::array::from_fn(|k| (own[k], if sum > 0.0 { coverage[k] / sum } else { 0.25 }))
     }
+}
+
+/// The texel of a coarse level that stands for its four children on `level`.
+fn mean_of_children<R: Real>(fine: &[Texel<R>], weights: &PyramidWeights, level: usize, parent: usize) -> Texel<R> {
+    let mut sum = [R::zero(); TEXEL_NUMBERS];
+    for (child, share) in weights.shares(level, parent) {
+        let share = R::from_f32(share);
+        for (total, &value) in sum.iter_mut().zip(&fine[child]) {
+            *total += value * share;
+        }
+    }
+    sum
 }
 
 /// Indices of the four children of texel `parent`; `width` is that of the finer level.
@@ -161,15 +186,17 @@ impl<R: Real> TexelPyramid<R> {
             let (fine, coarse) = self.levels.split_at_mut(level);
             let fine = &fine[level - 1].texels;
             coarse[0].texels.par_iter_mut().with_min_len(1 << 13).enumerate().for_each(|(parent, texel)| {
-                let mut sum = [R::zero(); TEXEL_NUMBERS];
-                for (child, share) in weights.shares(level - 1, parent) {
-                    let share = R::from_f32(share);
-                    for (total, &value) in sum.iter_mut().zip(&fine[child]) {
-                        *total += value * share;
-                    }
-                }
-                *texel = sum;
+                *texel = mean_of_children(fine, weights, level - 1, parent);
             });
+        }
+    }
+
+    /// Recomputes the texels of the coarse levels that a base texel is a part of: what
+    /// [`TexelPyramid::rebuild`] does when that one texel has changed.
+    pub fn rebuild_above(&mut self, weights: &PyramidWeights, base_index: usize) {
+        for (level, parent) in weights.ancestors(base_index).skip(1) {
+            let (fine, coarse) = self.levels.split_at_mut(level);
+            coarse[0].texels[parent] = mean_of_children(&fine[level - 1].texels, weights, level - 1, parent);
         }
     }
 
@@ -290,6 +317,20 @@ mod tests {
         probe.pull_down(&weights);
         let backward = dot(&base, &probe.levels[0].texels);
         assert!((forward - backward).abs() < 1e-10 * forward.abs(), "{forward} {backward}");
+    }
+
+    #[test]
+    fn one_changed_texel_rebuilds_like_all() {
+        let covered = Image::from_fn(16, 8, |row, column| (row + column) % 3 != 0);
+        let weights = PyramidWeights::new(&covered, 4);
+        let mut base = random_texels(128, 2);
+        let mut one = TexelPyramid::from_base(base.clone(), &weights);
+        for index in [0, 17, 63, 127] {
+            base[index] = [3.0; 8];
+            one.levels[0].texels[index] = [3.0; 8];
+            one.rebuild_above(&weights, index);
+            assert_eq!(one, TexelPyramid::from_base(base.clone(), &weights));
+        }
     }
 
     #[test]
