@@ -13,6 +13,9 @@ const BETA_ONE: f32 = 0.9;
 const BETA_TWO: f32 = 0.99;
 /// Added to the root of the second moment, relative to nothing: gradients of a mean over 10^6 pixels are about 1e-8.
 const EPSILON: f32 = 1e-16;
+/// A gradient counts as not finite from here on: its square would be infinite, and an infinite second moment would hold
+/// its number still for ever.
+const LARGEST_GRADIENT: f32 = 1e18;
 
 /// Moments of a group of numbers; the last entry of each group counts its updates.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -40,6 +43,11 @@ impl Moments {
         Moments { first: vec![[0.0; 8]; count], second: vec![[0.0; 8]; count] }
     }
 
+    /// Whether these are moments of `count` groups.
+    pub fn is_of(&self, count: usize) -> bool {
+        self.first.len() == count && self.second.len() == count
+    }
+
     /// Moves the texels that a gradient touched, and clears the gradient. Values are projected to their ranges after
     /// the step; the projection does not enter the gradient, so a value leaves its bound as soon as the photos ask.
     /// Returns the number of gradients that were not finite and were left out.
@@ -61,7 +69,7 @@ impl Moments {
                     return 0;
                 }
                 let own = std::mem::take(gradient);
-                if !own.iter().all(|value| value.is_finite()) {
+                if !own.iter().all(|value| value.abs() < LARGEST_GRADIENT) {
                     return 1;
                 }
                 let corrections = count_update(first);
@@ -84,12 +92,12 @@ impl Moments {
         let mut touched = vec![None; light.len()];
         for (index, gradient) in gradient.iter_mut().enumerate() {
             let own = std::mem::take(gradient);
-            if own.iter().all(|value| value.is_finite()) {
+            // The derivative by a relative change of the texel.
+            let relative: [f32; 3] = std::array::from_fn(|channel| own[channel] * (mean + light[index][channel]));
+            if relative.iter().all(|value| value.abs() < LARGEST_GRADIENT) {
                 let corrections = count_update(&mut self.first[index]);
                 for channel in 0..3 {
-                    // The derivative by a relative change of the texel.
-                    let relative = own[channel] * (mean + light[index][channel]);
-                    accumulate(relative, &mut self.first[index][channel], &mut self.second[index][channel]);
+                    accumulate(relative[channel], &mut self.first[index][channel], &mut self.second[index][channel]);
                 }
                 touched[index] = Some(corrections);
             } else {

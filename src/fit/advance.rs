@@ -10,24 +10,33 @@ use crate::math::sphere::solid_angle_of_texel;
 
 /// Step size of the logarithm of a view's gain.
 const RATE_GAIN: f32 = 0.01;
+/// Steps of the light are relative to its mean radiance, and to at least this share of the photos' mean.
+const LEAST_LIGHT: f32 = 0.5;
 
 impl Fitter {
-    /// Detects the paper's start, where every gradient is exactly zero, and leaves it. `true` when it did.
+    /// Detects the paper's start, diffuse 0 under light 0, and leaves it. `true` when it did.
+    ///
+    /// There the gradient by the maps is exactly zero, and so is that by the light but for pixels that show the
+    /// background and for the grazing part of a lobe that is already on. Those few would raise the light first and the
+    /// maps after it, but from far behind: it is left in every case.
     pub(super) fn leave_saddle(&mut self) -> bool {
         if self.settings.start != Start::Paper {
             return false;
         }
         let Some(work) = &self.work else { return false };
-        let still = work.gradient.texels.levels[0].texels.iter().all(|texel| texel[..6].iter().all(|&d| d == 0.0))
-            && work.gradient.light.iter().flatten().all(|&d| d == 0.0);
-        if !still || self.state.events.iter().any(|event| event.contains("saddle")) {
+        let norm =
+            |numbers: &mut dyn Iterator<Item = f32>| numbers.map(|d| f64::from(d) * f64::from(d)).sum::<f64>().sqrt();
+        let maps = norm(&mut work.gradient.texels.levels[0].texels.iter().flat_map(|texel| texel[..7].iter().copied()));
+        let light = norm(&mut work.gradient.light.iter().flatten().copied());
+        let black = self.state.light.iter().all(|radiance| *radiance == [0.0; 3]);
+        if !black || maps > 0.0 || self.state.events.iter().any(|event| event.contains("saddle")) {
             return false;
         }
-        self.state.events.push(
-            "The start of diffuse 0 and light 0 is a saddle: the gradient is exactly zero (norm 0). It was left by the \
-             measured start: light from the photographs, one grey for the surface."
-                .into(),
-        );
+        self.state.events.push(format!(
+            "The start of diffuse 0 and light 0 is a saddle: the gradient by the maps is exactly zero (norm {maps}), by \
+             the light its norm is {light:.3e}. It was left by the measured start: light from the photographs, one grey \
+             for the surface."
+        ));
         let values = self.measured_start();
         self.begin_from(values, None);
         true
@@ -49,7 +58,9 @@ impl Fitter {
         if self.settings.fixed_light {
             work.gradient.light.fill([0.0; 3]);
         } else {
-            let mean = mean_radiance(&self.state.light, work.parameters.environment_size);
+            // Off a black light as well: there a step relative to the light's own mean would be none.
+            let mean = mean_radiance(&self.state.light, work.parameters.environment_size)
+                .max(LEAST_LIGHT * work.mean_of_photos);
             let rate = rate * self.settings.rate_light;
             let (weight, d_light) = (self.settings.light_smoothness, &mut work.gradient.light);
             let size = work.parameters.environment_size;
@@ -71,6 +82,9 @@ impl Fitter {
             for &view in &self.training {
                 self.state.log_gains[view] -= mean;
             }
+        }
+        for (name, count) in &sums.non_finite {
+            self.state.count_non_finite(name.clone(), *count);
         }
         for (name, count) in [("gradient of a texel", texels), ("gradient of the light", light)] {
             if count > 0 {

@@ -5,6 +5,7 @@
 //! interrupted.
 
 use super::adam::Moments;
+use super::evidence;
 use super::gauge::GaugeRule;
 use super::held_out::held_out_targets;
 use super::schedule::{Stage, stages};
@@ -65,16 +66,30 @@ impl Fitter {
             Start::Paper => start::paper(&fitter.settings),
         };
         fitter.begin_from(values, known_light);
+        fitter.state.non_finite = evidence::defects_of_photos(&fitter.scene);
         Ok(fitter)
     }
 
     /// Takes up a fit from a saved state.
     pub fn resume(scene: Arc<Scene>, surface: Arc<Surface>, settings: FitSettings, state: FitState) -> Result<Self> {
         let mut fitter = Fitter::prepare(scene, surface, settings)?;
-        let fits = state.log_gains.len() == fitter.scene.views.len()
-            && state.stage <= fitter.stages.len()
-            && state.texels.len() == state.map_size * state.map_size
-            && state.light.len() == 2 * fitter.settings.environment_height * fitter.settings.environment_height;
+        let views = fitter.scene.views.len();
+        let light = 2 * fitter.settings.environment_height * fitter.settings.environment_height;
+        let texels = state.map_size.saturating_mul(state.map_size);
+        // At the border of two stages the maps still have the size of the stage before.
+        let stage = fitter.stages.get(state.stage).or(fitter.stages.last());
+        let fits = stage.is_some_and(|stage| {
+            state.map_size.is_power_of_two()
+                && state.map_size <= stage.map_size
+                && (state.map_size == stage.map_size || state.step_in_stage == 0)
+                && state.step_in_stage <= stage.steps
+        }) && state.stage <= fitter.stages.len()
+            && state.texels.len() == texels
+            && state.moments.is_of(texels)
+            && state.light.len() == light
+            && state.light_moments.is_of(light)
+            && state.log_gains.len() == views
+            && state.gain_moments.is_of(views);
         if !fits {
             return Err(Error::new(
                 ErrorKind::InvalidScene,
@@ -93,6 +108,7 @@ impl Fitter {
             return Err(Error::new(ErrorKind::InvalidScene, "no view is left to fit to")
                 .remedy("hold out fewer views: --hold-out-every 0 keeps them all"));
         }
+        evidence::check(&scene, &training, &settings)?;
         let held_out = held_out_targets(&scene);
         let stages = stages(&settings);
         Ok(Fitter { scene, surface, stages, settings, training, held_out, state: FitState::default(), work: None })
@@ -174,8 +190,12 @@ impl Fitter {
     pub fn findings(&self) -> Vec<Finding> {
         let events = self.state.events.iter().map(|event| Finding::new(Severity::Note, "fit-event", event.clone()));
         let counts = self.state.non_finite.iter().map(|(name, count)| {
-            Finding::new(Severity::Warning, "non-finite", format!("{count} numbers were not finite: {name}"))
-                .remedy("they were left out; look at that place of the photo or the mesh")
+            Finding::new(
+                Severity::Warning,
+                "non-finite",
+                format!("{count} numbers were not finite or too large: {name}"),
+            )
+            .remedy("they were left out; look at that place of the photo or the mesh")
         });
         events.chain(counts).collect()
     }
@@ -183,6 +203,9 @@ impl Fitter {
     /// Does one step. `stop` may be raised by another thread at any time: the step in progress is then dropped.
     pub fn step(&mut self, stop: &AtomicBool) -> Result<StepOutcome> {
         let began = Instant::now();
+        if !self.look_at_held_out(stop) {
+            return Ok(StepOutcome::Interrupted);
+        }
         while self.stages.get(self.state.stage).is_some_and(|stage| self.state.step_in_stage >= stage.steps) {
             self.state.stage += 1;
             self.state.step_in_stage = 0;
@@ -200,9 +223,6 @@ impl Fitter {
 
         self.state.step += 1;
         self.state.step_in_stage += 1;
-        let look = self.settings.held_out_interval;
-        let held_out_rmse =
-            (look > 0 && self.state.step.is_multiple_of(look)).then(|| self.held_out_rmse(&stage, stop));
         self.state.seconds += began.elapsed().as_secs_f64();
         let row = LossRow {
             step: self.state.step,
@@ -211,9 +231,14 @@ impl Fitter {
             loss: sums.loss,
             image_loss: sums.image_loss,
             consistency: sums.consistency,
-            held_out_rmse: held_out_rmse.flatten(),
+            held_out_rmse: None,
         };
-        self.state.losses.push(row.clone());
-        Ok(StepOutcome::Stepped(row))
+        self.state.losses.push(row);
+        // A look that is stopped is made up for at the begin of the next step.
+        self.look_at_held_out(stop);
+        match self.state.losses.last() {
+            Some(row) => Ok(StepOutcome::Stepped(row.clone())),
+            None => Err(Error::new(ErrorKind::Internal, "a step left no line in the history")),
+        }
     }
 }

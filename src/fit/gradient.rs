@@ -32,6 +32,9 @@ pub(super) struct StepSums {
     pub consistency: f64,
     /// View and derivative of the loss by its gain.
     pub gain_derivatives: Vec<(usize, f32)>,
+    /// Names and numbers of pixels that were not finite; counted when the step is kept, so that a step that is dropped
+    /// and done again counts once.
+    pub non_finite: Vec<(String, u64)>,
 }
 
 impl Fitter {
@@ -52,7 +55,7 @@ impl Fitter {
     }
 
     fn sum_gradient_of(
-        &mut self,
+        &self,
         work: &mut StageWork,
         views: &[(usize, usize)],
         stage: &Stage,
@@ -67,7 +70,7 @@ impl Fitter {
         let mut view_gradients: Vec<ViewGradient<f32>> = Vec::new();
         let mut total: Option<Parameters<f32>> = None;
         for &(slot, visit) in views {
-            let StageWork { weights, parameters, gradient, targets, first_hits } = &mut *work;
+            let StageWork { weights, parameters, gradient, targets, first_hits, .. } = &mut *work;
             let target = &targets[slot];
             let pixels = pixels_of_visit(self.settings.seed, target, visit, quota);
             let tracer = self.tracer(stage, parameters, &sampler, target);
@@ -80,7 +83,7 @@ impl Fitter {
                 return Ok(None);
             }
             sums.gain_derivatives.push((target.view, loss.gain_derivative() * if separate { share } else { 1.0 }));
-            self.note_non_finite(target, &totals, pixels.len())?;
+            sums.non_finite.extend(self.non_finite_of(target, &totals, pixels.len())?);
             sums.image_loss += f64::from(totals.loss) * if separate { f64::from(share) } else { 1.0 };
             if separate {
                 gradient.texels.pull_down(weights);
@@ -156,24 +159,19 @@ impl Fitter {
         PassKey { seed: self.settings.seed, step: self.state.step as u32, view: target.view as u32 }
     }
 
-    /// Counts pixels that were not finite; too many of them end the fit.
-    fn note_non_finite(&mut self, target: &Target, totals: &PassTotals<f32>, pixels: usize) -> Result<()> {
-        let Some(pixel) = totals.first_non_finite else { return Ok(()) };
-        let (row, column) = (pixel / target.camera.width, pixel % target.camera.width);
-        let name = self.scene.views[target.view].name.clone();
-        self.state.count_non_finite(
-            format!("radiance in view {name}, first at row {row} column {column}"),
-            totals.non_finite_pixels,
-        );
-        if totals.non_finite_pixels as f64 > MAX_NON_FINITE_SHARE * pixels as f64 {
-            return Err(Error::new(
-                ErrorKind::NonFinite,
-                format!("{} of {pixels} pixels of a step are not finite", totals.non_finite_pixels),
-            )
-            .at(Place::Pixel { view: name, row, column })
-            .remedy("the last checkpoint is good: resume from it with smaller rates"));
+    /// Name and number of the pixels of a view that were not finite, if any; too many of them end the fit.
+    fn non_finite_of(&self, target: &Target, totals: &PassTotals<f32>, pixels: usize) -> Result<Option<(String, u64)>> {
+        let Some(pixel) = totals.first_non_finite else { return Ok(None) };
+        let (row, column) = target.place_in_photo(&self.scene, pixel);
+        let view = self.scene.views[target.view].name.clone();
+        let count = totals.non_finite_pixels;
+        if count as f64 > MAX_NON_FINITE_SHARE * pixels as f64 {
+            let message = format!("{count} of {pixels} pixels of a step are not finite");
+            return Err(Error::new(ErrorKind::NonFinite, message)
+                .at(Place::Pixel { view, row, column })
+                .remedy("the last checkpoint is good: resume from it with smaller rates"));
         }
-        Ok(())
+        Ok(Some((format!("error of a pixel in {view}, first at row {row} column {column}"), count)))
     }
 }
 

@@ -10,6 +10,7 @@ use crate::render::first_hits::CameraRays;
 use crate::scene::Scene;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 /// Pixels of a held-out view that the curve looks at.
 const HELD_OUT_PIXELS: usize = 20_000;
@@ -30,6 +31,31 @@ pub(super) fn held_out_targets(scene: &Scene) -> Vec<Target> {
 }
 
 impl Fitter {
+    /// Writes the error over the held-out views into the last line of the history, when it is due there. `false` when
+    /// stopped: the line stays without, and the next call fills it in.
+    pub(super) fn look_at_held_out(&mut self, stop: &AtomicBool) -> bool {
+        let every = self.settings.held_out_interval;
+        let due = self.state.losses.last().is_some_and(|row| {
+            every > 0 && row.step == self.state.step && row.step.is_multiple_of(every) && row.held_out_rmse.is_none()
+        });
+        if !due || self.held_out.is_empty() {
+            return true;
+        }
+        let began = Instant::now();
+        // The stage of the step that was done, which `step` has not left yet.
+        let Some(&stage) = self.stages.get(self.state.stage) else { return true };
+        self.enter(&stage);
+        let rmse = self.held_out_rmse(&stage, stop);
+        if stop.load(Ordering::Relaxed) {
+            return false;
+        }
+        self.state.seconds += began.elapsed().as_secs_f64();
+        if let Some(row) = self.state.losses.last_mut() {
+            row.held_out_rmse = rmse;
+        }
+        true
+    }
+
     /// Root mean squared error over the held-out views, on shrunken photographs. `None` without such views.
     pub(super) fn held_out_rmse(&self, stage: &Stage, stop: &AtomicBool) -> Option<f64> {
         let work = self.work.as_ref()?;

@@ -61,28 +61,37 @@ impl<R: Real> PixelLoss<R> for ViewLoss<'_> {
         let weight = R::from_f32(self.weight);
         let mut derivative = PixelDerivative { loss: R::zero(), d_first: [R::zero(); 3], d_second: [R::zero(); 3] };
         let mut d_gain = R::zero();
+        let clipped = if state.is_clipped() { self.target.clipped_at(self.scene, pixel) } else { [false; 3] };
         for channel in 0..3 {
-            let photo_value = photo[channel];
-            let mean = 0.5 * (estimate.first[channel].to_f32() + estimate.second[channel].to_f32()) * self.gain;
-            // A clipped channel says only that the radiance is at least this much.
-            if state.is_clipped() && photo_value >= CLIPPED_RADIANCE && mean >= photo_value {
+            let photo_value = R::from_f32(photo[channel]);
+            if clipped[channel] {
+                // The radiance is at least this much. The mean of both estimates is compared: with their product one
+                // half above the bound could push the other down.
+                let half = R::from_f32(0.5);
+                let sum = estimate.first[channel] + estimate.second[channel];
+                let rest = sum * half * gain - photo_value;
+                if rest.to_f32() < 0.0 {
+                    derivative.loss += weight * rest * rest;
+                    derivative.d_first[channel] = weight * rest * gain;
+                    derivative.d_second[channel] = weight * rest * gain;
+                    d_gain += weight * rest * sum;
+                }
                 continue;
             }
-            let first = estimate.first[channel] * gain - R::from_f32(photo_value);
-            let second = estimate.second[channel] * gain - R::from_f32(photo_value);
+            let first = estimate.first[channel] * gain - photo_value;
+            let second = estimate.second[channel] * gain - photo_value;
             derivative.loss += weight * first * second;
             derivative.d_first[channel] = weight * second * gain;
             derivative.d_second[channel] = weight * first * gain;
             d_gain += weight * (second * estimate.first[channel] + first * estimate.second[channel]);
         }
-        let units = (f64::from(d_gain.to_f32()) * GAIN_UNIT) as i64;
+        // Held in a range in which the sum over all pixels cannot wrap.
+        let most = (1u64 << 62) as f64 / self.target.pixel_count() as f64;
+        let units = (f64::from(d_gain.to_f32()) * GAIN_UNIT).clamp(-most, most) as i64;
         self.d_gain.fetch_add(units as u64, Ordering::Relaxed);
         Some(derivative)
     }
 }
-
-/// Linear radiance of an 8-bit sRGB value of 254: at and above it a channel counts as clipped.
-pub const CLIPPED_RADIANCE: f32 = 0.991;
 
 #[cfg(test)]
 mod tests {
@@ -133,6 +142,53 @@ mod tests {
         let result = at(&scene, estimate, true).unwrap();
         assert_eq!(result.d_first[0], 0.0);
         assert!(result.d_first[1] > 0.0 && result.d_first[2] < 0.0);
+    }
+
+    #[test]
+    fn a_shrunk_pixel_with_a_clipped_part_is_a_lower_bound_as_well() {
+        let mut scene = scene(Vec3::ONE, PixelState::SurfaceClipped);
+        let view = &mut scene.views[0];
+        view.camera = Camera::looking_at(Vec3::Z, Vec3::ZERO, 2, 1, 1.0);
+        // Clipped in red on the left half; green is known everywhere.
+        let half = [Vec3::new(1.0, 0.5, 0.3), Vec3::new(0.5, 0.5, 0.3)];
+        view.photo = Photo::Linear32(Image::from_pixels(2, 2, [half, half].concat()));
+        view.camera.height = 2;
+        view.states = Image::from_pixels(2, 2, vec![PixelState::SurfaceClipped, PixelState::Surface].repeat(2));
+        let target = Target::new(&scene, 0, 1);
+        let at = |value: f64| {
+            let estimate = PixelEstimate { first: [value; 3], second: [value; 3], escaped: 0.0 };
+            ViewLoss::new(&scene, &target, 1.0, 1.0, true).at(0, &estimate).unwrap()
+        };
+        assert_eq!(at(0.9).d_first[0], 0.0, "above the mean of 0.75, which is a bound");
+        assert!(at(0.9).d_first[1] > 0.0, "green is known");
+        assert!(at(0.6).d_first[0] < 0.0);
+    }
+
+    #[test]
+    fn below_the_bound_no_estimate_is_pushed_down() {
+        let scene = scene(Vec3::ONE, PixelState::SurfaceClipped);
+        let estimate = PixelEstimate { first: [1.8; 3], second: [0.0; 3], escaped: 0.0 };
+        let result = at(&scene, estimate, true).unwrap();
+        assert!(result.d_first[0] < 0.0 && result.d_second[0] < 0.0);
+    }
+
+    #[test]
+    fn a_gain_under_a_sun_keeps_its_sign() {
+        let scene = scene(Vec3::ZERO, PixelState::Surface);
+        let target = Target::new(&scene, 0, 0);
+        let loss = ViewLoss::new(&scene, &target, 1.0, 1.0, true);
+        for _ in 0..3 {
+            PixelLoss::<f32>::at(&loss, 0, &PixelEstimate { first: [1e6; 3], second: [1e6; 3], escaped: 0.0 }).unwrap();
+        }
+        assert!(loss.gain_derivative() > 0.0, "{}", loss.gain_derivative());
+    }
+
+    #[test]
+    fn a_photo_that_is_not_finite_says_nothing() {
+        for value in [f32::NAN, f32::INFINITY, -f32::INFINITY, 1e13] {
+            let scene = scene(Vec3::new(0.1, value, 0.1), PixelState::SurfaceClipped);
+            assert!(at(&scene, PixelEstimate { first: [0.5; 3], second: [0.5; 3], escaped: 0.0 }, true).is_none());
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! Read in this order: [`settings`] says what can be chosen, [`schedule`] turns it into stages, [`targets`] holds the
 //! photographs at the resolution of a stage, [`loss`] compares a pixel with its photo, [`consistency`] compares the
 //! gradients of views, [`adam`] moves the numbers, and [`fitter`] is the loop body: one call, one step.
-//! Its parts stand in the order they run: `work` prepares a stage, `batch` picks views and pixels, `gradient` adds them
+//! Its parts stand in the order they run: `evidence` looks at what is given, `work` prepares a stage, `batch` picks views and pixels, `gradient` adds them
 //! up, `weigh` applies consistency, `advance` moves the numbers, `held_out` judges them. [`state`] is all they change.
 //! [`start`] chooses where to begin, [`gauge`] names the freedom that photographs leave, [`checkpoint`] saves it all.
 //!
@@ -14,6 +14,7 @@ mod advance;
 mod batch;
 pub mod checkpoint;
 pub mod consistency;
+mod evidence;
 pub mod fitter;
 pub mod gauge;
 mod gradient;

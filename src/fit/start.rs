@@ -27,6 +27,8 @@ pub struct StartValues {
 
 /// Specular reflectance to begin with: a dielectric's.
 const START_SPECULAR: f32 = 0.04;
+/// Brightest grey of a surface to begin with.
+const BRIGHTEST_GREY: f32 = 0.8;
 /// Roughness `r` to begin with, the paper's.
 const START_ROUGHNESS: f32 = 0.5;
 
@@ -99,8 +101,31 @@ pub fn measured(scene: &Scene, surface: &Surface, targets: &[Target], settings: 
     let mean_light: Vec3 =
         (0..width * height).map(|index| environment.radiance.pixels()[index] * weight(index) as f32).sum::<Vec3>()
             / (4.0 * std::f32::consts::PI);
+    let (environment, mean_light) = brightened(environment, mean_light, surface_mean, &seen, light_seen as f32);
     let grey = surface_mean.element_sum() / mean_light.element_sum().max(1e-6);
-    StartValues { texel: texel(grey.clamp(0.05, 0.8), START_SPECULAR), environment, light_seen }
+    StartValues { texel: texel(grey.clamp(0.05, BRIGHTEST_GREY), START_SPECULAR), environment, light_seen }
+}
+
+/// A light under which the surface can be as bright as it is: what the seen texels leave unexplained comes from those
+/// that no photo shows. So a black cloth behind an object is not taken for a night. Returns the light and its mean.
+fn brightened(
+    mut environment: Environment,
+    mean_light: Vec3,
+    surface_mean: Vec3,
+    seen: &[bool],
+    light_seen: f32,
+) -> (Environment, Vec3) {
+    let missing = (surface_mean / BRIGHTEST_GREY - mean_light).max(Vec3::ZERO);
+    let unseen = 1.0 - light_seen;
+    if unseen < 0.01 || missing == Vec3::ZERO {
+        return (environment, mean_light);
+    }
+    for (radiance, &seen) in environment.radiance.pixels_mut().iter_mut().zip(seen) {
+        if !seen {
+            *radiance += missing / unseen;
+        }
+    }
+    (environment, mean_light + missing)
 }
 
 /// Fills unknown texels of a latitude-longitude map by relaxation towards the mean of their neighbours (Laplace).

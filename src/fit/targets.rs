@@ -13,7 +13,38 @@ pub struct Target {
     /// The camera, shrunk like the photo.
     pub camera: Camera,
     /// Shrunk pixels; `None` at full size, where the view itself is read.
-    shrunk: Option<(Vec<Vec3>, Vec<PixelState>)>,
+    shrunk: Option<Shrunk>,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Shrunk {
+    radiance: Vec<Vec3>,
+    states: Vec<PixelState>,
+    /// Channels in which a pixel of the photo is clipped: there the mean is a lower bound as well.
+    clipped: Vec<[bool; 3]>,
+}
+
+/// Linear radiance of an 8-bit sRGB value of 254: at and above it a channel of a clipped pixel counts as clipped.
+pub const CLIPPED_RADIANCE: f32 = 0.991;
+
+/// Beyond this a number in a photo is a defect, no radiance: its square, summed over a picture, would leave the range
+/// of `f32`.
+pub const LARGEST_RADIANCE: f32 = 1e12;
+
+/// Whether all channels can be a radiance.
+pub fn is_radiance(value: Vec3) -> bool {
+    // Written so that NaN fails too.
+    value.to_array().iter().all(|channel| channel.abs() <= LARGEST_RADIANCE)
+}
+
+/// A pixel of a photo; one that is no radiance says nothing.
+fn pixel_of(view: &View, row: usize, column: usize) -> (Vec3, PixelState) {
+    let radiance = view.photo.radiance(row, column);
+    if is_radiance(radiance) { (radiance, view.states[(row, column)]) } else { (Vec3::ZERO, PixelState::Ignored) }
+}
+
+fn clipped_channels(radiance: Vec3, state: PixelState) -> [bool; 3] {
+    radiance.to_array().map(|value| state.is_clipped() && value >= CLIPPED_RADIANCE)
 }
 
 impl Target {
@@ -32,13 +63,27 @@ impl Target {
     #[inline]
     pub fn at(&self, scene: &Scene, pixel: usize) -> (Vec3, PixelState) {
         match &self.shrunk {
-            Some((radiance, states)) => (radiance[pixel], states[pixel]),
+            Some(shrunk) => (shrunk.radiance[pixel], shrunk.states[pixel]),
+            None => pixel_of(&scene.views[self.view], pixel / self.camera.width, pixel % self.camera.width),
+        }
+    }
+
+    /// In which channels a pixel's radiance is only known to be at least what [`Target::at`] says.
+    #[inline]
+    pub fn clipped_at(&self, scene: &Scene, pixel: usize) -> [bool; 3] {
+        match &self.shrunk {
+            Some(shrunk) => shrunk.clipped[pixel],
             None => {
-                let view = &scene.views[self.view];
-                let (row, column) = (pixel / self.camera.width, pixel % self.camera.width);
-                (view.photo.radiance(row, column), view.states[(row, column)])
+                let (radiance, state) = self.at(scene, pixel);
+                clipped_channels(radiance, state)
             }
         }
+    }
+
+    /// Row and column in the photo of the upper left corner of a pixel.
+    pub fn place_in_photo(&self, scene: &Scene, pixel: usize) -> (usize, usize) {
+        let factor = scene.views[self.view].camera.width / self.camera.width;
+        (pixel / self.camera.width * factor, pixel % self.camera.width * factor)
     }
 
     /// Number of pixels.
@@ -52,23 +97,27 @@ pub fn targets(scene: &Scene, views: &[usize], level: usize) -> Vec<Target> {
     views.par_iter().map(|&view| Target::new(scene, view, level)).collect()
 }
 
-fn shrink(source: &View, camera: &Camera, factor: usize) -> (Vec<Vec3>, Vec<PixelState>) {
-    let mut radiance = Vec::with_capacity(camera.width * camera.height);
-    let mut states = Vec::with_capacity(camera.width * camera.height);
+fn shrink(source: &View, camera: &Camera, factor: usize) -> Shrunk {
+    let mut shrunk = Shrunk::default();
     for row in 0..camera.height {
         for column in 0..camera.width {
             let mut sum = Vec3::ZERO;
             let mut state = None;
+            let mut clipped = [false; 3];
             for i in 0..factor * factor {
                 let place = (row * factor + i / factor, column * factor + i % factor);
-                sum += source.photo.radiance(place.0, place.1);
-                state = Some(join(state, source.states[place]));
+                let (radiance, own) = pixel_of(source, place.0, place.1);
+                sum += radiance;
+                state = Some(join(state, own));
+                let own = clipped_channels(radiance, own);
+                clipped = std::array::from_fn(|channel| clipped[channel] || own[channel]);
             }
-            radiance.push(sum / (factor * factor) as f32);
-            states.push(state.unwrap_or_default());
+            shrunk.radiance.push(sum / (factor * factor) as f32);
+            shrunk.states.push(state.unwrap_or_default());
+            shrunk.clipped.push(clipped);
         }
     }
-    (radiance, states)
+    shrunk
 }
 
 /// The state of a pixel made of several.

@@ -85,7 +85,7 @@ impl Fitter {
         scale: f32,
         stop: &AtomicBool,
     ) -> bool {
-        let StageWork { weights, parameters, gradient, targets, first_hits } = work;
+        let StageWork { weights, parameters, gradient, targets, first_hits, .. } = work;
         let target = &targets[slot];
         let lift = |value: f32| Dual::new(value, 0.0f32);
         let mut base: Vec<Texel<Dual<f32>>> =

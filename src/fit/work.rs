@@ -9,6 +9,7 @@ use crate::atlas::covered_texels;
 use crate::material::texels::{PyramidWeights, Texel, TexelPyramid};
 use crate::render::Parameters;
 use crate::render::first_hits::FirstHits;
+use crate::scene::{PixelState, Scene};
 
 /// What a stage needs and no checkpoint holds: all of it follows from scene, settings and state.
 pub(super) struct StageWork {
@@ -17,6 +18,8 @@ pub(super) struct StageWork {
     pub gradient: Parameters<f32>,
     pub targets: Vec<Target>,
     pub first_hits: Vec<Option<FirstHits>>,
+    /// Mean radiance of the pixels that are evidence, over all photos and channels.
+    pub mean_of_photos: f32,
 }
 
 impl Fitter {
@@ -42,7 +45,8 @@ impl Fitter {
         };
         let targets = targets(&self.scene, &self.training, stage.photo_level);
         let first_hits = self.cache_first_hits(&targets);
-        self.work = Some(StageWork { weights, parameters, gradient, targets, first_hits });
+        let mean_of_photos = mean_of_photos(&self.scene, &targets);
+        self.work = Some(StageWork { weights, parameters, gradient, targets, first_hits, mean_of_photos });
     }
 
     /// Traces first hits for as many views as the memory budget holds, when each view is likely to be visited often
@@ -73,6 +77,22 @@ impl Fitter {
             })
             .collect()
     }
+}
+
+/// Mean radiance over all pixels that say something, on at most about 128 x 128 pixels a photo.
+fn mean_of_photos(scene: &Scene, targets: &[Target]) -> f32 {
+    let (mut sum, mut count) = (0.0f64, 0u64);
+    for target in targets {
+        let stride = (target.pixel_count() >> 14).max(1);
+        for pixel in (0..target.pixel_count()).step_by(stride) {
+            let (radiance, state) = target.at(scene, pixel);
+            if state != PixelState::Ignored {
+                sum += f64::from(radiance.element_sum().max(0.0)) / 3.0;
+                count += 1;
+            }
+        }
+    }
+    (sum / count.max(1) as f64) as f32
 }
 
 /// Maps of twice the size: each texel becomes four.

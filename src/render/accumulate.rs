@@ -44,6 +44,12 @@ pub struct PixelDerivative<R> {
     pub d_second: [R; 3],
 }
 
+impl<R: Real> PixelDerivative<R> {
+    fn is_finite(&self) -> bool {
+        self.loss.is_finite() && self.d_first.iter().chain(&self.d_second).all(|value| value.is_finite())
+    }
+}
+
 /// A loss over pixels.
 pub trait PixelLoss<R>: Sync {
     /// The loss and its derivative at a pixel (row-major index); `None` where the photo says nothing.
@@ -150,6 +156,11 @@ fn work_chunk<R: Real>(
             continue;
         }
         let Some(derivative) = loss.at(pixel, &estimate) else { continue };
+        if !derivative.is_finite() {
+            totals.non_finite_pixels += 1;
+            totals.first_non_finite.get_or_insert(pixel);
+            continue;
+        }
         totals.loss += derivative.loss;
         totals.pixels += 1;
         let half = (samples / 2).max(1);

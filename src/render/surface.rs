@@ -38,6 +38,10 @@ impl Surface {
             return Err(Error::new(ErrorKind::InvalidScene, "the mesh has no texture coordinates or no normals")
                 .remedy("build an atlas first"));
         }
+        if let Some(vertex) = mesh.uvs.iter().position(|uv| !uv.is_finite()) {
+            let message = format!("the texture coordinate of vertex {vertex} is not finite");
+            return Err(Error::new(ErrorKind::NonFinite, message).remedy("build an atlas anew: --uv rebuild"));
+        }
         let bvh = Bvh::build(&mesh.positions, &mesh.triangles)?;
         let uv_per_length = (0..mesh.triangles.len())
             .map(|triangle| {
