@@ -146,8 +146,7 @@ fn damaged_mesh_files_never_panic() {
 
 /// A small BlendedMVS folder, then a change to it; the error of reading it.
 fn folder_error(change: impl FnOnce(&Path)) -> Error {
-    let (_keep, folder) = folder();
-    write_blended_mvs(&folder, &scene(2), &FolderStyle::default());
+    let (_keep, folder) = copy_of(&BLENDED_MVS);
     change(&folder);
     read(&folder, &ReadSettings { pixel_centre: PixelCentre::Integer, up: Up::Y, ..Default::default() }).unwrap_err()
 }
@@ -260,8 +259,7 @@ fn bad_photos_and_masks_are_named() {
 
 /// A small exchange folder, then a change to it; the error of reading it.
 fn exchange_error(change: impl FnOnce(&Path)) -> Error {
-    let (_keep, folder) = folder();
-    write_exchange(&folder, &scene(2));
+    let (_keep, folder) = copy_of(&EXCHANGE);
     change(&folder);
     read(&folder, &ReadSettings::default()).unwrap_err()
 }
