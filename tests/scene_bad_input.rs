@@ -21,10 +21,16 @@ fn assert_error(error: &Error, kind: ErrorKind, says: &str) {
     assert_ne!(*error.place(), Place::Nowhere, "no place: {text}");
 }
 
+/// Writes a file anew. Cutting an old one to nothing would make some file systems flush the disk each time.
+fn put(path: impl AsRef<Path>, content: impl AsRef<[u8]>) -> std::io::Result<()> {
+    let _ = std::fs::remove_file(&path);
+    std::fs::write(path, content)
+}
+
 fn mesh_error(name: &str, content: &[u8]) -> Error {
     let (_keep, folder) = folder();
     let path = folder.join(name);
-    std::fs::write(&path, content).unwrap();
+    put(&path, content).unwrap();
     read_mesh(&path).unwrap_err()
 }
 
@@ -137,7 +143,7 @@ fn damaged_mesh_files_never_panic() {
             }
             damaged.truncate(1 + random.below(damaged.len()));
             let path = folder.join(name);
-            std::fs::write(&path, &damaged).unwrap();
+            put(&path, &damaged).unwrap();
             refused += usize::from(read_mesh(&path).is_err());
         }
     }
@@ -146,8 +152,7 @@ fn damaged_mesh_files_never_panic() {
 
 /// A small BlendedMVS folder, then a change to it; the error of reading it.
 fn folder_error(change: impl FnOnce(&Path)) -> Error {
-    let (_keep, folder) = folder();
-    write_blended_mvs(&folder, &scene(2), &FolderStyle::default());
+    let (_keep, folder) = copy_of(&BLENDED_MVS);
     change(&folder);
     read(&folder, &ReadSettings { pixel_centre: PixelCentre::Integer, up: Up::Y, ..Default::default() }).unwrap_err()
 }
@@ -159,7 +164,7 @@ fn bad_camera_files_are_named_by_line() {
             let path = folder.join("cams/00000001_cam.txt");
             let text = std::fs::read_to_string(&path).unwrap();
             assert!(text.contains(from));
-            std::fs::write(&path, text.replace(from, to)).unwrap();
+            put(&path, text.replace(from, to)).unwrap();
         })
     };
     assert_error(&edited("extrinsic\n", "extrinsic\nnan "), ErrorKind::NonFinite, "00000001_cam.txt, line 2");
@@ -175,16 +180,16 @@ fn bad_camera_files_are_named_by_line() {
     let truncated = folder_error(|folder| {
         let path = folder.join("cams/00000000_cam.txt");
         let text = std::fs::read_to_string(&path).unwrap();
-        std::fs::write(&path, &text[..90]).unwrap();
+        put(&path, &text[..90]).unwrap();
     });
     assert_error(&truncated, ErrorKind::Malformed, "the file ends before the extrinsic matrix");
     assert_error(
-        &folder_error(|folder| std::fs::write(folder.join("cams/00000000_cam.txt"), "").unwrap()),
+        &folder_error(|folder| put(folder.join("cams/00000000_cam.txt"), "").unwrap()),
         ErrorKind::Malformed,
         "line 1",
     );
     assert_error(
-        &folder_error(|folder| std::fs::write(folder.join("cams/00000000_cam.txt"), [0xff; 9]).unwrap()),
+        &folder_error(|folder| put(folder.join("cams/00000000_cam.txt"), [0xff; 9]).unwrap()),
         ErrorKind::Malformed,
         "byte 0: the file is not text",
     );
@@ -240,14 +245,10 @@ fn bad_photos_and_masks_are_named() {
     let photo = "blended_images/00000001.png";
     let truncated = folder_error(|folder| {
         let bytes = std::fs::read(folder.join(photo)).unwrap();
-        std::fs::write(folder.join(photo), &bytes[..bytes.len() / 2]).unwrap();
+        put(folder.join(photo), &bytes[..bytes.len() / 2]).unwrap();
     });
     assert_error(&truncated, ErrorKind::Malformed, "00000001.png");
-    assert_error(
-        &folder_error(|folder| std::fs::write(folder.join(photo), b"").unwrap()),
-        ErrorKind::Malformed,
-        "00000001.png",
-    );
+    assert_error(&folder_error(|folder| put(folder.join(photo), b"").unwrap()), ErrorKind::Malformed, "00000001.png");
     let other_size = folder_error(|folder| {
         file::write_png_srgb8(&folder.join("masks/00000001.png"), &Image::filled(64, 48, [255; 3])).unwrap();
     });
@@ -260,8 +261,7 @@ fn bad_photos_and_masks_are_named() {
 
 /// A small exchange folder, then a change to it; the error of reading it.
 fn exchange_error(change: impl FnOnce(&Path)) -> Error {
-    let (_keep, folder) = folder();
-    write_exchange(&folder, &scene(2));
+    let (_keep, folder) = copy_of(&EXCHANGE);
     change(&folder);
     read(&folder, &ReadSettings::default()).unwrap_err()
 }
@@ -273,7 +273,7 @@ fn bad_exchange_folders_and_manifests_are_named() {
         exchange_error(|folder| {
             let text = std::fs::read_to_string(folder.join(json)).unwrap();
             assert!(text.contains(from), "{text}");
-            std::fs::write(folder.join(json), text.replace(from, to)).unwrap();
+            put(folder.join(json), text.replace(from, to)).unwrap();
         })
     };
     assert_error(&edited("\"w2c\"", "\"w2d\""), ErrorKind::Malformed, "cameras.json, line 1");
@@ -286,7 +286,7 @@ fn bad_exchange_folders_and_manifests_are_named() {
     assert_error(&edited("\"file\"", "\"distortion\":[0.1],\"file\""), ErrorKind::Unsupported, "distortion");
     assert_error(&edited("00000001.exr", "00000000.exr"), ErrorKind::InvalidScene, "two views are named '00000000'");
     assert_error(
-        &exchange_error(|folder| std::fs::write(folder.join(json), r#"{"views": []}"#).unwrap()),
+        &exchange_error(|folder| put(folder.join(json), r#"{"views": []}"#).unwrap()),
         ErrorKind::InvalidScene,
         "no views",
     );
@@ -301,7 +301,7 @@ fn bad_exchange_folders_and_manifests_are_named() {
         "00000001.exr",
     );
     assert_error(
-        &exchange_error(|folder| std::fs::write(folder.join("scene.json"), "{").unwrap()),
+        &exchange_error(|folder| put(folder.join("scene.json"), "{").unwrap()),
         ErrorKind::Malformed,
         "scene.json, line 1",
     );
@@ -314,8 +314,7 @@ fn bad_exchange_folders_and_manifests_are_named() {
     });
     assert_error(&truth, ErrorKind::InvalidScene, "the map is 16 x 4, diffuse.exr is 8 x 4");
 
-    let manifest =
-        |text: &'static str| exchange_error(|folder| std::fs::write(folder.join("scene.toml"), text).unwrap());
+    let manifest = |text: &'static str| exchange_error(|folder| put(folder.join("scene.toml"), text).unwrap());
     assert_error(
         &manifest("mesh = \"mesh.obj\"\nimages = \"views\"\ncamera = \"cameras.json\"\n"),
         ErrorKind::Malformed,

@@ -256,3 +256,36 @@ pub fn folder() -> (tempfile::TempDir, PathBuf) {
     let path = folder.path().to_path_buf();
     (folder, path)
 }
+
+/// A folder for one test with a copy of a template that is written once. Copies are not flushed to the disk, so that many
+/// tests may spoil one each.
+pub fn copy_of(template: &LazyLock<tempfile::TempDir>) -> (tempfile::TempDir, PathBuf) {
+    fn copy(from: &Path, to: &Path) {
+        std::fs::create_dir_all(to).unwrap();
+        for entry in std::fs::read_dir(from).unwrap() {
+            let (path, target) = (entry.as_ref().unwrap().path(), to.join(entry.unwrap().file_name()));
+            if path.is_dir() {
+                copy(&path, &target);
+            } else {
+                std::fs::copy(&path, &target).unwrap();
+            }
+        }
+    }
+    let (keep, path) = folder();
+    copy(template.path(), &path);
+    (keep, path)
+}
+
+/// A BlendedMVS folder of two views.
+pub static BLENDED_MVS: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
+    let (keep, path) = folder();
+    write_blended_mvs(&path, &scene(2), &FolderStyle::default());
+    keep
+});
+
+/// An exchange folder of two views.
+pub static EXCHANGE: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
+    let (keep, path) = folder();
+    write_exchange(&path, &scene(2));
+    keep
+});
