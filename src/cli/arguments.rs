@@ -38,6 +38,51 @@ pub enum Task {
     Render(RenderOptions),
     /// Score a run against the photographs of a scene.
     Compare(CompareOptions),
+    /// Check the program against itself.
+    #[command(subcommand)]
+    Audit(AuditTask),
+    /// Measure time and memory.
+    #[command(subcommand)]
+    Bench(BenchTask),
+}
+
+/// What to audit.
+#[derive(Debug, Subcommand)]
+pub enum AuditTask {
+    /// Compare reverse-mode derivatives with central differences in f64 under frozen randomness.
+    Gradients(AuditOptions),
+}
+
+/// Options of `patina audit gradients`.
+#[derive(Debug, Args)]
+pub struct AuditOptions {
+    /// Parameters to compare over all maps and the light.
+    #[arg(long, default_value_t = crate::insight::audit::AuditSettings::default().parameters)]
+    pub parameters: usize,
+    /// Parameters to compare for the exact gradient of multi-view consistency.
+    #[arg(long, default_value_t = crate::insight::audit::AuditSettings::default().consistency_parameters)]
+    pub consistency_parameters: usize,
+    /// Seed of the scene's photographs, the paths and the choice of parameters.
+    #[arg(long, default_value_t = crate::insight::audit::AuditSettings::default().seed)]
+    pub seed: u64,
+}
+
+/// What to measure.
+#[derive(Debug, Subcommand)]
+pub enum BenchTask {
+    /// Growth with triangles, views and map size: read, atlas, tracer, one step, peak memory.
+    Scale(BenchOptions),
+}
+
+/// Options of `patina bench scale`.
+#[derive(Debug, Args)]
+pub struct BenchOptions {
+    /// Two small cases only.
+    #[arg(long)]
+    pub quick: bool,
+    /// Folder of the tables.
+    #[arg(short, long, default_value = "patina-bench")]
+    pub output: PathBuf,
 }
 
 /// Options of `patina demo`.

@@ -18,12 +18,13 @@ pub struct ViewLoss<'a> {
     pub gain: f32,
     /// Whether background pixels are evidence for the light.
     pub use_background: bool,
-    /// Derivative of the loss by the gain, in units of 2^-40, added up in whole numbers so that the order of pixels
-    /// does not matter.
+    /// Derivative of the loss by the gain over `weight`, in units of 2^-20, added up in whole numbers so that the order
+    /// of pixels does not matter. A pixel adds at most 2^42 units: a million of them cannot overflow.
     pub d_gain: AtomicU64,
 }
 
-const GAIN_UNIT: f64 = (1u64 << 40) as f64;
+const GAIN_UNIT: f64 = (1u64 << 20) as f64;
+const LARGEST_GAIN_UNITS: f64 = (1u64 << 42) as f64;
 
 impl<'a> ViewLoss<'a> {
     /// The loss of a view.
@@ -33,7 +34,7 @@ impl<'a> ViewLoss<'a> {
 
     /// Derivative of the loss by the gain.
     pub fn gain_derivative(&self) -> f32 {
-        (self.d_gain.load(Ordering::Relaxed) as i64 as f64 / GAIN_UNIT) as f32
+        (self.d_gain.load(Ordering::Relaxed) as i64 as f64 / GAIN_UNIT * f64::from(self.weight)) as f32
     }
 
     /// What a pixel is evidence for, given which share of its camera rays met nothing.
@@ -86,8 +87,8 @@ impl<R: Real> PixelLoss<R> for ViewLoss<'_> {
             d_gain += weight * (second * estimate.first[channel] + first * estimate.second[channel]);
         }
         // Held in a range in which the sum over all pixels cannot wrap.
-        let most = (1u64 << 62) as f64 / self.target.pixel_count() as f64;
-        let units = (f64::from(d_gain.to_f32()) * GAIN_UNIT).clamp(-most, most) as i64;
+        let over_weight = f64::from(d_gain.to_f32()) / f64::from(self.weight).max(f64::MIN_POSITIVE);
+        let units = (over_weight * GAIN_UNIT).clamp(-LARGEST_GAIN_UNITS, LARGEST_GAIN_UNITS) as i64;
         self.d_gain.fetch_add(units as u64, Ordering::Relaxed);
         Some(derivative)
     }

@@ -11,6 +11,7 @@ pub mod demo;
 pub mod outcome;
 pub mod pictures;
 pub mod prepare;
+pub mod scale;
 pub mod slot;
 pub mod worker;
 

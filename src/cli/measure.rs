@@ -1,0 +1,43 @@
+//! `patina audit` and `patina bench`.
+
+use super::arguments::{AuditOptions, BenchOptions};
+use crate::error::{Error, ErrorKind, Result};
+use crate::insight::audit::{AuditSettings, built_in, gradients};
+use crate::job::scale;
+use std::sync::atomic::AtomicBool;
+
+/// Audits gradients on the built-in audit scene; an audit beyond its limits is an error.
+pub fn audit_gradients(options: &AuditOptions, json: bool) -> Result<()> {
+    let settings = AuditSettings {
+        parameters: options.parameters,
+        consistency_parameters: options.consistency_parameters,
+        seed: options.seed,
+        ..Default::default()
+    };
+    let built = built_in(&settings)?;
+    let stop = AtomicBool::new(false);
+    let report = gradients(&built.scene, &built.surface, &built.parameters, &built.weights, &settings, &stop)?;
+    if json {
+        println!("{}", serde_json::json!({"event": "audit", "report": report}));
+    } else {
+        println!("{}", report.to_markdown());
+    }
+    if report.passes() {
+        return Ok(());
+    }
+    Err(Error::new(ErrorKind::Numerical, "a derivative is not that of its function; the worst rows are above")
+        .remedy("a defect of this program: report it with the table"))
+}
+
+/// Measures growth and writes the table as Markdown, CSV and SVG.
+pub fn bench_scale(options: &BenchOptions, json: bool) -> Result<()> {
+    std::fs::create_dir_all(&options.output).map_err(|source| Error::writing(&options.output, source))?;
+    let table = scale::run(options.quick, &options.output, &|case| {
+        if !json {
+            eprintln!("{case}");
+        }
+    })?;
+    table.write(&options.output, "scale")?;
+    println!("{}", table.to_markdown());
+    Ok(())
+}
