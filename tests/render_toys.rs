@@ -150,6 +150,7 @@ fn pictures_agree_with_mitsuba_at_one_and_three_surface_hits() {
             assert!(own.relative_bias.abs() < 4.0 * own.bias_error, "{sub} view {view}: {own:?}");
             // Few groups of a skewed distribution leave long tails; a wrong renderer leaves a shifted mean.
             assert!(own.mean_z.abs() < 0.05 && own.outliers < 0.01, "{sub} view {view}: {own:?}");
+            assert!(own.mean_z_squared < 3.0, "{sub} view {view}: {own:?}");
         }
     }
 }
