@@ -55,7 +55,8 @@ fn the_four_settings_of_consistency() {
     assert!(distance(&none, &exact) > 10.0 * distance(&none, &released), "the exact gradient is another one");
     assert!(released.state().losses.iter().all(|row| row.consistency < 1e-2));
     assert!(exact.state().losses.iter().all(|row| row.consistency > 0.0 && row.consistency <= 1.0));
-    assert!(constant.state().losses.iter().all(|row| row.loss >= row.image_loss));
+    // The unbiased image loss may fall below zero; the factor makes it larger either way.
+    assert!(constant.state().losses.iter().all(|row| row.loss.abs() >= row.image_loss.abs()));
 }
 
 #[test]
