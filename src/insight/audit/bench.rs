@@ -124,7 +124,7 @@ impl<'a> Bench<'a> {
                 lobe_strength: self.settings.lobe_strength,
                 background_visible: self.scenes[*scene].background == Background::Environment,
                 two_sided: false,
-            camera_cone_radians: target.camera.pixel_angle_radians() / (self.settings.samples as f32).sqrt(),
+                camera_cone_radians: target.camera.pixel_angle_radians() / (self.settings.samples as f32).sqrt(),
                 bounce_cone_radians: BOUNCE_CONE_RADIANS,
             },
         }
