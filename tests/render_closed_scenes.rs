@@ -238,6 +238,11 @@ fn black_light_gives_black_and_backs_are_black() {
     for (radiance, &coverage) in behind.radiance.pixels().iter().zip(behind.coverage.pixels()) {
         assert!(coverage < 1.0 || *radiance == Vec3::ZERO, "a back shines: {radiance}");
     }
+    // With both sides drawn it is as bright as from the front under an even light.
+    let both = PictureSettings { two_sided: true, lobe_strength: 0.0, max_bounces: 1, samples: 64, ..settings };
+    let shining = picture(&square, &camera, &uniform(lambert(0.5), &constant_light(1.0)), &both);
+    let (mean, error) = mean_and_error(&shining, |coverage| coverage == 1.0);
+    assert!((mean - 0.5).abs() < 4.0 * error + 1e-3, "{mean} +- {error}");
 }
 
 #[test]
