@@ -1,14 +1,16 @@
 //! The command line; it holds no algorithm.
 //!
-//! [`arguments`] is what can be typed, [`fit`] drives a job and shows its events, [`commands`] holds the rest. Whatever
+//! [`arguments`] is what can be typed, [`fit`] drives a job and shows its events, [`study`] runs studies,
+//! [`commands`] holds the rest. Whatever
 //! is asked here can be asked of the library in the same words.
 
 pub mod arguments;
 pub mod commands;
 pub mod fit;
+pub mod study;
 
 use crate::error::{Error, ErrorKind};
-use arguments::{Arguments, Task};
+use arguments::{Arguments, StudyTask, Task};
 use clap::Parser;
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -36,6 +38,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Task::Relight(options)) => commands::relight(&options),
         Some(Task::Render(options)) => commands::render(&options),
         Some(Task::Compare(options)) => commands::compare(&options, json),
+        Some(Task::Study(StudyTask::Mvcl(options))) => study::mvcl(&options, json),
         None => {
             eprintln!("Patina has no window in this build. Try `patina demo`, or `patina --help`.");
             return ExitCode::from(2);
