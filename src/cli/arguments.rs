@@ -44,6 +44,9 @@ pub enum Task {
     /// Measure time and memory.
     #[command(subcommand)]
     Bench(BenchTask),
+    /// Fit scenes with a known truth many times over and write tables and plots.
+    #[command(subcommand)]
+    Study(StudyTask),
 }
 
 /// What to audit.
@@ -82,6 +85,38 @@ pub struct BenchOptions {
     pub quick: bool,
     /// Folder of the tables.
     #[arg(short, long, default_value = "patina-bench")]
+    pub output: PathBuf,
+}
+
+/// What to study.
+#[derive(Debug, Subcommand)]
+pub enum StudyTask {
+    /// What consistency between views changes: errors of pictures, maps and light for its settings, over seeds.
+    Mvcl(MvclOptions),
+}
+
+/// Options of `patina study mvcl`.
+#[derive(Debug, Args)]
+pub struct MvclOptions {
+    /// Exchange folders with their truth; without one, a vase made and photographed in code.
+    pub scenes: Vec<PathBuf>,
+    /// Number of seeds: 1, 2, 3 and so on.
+    #[arg(long, default_value_t = 5)]
+    pub seeds: usize,
+    /// Halved photographs, few steps and few paths.
+    #[arg(long)]
+    pub quick: bool,
+    /// Settings to run; `none` always runs, since changes are against it.
+    #[arg(long, value_enum, value_delimiter = ',')]
+    pub cases: Vec<crate::job::study::Case>,
+    /// Optimiser steps of the first step; 30 when quick, else the default of a fit.
+    #[arg(long)]
+    pub steps_diffuse: Option<usize>,
+    /// Optimiser steps of the second step; 40 when quick, else the default of a fit.
+    #[arg(long)]
+    pub steps_all: Option<usize>,
+    /// Folder of the tables and plots.
+    #[arg(short, long)]
     pub output: PathBuf,
 }
 

@@ -1,16 +1,16 @@
 //! The command line; it holds no algorithm.
 //!
 //! [`arguments`] is what can be typed, [`fit`] drives a job and shows its events, [`measure`] audits and benches,
-//! [`commands`] holds the rest. Whatever
-//! is asked here can be asked of the library in the same words.
+//! [`study`] runs studies, [`commands`] holds the rest. Whatever is asked here can be asked of the library in the same words.
 
 pub mod arguments;
 pub mod commands;
 pub mod fit;
 pub mod measure;
+pub mod study;
 
 use crate::error::{Error, ErrorKind};
-use arguments::{Arguments, AuditTask, BenchTask, Task};
+use arguments::{Arguments, AuditTask, BenchTask, StudyTask, Task};
 use clap::Parser;
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -40,6 +40,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Task::Compare(options)) => commands::compare(&options, json),
         Some(Task::Audit(AuditTask::Gradients(options))) => measure::audit_gradients(&options, json),
         Some(Task::Bench(BenchTask::Scale(options))) => measure::bench_scale(&options, json),
+        Some(Task::Study(StudyTask::Mvcl(options))) => study::mvcl(&options, json),
         None => {
             eprintln!("Patina has no window in this build. Try `patina demo`, or `patina --help`.");
             return ExitCode::from(2);

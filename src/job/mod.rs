@@ -5,7 +5,8 @@
 //! and the window drive the same job, so neither can do what the other cannot.
 //!
 //! [`prepare`] turns a scene into a surface with an atlas, [`worker`] is the thread, [`outcome`] renders, scores and
-//! writes the run folder, [`demo`] makes the built-in scene.
+//! writes the run folder, [`demo`] makes the built-in scene, [`study`]
+//! fits many times over and makes tables.
 
 pub mod demo;
 pub mod outcome;
@@ -13,6 +14,7 @@ pub mod pictures;
 pub mod prepare;
 pub mod scale;
 pub mod slot;
+pub mod study;
 pub mod worker;
 
 pub use prepare::RunSettings;

@@ -17,6 +17,7 @@ use crate::insight::report::{RelitPicture, RelitStrip, ReportImages, ViewPicture
 use crate::insight::scores::{ViewScores, aggregate, score_view};
 use crate::insight::truth::{environment_errors, map_errors};
 use crate::insight::{coverage, memory};
+use crate::light::Environment;
 use crate::material::MaterialMaps;
 use crate::render::picture::{PictureSettings, render};
 use crate::render::{Parameters, Surface};
@@ -106,7 +107,10 @@ pub fn write(
             data.aggregates.push(NamedAggregate { name: name.into(), score });
         }
     }
-    data.truth = truth_errors(scene, surface, &result, relit_errors)?;
+    data.truth = truth_errors(scene, surface, &result.maps, &result.environment)?;
+    if let Some(truth) = data.truth.as_mut().filter(|_| !relit_errors.is_empty()) {
+        truth.relit = Some(aggregate(&relit_errors));
+    }
     timings.push(crate::insight::report::data::StageTime {
         stage: "whole run".into(),
         seconds: began.elapsed().as_secs_f64(),
@@ -304,24 +308,23 @@ fn same_atlas(scene: &Scene, surface: &Surface) -> bool {
         })
 }
 
-fn truth_errors(
+/// Errors of maps and light against the truth of a scene, without relit pictures; `None` where no truth is known. Maps
+/// are compared only where they lie on the texture coordinates of the truth.
+pub(super) fn truth_errors(
     scene: &Scene,
     surface: &Surface,
-    result: &RunResult,
-    relit: Vec<ViewScores>,
+    maps: &MaterialMaps,
+    environment: &Environment,
 ) -> Result<Option<TruthErrors>> {
     let Some(truth) = &scene.truth else { return Ok(None) };
     let mut errors = TruthErrors::default();
     let size = (truth.texels_seen.width(), truth.texels_seen.height());
     if same_atlas(scene, surface) && size == (truth.maps.diffuse.width(), truth.maps.diffuse.height()) {
-        let fitted = resampled(&result.maps, size);
+        let fitted = resampled(maps, size);
         errors.maps = Some(map_errors(&fitted, &truth.maps, &truth.texels_seen)?);
     }
     let light = &truth.environment;
-    errors.environment = Some(environment_errors(&result.environment.resampled(light.width(), light.height()), light)?);
-    if !relit.is_empty() {
-        errors.relit = Some(aggregate(&relit));
-    }
+    errors.environment = Some(environment_errors(&environment.resampled(light.width(), light.height()), light)?);
     Ok(Some(errors))
 }
 
