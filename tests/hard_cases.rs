@@ -301,7 +301,8 @@ fn a_photo_of_another_size_than_its_camera_is_an_error_at_the_view() {
 
 #[test]
 fn cameras_that_are_none_are_errors_at_the_view() {
-    let spoil: [(fn(&mut Camera), ErrorKind); 6] = [
+    type Spoil = fn(&mut Camera);
+    let spoil: [(Spoil, ErrorKind); 6] = [
         (|camera| camera.translation_camera_from_world.x = f32::NAN, ErrorKind::NonFinite),
         (|camera| camera.rotation_camera_from_world.x_axis.y = f32::INFINITY, ErrorKind::NonFinite),
         (|camera| camera.focal_pixels.x = 0.0, ErrorKind::InvalidScene),

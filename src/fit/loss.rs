@@ -154,7 +154,7 @@ mod tests {
         let half = [Vec3::new(1.0, 0.5, 0.3), Vec3::new(0.5, 0.5, 0.3)];
         view.photo = Photo::Linear32(Image::from_pixels(2, 2, [half, half].concat()));
         view.camera.height = 2;
-        view.states = Image::from_pixels(2, 2, vec![PixelState::SurfaceClipped, PixelState::Surface].repeat(2));
+        view.states = Image::from_pixels(2, 2, [PixelState::SurfaceClipped, PixelState::Surface].repeat(2));
         let target = Target::new(&scene, 0, 1);
         let at = |value: f64| {
             let estimate = PixelEstimate { first: [value; 3], second: [value; 3], escaped: 0.0 };
@@ -175,11 +175,16 @@ mod tests {
 
     #[test]
     fn a_gain_under_a_sun_keeps_its_sign() {
-        let scene = scene(Vec3::ZERO, PixelState::Surface);
+        let mut scene = scene(Vec3::ZERO, PixelState::Surface);
+        let view = &mut scene.views[0];
+        view.camera.width = 3;
+        view.photo = Photo::Linear32(Image::filled(3, 1, Vec3::ZERO));
+        view.states = Image::filled(3, 1, PixelState::Surface);
         let target = Target::new(&scene, 0, 0);
         let loss = ViewLoss::new(&scene, &target, 1.0, 1.0, true);
-        for _ in 0..3 {
-            PixelLoss::<f32>::at(&loss, 0, &PixelEstimate { first: [1e6; 3], second: [1e6; 3], escaped: 0.0 }).unwrap();
+        for pixel in 0..3 {
+            let estimate = PixelEstimate::<f32> { first: [1e6; 3], second: [1e6; 3], escaped: 0.0 };
+            loss.at(pixel, &estimate).unwrap();
         }
         assert!(loss.gain_derivative() > 0.0, "{}", loss.gain_derivative());
     }
