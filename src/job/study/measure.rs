@@ -121,6 +121,7 @@ fn sums(
     let scene = fitter.scene().as_ref();
     let fit = fitter.settings();
     let settings = PictureSettings {
+        two_sided: false,
         samples: SAMPLES,
         groups: GROUPS,
         filter: fit.pixel_filter,
