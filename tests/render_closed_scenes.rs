@@ -22,7 +22,7 @@ fn quads(corners: &[[Vec3; 4]]) -> Mesh {
     let mut mesh = Mesh::default();
     for quad in corners {
         let first = mesh.positions.len() as u32;
-        let normal = (quad[1] - quad[0]).cross(quad[2] - quad[0]).normalize();
+        let normal = (quad[1] - quad[0]).cross(quad[2] - quad[0]).try_normalize().unwrap();
         mesh.positions.extend(quad);
         mesh.normals.extend([normal; 4]);
         mesh.uvs.extend([Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y]);

@@ -50,7 +50,7 @@ pub fn write(path: &Path, rows: &[LossRow]) -> Result<()> {
     })
 }
 
-/// Reads the rows of [`write`]. An error names the line.
+/// Reads the rows of [`fn@write`]. An error names the line.
 pub fn read(path: &Path) -> Result<Vec<LossRow>> {
     let text = std::fs::read_to_string(path).map_err(|source| Error::reading(path, source))?;
     let mut lines = text.lines().enumerate();

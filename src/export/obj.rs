@@ -43,7 +43,7 @@ pub fn write(path: &Path, mesh: &Mesh) -> Result<()> {
     })
 }
 
-/// Reads a mesh of [`write`]. An error names the line.
+/// Reads a mesh of [`fn@write`]. An error names the line.
 pub fn read(path: &Path) -> Result<Mesh> {
     let text = std::fs::read_to_string(path).map_err(|source| Error::reading(path, source))?;
     let mut mesh = Mesh::default();

@@ -1,7 +1,7 @@
 //! Linear images, image files, metrics and the mip chain.
 //!
 //! Read [`raster`] first: an image is a row-major table of pixels, row 0 at the top. Values are linear; transfer
-//! curves ([`transfer`]) are applied by [`file`] at the file border and nowhere else.
+//! curves ([`transfer`]) are applied by [`mod@file`] at the file border and nowhere else.
 
 pub mod file;
 pub mod linear;

@@ -78,7 +78,7 @@ impl Source {
     }
 }
 
-/// The header of a file. Errors as [`Source::open`].
+/// The header of a file. Errors as those of reading it.
 pub fn read_header(path: &Path) -> Result<ImageHeader> {
     let (mut reader, length) = open_file(path)?;
     header_of(&mut reader, path, length)

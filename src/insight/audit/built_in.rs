@@ -21,7 +21,7 @@ const PHOTO_SAMPLES: usize = 16;
 /// Levels of the mip chain, as in a fit.
 const LEVELS: usize = 6;
 
-/// A scene with all that [`gradients`](super::gradients) needs.
+/// A scene with all that [`gradients`](fn@super::gradients) needs.
 pub struct BuiltIn {
     /// Demo with rendered photographs.
     pub scene: Scene,

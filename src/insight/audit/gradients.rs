@@ -30,7 +30,7 @@ const PLACE_SHARE: usize = 4;
 /// Compares reverse mode with central differences over views of a scene.
 ///
 /// `parameters` is where the gradient is looked at; its mip chain has the weights `weights`. Photographs that the
-/// parameters explain exactly leave nothing to compare: [`built_in`](super::built_in) makes a scene with residuals.
+/// parameters explain exactly leave nothing to compare: [`built_in`](fn@super::built_in) makes a scene with residuals.
 ///
 /// # Errors
 /// `InvalidScene` when there is no view, or when no path reads a parameter; `Stopped` when `stop` is raised.

@@ -1,12 +1,12 @@
 //! Are the derivatives right? Reverse mode against central differences, under frozen randomness.
 //!
-//! Paths are traced once ([`bench`]) and kept; over kept paths the loss is a smooth function of the maps and the light,
+//! Paths are traced once ([`mod@bench`]) and kept; over kept paths the loss is a smooth function of the maps and the light,
 //! because nothing that depends on the sampling proposal is differentiated. A parameter is moved up and down by a small
 //! step in `f64`, only the pixels whose paths read it are added up again ([`readers`]), and the difference is compared
-//! with what the reverse pass of the fit says, run once in `f64` and once in `f32` ([`gradients`]). The gradient of the
+//! with what the reverse pass of the fit says, run once in `f64` and once in `f32` ([`mod@gradients`]). The gradient of the
 //! views' disagreement, which takes second derivatives of the loss, is checked the same way ([`consistency`]).
 //! [`report`] puts it into groups: the four kinds of parameters, and the places where renderers tend to be wrong.
-//! [`built_in`] is a small scene to do it on.
+//! [`fn@built_in`] is a small scene to do it on.
 //!
 //! The error of a derivative `a` against a difference `d` is `|a - d| / max(|d|, 1e-3 g)`, with `g` the root mean square
 //! of the differences of its kind (diffuse, specular, roughness, light): a derivative a thousand times below the typical
