@@ -298,7 +298,8 @@ fn summarise(data: &ReportData, folder: &RunFolder) {
         }
     }
     let whole = data.timings.iter().map(|time| format!("{} {:.1} s", time.stage, time.seconds)).collect::<Vec<_>>();
-    println!("{}", whole.join(", "));
+    let total: f64 = data.timings.iter().map(|time| time.seconds).sum();
+    println!("{}; together {total:.1} s", whole.join(", "));
     if let Some(bytes) = data.peak_memory_bytes {
         println!("peak memory {}", crate::insight::report::number::memory(bytes));
     }

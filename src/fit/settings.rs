@@ -241,7 +241,14 @@ impl FitSettings {
         let own = toml::Table::try_from(self).unwrap_or_default();
         let default = toml::Table::try_from(FitSettings::default()).unwrap_or_default();
         own.into_iter()
-            .map(|(name, value)| (name.clone(), value.to_string(), default.get(&name) == Some(&value)))
+            .map(|(name, value)| {
+                let text = match &value {
+                    // Rates are single precision: printed so, without the digits that widening adds.
+                    toml::Value::Float(number) => (*number as f32).to_string(),
+                    other => other.to_string(),
+                };
+                (name.clone(), text, default.get(&name) == Some(&value))
+            })
             .collect()
     }
 }

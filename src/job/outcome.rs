@@ -11,7 +11,7 @@ use crate::fit::state::FitState;
 use crate::fit::targets::Target;
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::insight::report::data::{
-    Fact, NamedAggregate, NonFiniteCount, ReportData, SettingLine, TexelCounts, TruthErrors, ViewLine,
+    Fact, NamedAggregate, NonFiniteCount, ReportData, SettingLine, StageTime, TexelCounts, TruthErrors, ViewLine,
 };
 use crate::insight::report::{RelitPicture, RelitStrip, ReportImages, ViewPictures, write_report};
 use crate::insight::scores::{ViewScores, aggregate, score_view};
@@ -72,6 +72,8 @@ pub fn write(
     let scene = fitter.scene().as_ref();
     let surface = fitter.surface().as_ref();
     let mut timings = std::mem::take(&mut prepared.timings);
+    // The clock of the job began after these, and after earlier sessions of a resumed fit.
+    let before_job: f64 = timings.iter().filter(|time| time.stage != "fit").map(|time| time.seconds).sum();
     tell("maps");
     let times_seen = timed(&mut timings, "coverage", || coverage::times_seen(scene, surface, settings.fit.map_size));
     let covered = covered(surface, settings.fit.map_size);
@@ -111,10 +113,9 @@ pub fn write(
     if let Some(truth) = data.truth.as_mut().filter(|_| !relit_errors.is_empty()) {
         truth.relit = Some(aggregate(&relit_errors));
     }
-    timings.push(crate::insight::report::data::StageTime {
-        stage: "whole run".into(),
-        seconds: began.elapsed().as_secs_f64(),
-    });
+    let named: f64 = timings.iter().map(|time| time.seconds).sum();
+    let rest = (began.elapsed().as_secs_f64() + before_job - named).max(0.0);
+    timings.push(StageTime { stage: "other".into(), seconds: rest });
     data.timings = timings;
     data.peak_memory_bytes = memory::peak_bytes();
 
@@ -134,8 +135,8 @@ pub fn write(
     Ok(data)
 }
 
-/// Texels outside every chart take the value of the nearest texel that a photograph saw, so that no filter reads junk.
-/// Texels inside a chart keep what the fit gave them, seen or not.
+/// Texels outside every chart, and those inside that no photograph saw, take the value of the nearest texel that one
+/// saw, so that no filter reads junk; `seen.exr` tells which they are.
 fn fill_outside(maps: &MaterialMaps, times_seen: &GreyImage, covered: &Image<bool>) -> MaterialMaps {
     let seen = Image::from_fn(covered.width(), covered.height(), |row, column| {
         covered[(row, column)] && times_seen[(row, column)] > 0.0
@@ -144,7 +145,7 @@ fn fill_outside(maps: &MaterialMaps, times_seen: &GreyImage, covered: &Image<boo
         return maps.clone();
     }
     let nearest = nearest_covered(&seen);
-    let filled = |index: usize| covered.pixels()[index];
+    let filled = |index: usize| seen.pixels()[index];
     fn join<T: Clone>(own: &Image<T>, grown: Image<T>, keep: impl Fn(usize) -> bool) -> Image<T> {
         let pixels = own.pixels().iter().zip(grown.pixels()).enumerate();
         let pixels = pixels.map(|(index, (own, grown))| if keep(index) { own.clone() } else { grown.clone() });
