@@ -83,7 +83,7 @@ fn grazing_views() {
 fn one_view_alone_with_each_consistency() {
     for consistency in [Consistency::None, Consistency::Released, Consistency::Constant, Consistency::Exact] {
         let trial = Trial { cameras: around(1, 35.0), ..Default::default() };
-        let fitter = trial.fitted(FitSettings { consistency, ..quick() });
+        let fitter = trial.fitted(FitSettings { consistency, steps_diffuse: 25, steps_all: 25, ..quick() });
         assert!(fitter.state().losses.iter().all(|row| row.consistency < 0.1), "one view agrees with itself");
         assert_learned(&fitter);
     }
