@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::pictures::parameters;
 
 /// Paths a pixel in the photographs of the demo.
-const PHOTO_SAMPLES: usize = 20;
+const PHOTO_SAMPLES: usize = 16;
 
 /// Settings of the demo's fit: small maps and few steps, for a minute on two cores.
 pub fn settings() -> RunSettings {
@@ -23,8 +23,8 @@ pub fn settings() -> RunSettings {
         atlas: AtlasSettings { keep_uv: KeepUv::Keep, ..Default::default() },
         fit: FitSettings {
             map_size: DemoSettings::default().map_size,
-            steps_diffuse: 32,
-            steps_all: 56,
+            steps_diffuse: 30,
+            steps_all: 48,
             levels: 2,
             views_per_step: 6,
             pixels_per_step: 0,
