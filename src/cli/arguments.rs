@@ -109,10 +109,10 @@ pub struct MvclOptions {
     /// Settings to run; `none` always runs, since changes are against it.
     #[arg(long, value_enum, value_delimiter = ',')]
     pub cases: Vec<crate::job::study::Case>,
-    /// Optimiser steps of the first step; 30 when quick, else the default of a fit.
+    /// Optimiser steps of the first step; 60 when quick, else the default of a fit.
     #[arg(long)]
     pub steps_diffuse: Option<usize>,
-    /// Optimiser steps of the second step; 40 when quick, else the default of a fit.
+    /// Optimiser steps of the second step; 90 when quick, else the default of a fit.
     #[arg(long)]
     pub steps_all: Option<usize>,
     /// Folder of the tables and plots.

@@ -55,7 +55,8 @@ impl Case {
             }
             Case::Exact => {
                 "`exact`: the variance is part of the loss and its gradient is followed, with a second pass over each \
-                 view of the step. This is the only setting that changes the direction of a texel's gradient."
+                 view of the step. The loss multiplies it, so a step whose views show the sun behind the object weighs \
+                 it more. This is the only setting that changes the direction of a texel's gradient."
             }
             Case::OneStep => "`one-step, none`: all maps and the light from the start, with as many steps in all.",
             Case::OneStepExact => "`one-step, exact`: the same with the exact variance.",

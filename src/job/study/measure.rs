@@ -6,7 +6,9 @@ use crate::image::{Image, RgbImage};
 use crate::insight::report::number::short;
 use crate::insight::scores::{AlignmentSums, counted_pixels};
 use crate::job::outcome::truth_errors;
-use crate::job::pictures::parameters;
+use crate::job::prepare::covered;
+use crate::light::Environment;
+use crate::material::texels::{PyramidWeights, TexelPyramid, texels_from_maps};
 use crate::render::Parameters;
 use crate::render::picture::{PictureSettings, render};
 use crate::scene::Background;
@@ -51,6 +53,9 @@ const GROUPS: usize = 4;
 /// Paths a pixel in each group.
 const SAMPLES: usize = 8;
 
+/// Levels of the mip chain, as in the fit.
+const MIP_LEVELS: usize = 6;
+
 /// A line for progress.
 pub fn line(values: &[f64]) -> String {
     let value = |column: usize| short(values.get(column).copied().unwrap_or(f64::NAN));
@@ -73,7 +78,11 @@ pub fn measure(fitter: &Fitter, stop: &AtomicBool) -> Result<Vec<f64>> {
     if judged.is_empty() {
         judged = (0..scene.views.len()).collect();
     }
-    let own = parameters(&maps, &environment);
+    // Mip levels over texels of charts alone, as in the fit: what lies between charts was never fitted.
+    let weights = PyramidWeights::new(&covered(fitter.surface(), maps.diffuse.width()), MIP_LEVELS);
+    let texels = TexelPyramid::from_base(texels_from_maps(&maps), &weights);
+    let under = |light: &Environment| Parameters::new(texels.clone(), light);
+    let own = under(&environment);
     let photo = |view: usize| {
         let photo = &scene.views[view].photo;
         Image::from_fn(photo.width(), photo.height(), |row, column| photo.radiance(row, column))
@@ -82,7 +91,7 @@ pub fn measure(fitter: &Fitter, stop: &AtomicBool) -> Result<Vec<f64>> {
 
     let mut relit = AlignmentSums::default();
     if let Some(relight) = scene.truth.as_ref().and_then(|truth| truth.relight.as_ref()) {
-        let lit = parameters(&maps, &relight.environment);
+        let lit = under(&relight.environment);
         let also_judged = relight.pictures.iter().any(|(view, _)| judged.contains(view));
         let pictures = relight.pictures.iter().filter(|(view, _)| !also_judged || judged.contains(view));
         relit = sums(fitter, &lit, pictures.map(|(view, picture)| (*view, picture.clone())), stop);

@@ -38,9 +38,9 @@ pub struct StudyOptions {
     pub seeds: usize,
     /// Halved photographs, few steps and few paths.
     pub quick: bool,
-    /// Optimiser steps of the first step; `None` takes 30 when quick, else the default of a fit.
+    /// Optimiser steps of the first step; `None` takes 60 when quick, else the default of a fit.
     pub steps_diffuse: Option<usize>,
-    /// Optimiser steps of the second step; `None` takes 40 when quick, else the default of a fit.
+    /// Optimiser steps of the second step; `None` takes 90 when quick, else the default of a fit.
     pub steps_all: Option<usize>,
     /// Folder of the tables and plots.
     pub output: PathBuf,
@@ -60,10 +60,11 @@ impl StudyOptions {
     }
 
     /// Settings shared by every fit, for maps of the truth's size. Every case takes every pixel of its views, so that
-    /// cases of one seed see the same pixels and paths.
+    /// cases of one seed see the same pixels and paths. First hits are drawn anew in each step: kept ones let the two
+    /// halves of a pixel's estimate drift apart on texels smaller than a pixel, since their product then falls.
     fn fit_settings(&self, map_size: usize) -> FitSettings {
         let base = if self.quick {
-            FitSettings { steps_diffuse: 30, steps_all: 40, samples: 2, levels: 2, lobe_ramp: 10, ..Default::default() }
+            FitSettings { steps_diffuse: 60, steps_all: 90, samples: 2, levels: 2, ..Default::default() }
         } else {
             FitSettings::default()
         };
@@ -71,6 +72,7 @@ impl StudyOptions {
             map_size,
             pixels_per_step: 0,
             held_out_interval: 0,
+            first_hits_mib: 0,
             steps_diffuse: self.steps_diffuse.unwrap_or(base.steps_diffuse),
             steps_all: self.steps_all.unwrap_or(base.steps_all),
             ..base
@@ -84,7 +86,7 @@ impl StudyOptions {
         let size = views.first().map_or((0, 0), |view| (view.camera.width, view.camera.height));
         format!(
             "{} views of {} x {} pixels to fit, {held_out} held out; maps of {} x {}; {} + {} optimiser steps (one-step: {}), \
-             {} views a step with every pixel, {} paths a pixel, {} surface hits; seeds 1 to {}.",
+             {} views a step with every pixel, {} paths a pixel, {} surface hits.",
             views.len() - held_out,
             size.0,
             size.1,
@@ -95,8 +97,7 @@ impl StudyOptions {
             fit.steps_diffuse + fit.steps_all,
             fit.views_per_step,
             fit.samples,
-            fit.bounces,
-            self.seeds
+            fit.bounces
         )
     }
 }

@@ -65,6 +65,13 @@ impl SceneTable {
         self.table.add(case.name(), values);
     }
 
+    /// The table, with a note of how many seeds it holds: fewer than asked for when the study was stopped.
+    fn with_seeds(&self) -> StudyTable {
+        let mut table = self.table.clone();
+        table.notes.push(format!("Seeds 1 to {}.", table.values(0, IMAGE).len()));
+        table
+    }
+
     /// Change of a score against no consistency in percent, one a seed.
     fn changes(&self, case: Case, column: usize) -> Vec<f64> {
         let values = |case: Case| {
@@ -104,7 +111,7 @@ impl SceneTable {
 
 /// The tables of all scenes and that of the changes, written into a folder.
 pub fn write(scenes: &[SceneTable], cases: &[Case], folder: &Path) -> Result<Vec<StudyTable>> {
-    let mut tables: Vec<StudyTable> = scenes.iter().map(|scene| scene.table.clone()).collect();
+    let mut tables: Vec<StudyTable> = scenes.iter().map(SceneTable::with_seeds).collect();
     tables.push(changes(scenes, cases));
     let names = scenes.iter().map(|scene| scene.name.as_str()).chain(["change"]);
     for (table, name) in tables.iter().zip(names) {
