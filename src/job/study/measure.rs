@@ -6,7 +6,6 @@ use crate::image::{Image, RgbImage};
 use crate::insight::report::number::short;
 use crate::insight::scores::{AlignmentSums, counted_pixels};
 use crate::job::outcome::truth_errors;
-use crate::job::prepare::covered;
 use crate::light::Environment;
 use crate::material::texels::{PyramidWeights, TexelPyramid, texels_from_maps};
 use crate::render::Parameters;
@@ -53,9 +52,6 @@ const GROUPS: usize = 4;
 /// Paths a pixel in each group.
 const SAMPLES: usize = 8;
 
-/// Levels of the mip chain, as in the fit.
-const MIP_LEVELS: usize = 6;
-
 /// A line for progress.
 pub fn line(values: &[f64]) -> String {
     let value = |column: usize| short(values.get(column).copied().unwrap_or(f64::NAN));
@@ -78,8 +74,8 @@ pub fn measure(fitter: &Fitter, stop: &AtomicBool) -> Result<Vec<f64>> {
     if judged.is_empty() {
         judged = (0..scene.views.len()).collect();
     }
-    // Mip levels over texels of charts alone, as in the fit: what lies between charts was never fitted.
-    let weights = PyramidWeights::new(&covered(fitter.surface(), maps.diffuse.width()), MIP_LEVELS);
+    // Pictures read the finest texels only.
+    let weights = PyramidWeights::flat(maps.diffuse.width(), maps.diffuse.height());
     let texels = TexelPyramid::from_base(texels_from_maps(&maps), &weights);
     let under = |light: &Environment| Parameters::new(texels.clone(), light);
     let own = under(&environment);
