@@ -36,6 +36,30 @@
 //! * **Roughness**: maps and files hold `r = a^2`, with `a` the microfacet width; inside, `log a` is what moves.
 //! * **Random numbers** are a pure function of (seed, step, view, pixel, sample, dimension), sums are reduced in a
 //!   fixed order: same seed, same bits, whatever the thread count.
+//!
+//! # A fit in twenty lines
+//! ```
+//! use patina::fit::{FitSettings, Fitter, StepOutcome};
+//! use patina::{render::Surface, scene::demo};
+//! use std::sync::{Arc, atomic::AtomicBool};
+//!
+//! # fn main() -> patina::Result<()> {
+//! // A scene made in code, photographed by the path tracer: small, so that this runs in a moment.
+//! let small = demo::DemoSettings { views: 4, held_out: 1, width: 24, height: 18, map_size: 64, seed: 1 };
+//! let stop = AtomicBool::new(false);
+//! let scene = patina::job::demo::scene(&small, &mut Vec::new(), &stop, &|_| {})?;
+//! let surface = Surface::new(scene.mesh.clone())?;
+//!
+//! // Two steps of diffuse and light, two of everything.
+//! let settings = FitSettings { map_size: 64, levels: 1, steps_diffuse: 2, steps_all: 2, ..FitSettings::default() };
+//! let mut fitter = Fitter::new(Arc::new(scene), Arc::new(surface), settings, None)?;
+//! while let StepOutcome::Stepped(row) = fitter.step(&stop)? {
+//!     println!("step {}: mean squared error {:.4}", row.step, row.image_loss);
+//! }
+//! assert_eq!((fitter.state().step, fitter.maps().diffuse.width()), (4, 64));
+//! # Ok(())
+//! # }
+//! ```
 
 #![warn(missing_docs)]
 
