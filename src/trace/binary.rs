@@ -64,7 +64,7 @@ pub(super) fn by_surface_area(prepared: &Prepared) -> BinaryTree {
         SortPrecision::U64,
         3,
     );
-    ReinsertionOptimizer::default().run(&mut built, 0.15, None);
+    ReinsertionOptimizer::default().run(&mut built, 1.0, None);
     from_topology(prepared, |node| {
         let node = &built.nodes[node as usize];
         if node.is_leaf() {
