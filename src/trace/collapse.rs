@@ -202,3 +202,96 @@ fn block_of(prepared: &Prepared, tree: &BinaryTree, source: u32) -> (TriangleBlo
     }
     (block, triangles)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{binary, plain, prepare, query::Query, wide};
+    use super::*;
+    use crate::math::random::SequentialRandom;
+    use crate::trace::Ray;
+
+    fn point(random: &mut SequentialRandom) -> Vec3 {
+        let mut number = || 2.0 * random.next_number() - 1.0;
+        Vec3::new(number(), number(), number())
+    }
+
+    fn prepared_soup(count: usize, random: &mut SequentialRandom) -> Prepared {
+        let mut positions = Vec::new();
+        for _ in 0..count {
+            let middle = point(random);
+            positions.extend([0; 3].map(|_| middle + 0.1 * point(random)));
+        }
+        let triangles: Vec<[u32; 3]> =
+            (0..count as u32).map(|index| [3 * index, 3 * index + 1, 3 * index + 2]).collect();
+        prepare::prepare(&positions, &triangles).unwrap()
+    }
+
+    /// Checks that every triangle is in one block, within the boxes of all nodes above.
+    fn check(prepared: &Prepared, wide: &WideTree) {
+        let mut seen = vec![0; prepared.triangles.len()];
+        let mut waiting = vec![(0, Vec3::NEG_INFINITY, Vec3::INFINITY)];
+        while let Some((reference, low, high)) = waiting.pop() {
+            if reference & BLOCK == 0 {
+                let node = &wide.nodes[reference as usize];
+                for slot in (0..WIDTH).filter(|&slot| node.planes[0][slot] <= node.planes[3][slot]) {
+                    let corner = |first: usize| Vec3::from([0, 1, 2].map(|axis| node.planes[first + axis][slot]));
+                    assert!(corner(0).cmpge(low).all() && corner(3).cmple(high).all());
+                    waiting.push((node.children[slot], corner(0), corner(3)));
+                }
+                continue;
+            }
+            let number = (reference & !BLOCK) as usize;
+            let block = &wide.blocks[number];
+            for lane in (0..LANES).filter(|&lane| wide.triangles[number][lane] != u32::MAX) {
+                let index = wide.triangles[number][lane];
+                let slot = prepared.triangles.binary_search_by_key(&index, |triangle| triangle.index).unwrap();
+                seen[slot] += 1;
+                for (corner, position) in prepared.triangles[slot].corners.iter().enumerate() {
+                    let place = usize::from(block.corners[lane] >> (3 * corner) & 7);
+                    assert_eq!(*position, Vec3::from([0, 1, 2].map(|axis| block.points[axis][place])));
+                    assert!(position.cmpge(low).all() && position.cmple(high).all());
+                }
+            }
+        }
+        assert!(seen.iter().all(|&count| count == 1));
+    }
+
+    #[test]
+    fn every_triangle_is_in_one_block_within_all_boxes_above() {
+        let mut random = SequentialRandom::new(1);
+        for count in [1, 2, 3, 8, 9, 100, 3000] {
+            let prepared = prepared_soup(count, &mut random);
+            check(&prepared, &wide::build(&prepared));
+            check(&prepared, &collapse(&prepared, &binary::balanced(&prepared)));
+        }
+    }
+
+    #[test]
+    fn hits_do_not_depend_on_the_tree() {
+        let mut random = SequentialRandom::new(2);
+        let prepared = prepared_soup(2000, &mut random);
+        let trees = [wide::build(&prepared), collapse(&prepared, &binary::balanced(&prepared))];
+        for _ in 0..5000 {
+            let ray = Ray { origin: point(&mut random), direction: point(&mut random), t_max: f32::INFINITY };
+            let query = Query::new(&ray, 1.1).unwrap();
+            let [one, other] = trees.each_ref().map(|tree| plain::closest_hit(tree, &query));
+            assert_eq!(one, other);
+        }
+    }
+
+    #[test]
+    fn boxes_that_coincide_make_no_deep_tree() {
+        // Different triangles, all with the cube as their box.
+        let mut random = SequentialRandom::new(3);
+        let mut positions = Vec::new();
+        for _ in 0..10_000 {
+            let (a, b) = (random.next_number(), random.next_number());
+            positions.extend([Vec3::ZERO, Vec3::ONE, Vec3::new(a, b, 0.5)]);
+        }
+        let triangles: Vec<[u32; 3]> = (0..10_000).map(|index| [3 * index, 3 * index + 1, 3 * index + 2]).collect();
+        let prepared = prepare::prepare(&positions, &triangles).unwrap();
+        let wide = collapse(&prepared, &binary::by_surface_area(&prepared));
+        assert!(wide.depth <= 16, "{} levels", wide.depth);
+        check(&prepared, &wide);
+    }
+}
