@@ -7,18 +7,22 @@
 //! |---|---|
 //! | `prepare` | which triangles take part: checks, zero areas, copies |
 //! | `binary` | the binary tree, built by obvhs; a balanced one where that would grow too deep |
-//! | `wide` | nodes of eight children and blocks of triangles, and how the binary tree becomes them |
+//! | `wide` | the tree that rays walk through: nodes of eight children and blocks of triangles |
+//! | `collapse` | from the binary tree to the wide one |
 //! | `query` | what one ray needs over and over: inverse direction, padding, shear |
 //! | `plain` | the walk through the tree in portable Rust |
-//! | `vector` | the same walk with AVX2, chosen at run time |
+//! | `frame`, `vector` | query and walk with AVX2, chosen at run time |
 //!
-//! Both walks do the same sums in the same order: their hits are the same bits. Two triangles that share an edge
+//! Both walks test triangles by the same sums in the same order: their hits are the same bits. Two triangles that share an edge
 //! leave no gap for a ray to pass. Where several triangles are hit at the same `t`, the one of lowest index is given.
 //!
 //! This folder knows positions and triangles, nothing of materials or scenes; it culls no backfaces, moves no
 //! triangles after the build and holds no instances.
 
 mod binary;
+mod collapse;
+#[cfg(target_arch = "x86_64")]
+mod frame;
 mod plain;
 mod prepare;
 mod query;
@@ -32,6 +36,7 @@ use query::Query;
 
 /// A ray: points `origin + t direction` for `t` in `(0, t_max)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct Ray {
     /// Start, in world units.
     pub origin: Vec3,
@@ -118,27 +123,23 @@ impl Bvh {
     /// `None` for a ray that meets nothing and for one that is none: a number that is not finite in origin or
     /// direction, a direction of zero, or a `t_max` that is not above zero.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        let query = Query::new(ray, self.bounds)?;
         match self.walk {
-            Walk::Plain => plain::closest_hit(&self.tree, &query),
+            Walk::Plain => plain::closest_hit(&self.tree, &Query::new(ray, self.largest_coordinate)?),
             // SAFETY: only walks of `Walk::available` are ever set.
             #[cfg(target_arch = "x86_64")]
-            Walk::Avx2 => unsafe { vector::closest_hit(&self.tree, &query) },
-            #[cfg(not(target_arch = "x86_64"))]
-            Walk::Avx2 => plain::closest_hit(&self.tree, &query),
+            Walk::Avx2 => unsafe { vector::closest_hit(&self.tree, ray, self.largest_coordinate) },
         }
     }
 
     /// Whether anything lies on the ray: true exactly when [`Bvh::closest_hit`] finds a hit.
     pub fn is_occluded(&self, ray: &Ray) -> bool {
-        let Some(query) = Query::new(ray, self.bounds) else { return false };
         match self.walk {
-            Walk::Plain => plain::is_occluded(&self.tree, &query),
+            Walk::Plain => {
+                Query::new(ray, self.largest_coordinate).is_some_and(|query| plain::is_occluded(&self.tree, &query))
+            }
             // SAFETY: only walks of `Walk::available` are ever set.
             #[cfg(target_arch = "x86_64")]
-            Walk::Avx2 => unsafe { vector::is_occluded(&self.tree, &query) },
-            #[cfg(not(target_arch = "x86_64"))]
-            Walk::Avx2 => plain::is_occluded(&self.tree, &query),
+            Walk::Avx2 => unsafe { vector::is_occluded(&self.tree, ray, self.largest_coordinate) },
         }
     }
 

@@ -1,53 +1,54 @@
 //! The walk through the tree in portable Rust.
 //!
-//! It is written lane by lane, so that a compiler may turn it into what vectors the machine has. `vector` does the
-//! same sums in the same order; where the order of operands decides what becomes of a NaN, it is that of the AVX
-//! instructions.
+//! It is written lane by lane, so that a compiler may turn it into what vectors the machine has. `vector` does the same;
+//! the triangle test is the same sums in the same order in both, so that they give the same bits.
 
 use super::Hit;
 use super::query::Query;
-use super::wide::{BLOCK, LANES, STACK_SIZE, TriangleBlock, WIDTH, WideNode, WideTree};
+use super::wide::{BLOCK, LANES, STACK_SIZE, WIDTH, WideNode, WideTree};
 
 /// The best hit so far: the end of the ray to begin with.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Best {
     /// Where it is on the ray.
     pub t: f32,
-    triangle: u32,
+    /// Number of the block and lane in it.
+    place: Option<(u32, u32)>,
     u: f32,
     v: f32,
 }
 
 impl Best {
-    /// No hit yet. No triangle has an index below 0: a hit at the end of the ray itself is none.
-    #[inline(always)]
-    pub fn end_of(query: &Query) -> Best {
-        Best { t: query.t_max, triangle: 0, u: 0.0, v: 0.0 }
+    /// No hit yet, on a ray that ends here.
+    #[inline]
+    pub fn end_of_ray(t_max: f32) -> Best {
+        Best { t: t_max, place: None, u: 0.0, v: 0.0 }
     }
 
-    /// Takes a hit that is nearer, or as near and of a lower triangle; whether it was taken. The weights of the second
-    /// and third corner are `b / sum` and `c / sum`.
-    #[inline(always)]
-    pub fn update(&mut self, t: f32, triangle: u32, b: f32, c: f32, sum: f32) -> bool {
-        let is_better = t < self.t || (t == self.t && triangle < self.triangle);
-        if is_better {
-            *self = Best { t, triangle, u: b / sum, v: c / sum };
+    /// Takes a hit that is nearer, or as near and of a lower triangle. The weights of the second and third corner are
+    /// `b / sum` and `c / sum`.
+    #[inline]
+    pub fn update(&mut self, tree: &WideTree, block: u32, lane: u32, [t, b, c, sum]: [f32; 4]) {
+        let index = |(block, lane): (u32, u32)| tree.triangles[block as usize][lane as usize];
+        let is_as_near_and_lower = t == self.t && self.place.is_some_and(|place| index((block, lane)) < index(place));
+        if t < self.t || is_as_near_and_lower {
+            *self = Best { t, place: Some((block, lane)), u: b / sum, v: c / sum };
         }
-        is_better
     }
-}
 
-impl From<Best> for Hit {
-    fn from(best: Best) -> Hit {
-        Hit { t: best.t, triangle: best.triangle, u: best.u, v: best.v }
+    /// The hit, if there is one.
+    #[inline]
+    pub fn hit(&self, tree: &WideTree) -> Option<Hit> {
+        let (block, lane) = self.place?;
+        let triangle = tree.triangles[block as usize][lane as usize];
+        Some(Hit { t: self.t, triangle, u: self.u, v: self.v })
     }
 }
 
 /// The nearest hit; among hits at the same `t` that of the lowest triangle.
 pub(super) fn closest_hit(tree: &WideTree, query: &Query) -> Option<Hit> {
-    let mut best = Best::end_of(query);
-    let mut found = false;
-    // Entry distance in the upper half, reference in the lower: the order of keys is that of distances.
+    let mut best = Best::end_of_ray(query.t_max);
+    // Entry distance in the upper half, reference in the lower: as distances are not negative, keys sort like them.
     let mut stack = [0u64; STACK_SIZE];
     let mut height = 1;
     while height > 0 {
@@ -57,7 +58,7 @@ pub(super) fn closest_hit(tree: &WideTree, query: &Query) -> Option<Hit> {
             continue;
         }
         if reference & BLOCK != 0 {
-            found |= test_block(&tree.blocks[(reference & !BLOCK) as usize], query, &mut best);
+            test_block(tree, reference & !BLOCK, query, &mut best);
             continue;
         }
         let node = &tree.nodes[reference as usize];
@@ -75,7 +76,7 @@ pub(super) fn closest_hit(tree: &WideTree, query: &Query) -> Option<Hit> {
             height += 1;
         }
     }
-    found.then_some(best.into())
+    best.hit(tree)
 }
 
 /// Whether there is any hit.
@@ -86,7 +87,9 @@ pub(super) fn is_occluded(tree: &WideTree, query: &Query) -> bool {
         height -= 1;
         let reference = stack[height];
         if reference & BLOCK != 0 {
-            if test_block(&tree.blocks[(reference & !BLOCK) as usize], query, &mut Best::end_of(query)) {
+            let mut best = Best::end_of_ray(query.t_max);
+            test_block(tree, reference & !BLOCK, query, &mut best);
+            if best.place.is_some() {
                 return true;
             }
             continue;
@@ -102,22 +105,11 @@ pub(super) fn is_occluded(tree: &WideTree, query: &Query) -> bool {
     false
 }
 
-/// The smaller number; the second where one is a NaN.
-#[inline(always)]
-fn smaller(one: f32, other: f32) -> f32 {
-    if one < other { one } else { other }
-}
-
-/// The larger number; the second where one is a NaN.
-#[inline(always)]
-fn larger(one: f32, other: f32) -> f32 {
-    if one > other { one } else { other }
-}
-
 /// Where the ray enters each child's box, NaN where it does not meet it within `(0, t_max)`.
 ///
-/// A ray that lies in a plane of a box has `0 * infinity`, a NaN, for it; the plane is then passed over.
-#[inline(always)]
+/// Numbers so large that a plane is at infinity minus infinity give a NaN here; `f32::max` and `f32::min` pass it over,
+/// and the box counts as met.
+#[inline]
 fn test_node(node: &WideNode, query: &Query, t_max: f32) -> [f32; WIDTH] {
     let mut entry = [0.0f32; WIDTH];
     let mut exit = [t_max; WIDTH];
@@ -125,44 +117,48 @@ fn test_node(node: &WideNode, query: &Query, t_max: f32) -> [f32; WIDTH] {
         let entry_planes = &node.planes[query.entry_row[axis]];
         let exit_planes = &node.planes[query.exit_row[axis]];
         for slot in 0..WIDTH {
-            entry[slot] = larger((entry_planes[slot] - query.origin_entry[axis]) * query.inverse[axis], entry[slot]);
-            exit[slot] = smaller((exit_planes[slot] - query.origin_exit[axis]) * query.inverse[axis], exit[slot]);
+            entry[slot] = entry[slot].max(entry_planes[slot] * query.inverse[axis] + query.entry_offset[axis]);
+            exit[slot] = exit[slot].min(exit_planes[slot] * query.inverse[axis] + query.exit_offset[axis]);
         }
     }
     std::array::from_fn(|slot| if entry[slot] <= exit[slot] { entry[slot] } else { f32::NAN })
 }
 
-/// Tests a block of triangles and keeps the best hit; whether there was a better one.
+/// Tests a block of triangles and keeps the best hit.
 ///
 /// Woop, Benthin and Wald 2013 ("Watertight ray/triangle intersection"). An edge function here has the right sign or is
 /// zero, because rounding is monotone: `a > b` never becomes `round(a) < round(b)`. Zero counts as inside for both
 /// triangles of an edge, so that no ray passes between them. This asks for products rounded one by one: a fused
-/// multiply and add would round one only and break it.
-#[inline(always)]
-fn test_block(block: &TriangleBlock, query: &Query, best: &mut Best) -> bool {
+/// multiply and add would round one only and break it. `t` is an average of the corners' with weights of one sign, so
+/// that it lies between them however thin the triangle is.
+#[inline]
+fn test_block(tree: &WideTree, number: u32, query: &Query, best: &mut Best) {
+    let block = &tree.blocks[number as usize];
     let [x, y, z] = query.axes;
-    let mut found = false;
+    let height: [f32; LANES] = std::array::from_fn(|place| block.points[z][place] - query.origin[z]);
+    let moved = |axis: usize, shear: f32| -> [f32; LANES] {
+        std::array::from_fn(|place| block.points[axis][place] - query.origin[axis] - shear * height[place])
+    };
+    let (along, across) = (moved(x, query.shear[0]), moved(y, query.shear[1]));
     for lane in 0..LANES {
         let corner = |corner: usize| {
-            let corner = &block.corners[corner];
-            let height = corner[z][lane] - query.origin[z];
-            let along = corner[x][lane] - query.origin[x] - query.shear[0] * height;
-            let across = corner[y][lane] - query.origin[y] - query.shear[1] * height;
-            [along, across, height]
+            let place = usize::from(block.corners[lane] >> (3 * corner)) % LANES;
+            [along[place], across[place], height[place]]
         };
-        let [ax, ay, az] = corner(0);
-        let [bx, by, bz] = corner(1);
-        let [cx, cy, cz] = corner(2);
+        let ([ax, ay, az], [bx, by, bz], [cx, cy, cz]) = (corner(0), corner(1), corner(2));
+        // U = C_x B_y - C_y B_x, V = A_x C_y - A_y C_x, W = B_x A_y - B_y A_x
         let a = cx * by - cy * bx;
         let b = ax * cy - ay * cx;
         let c = bx * ay - by * ax;
+        let is_inside = (a >= 0.0 && b >= 0.0 && c >= 0.0) || (a <= 0.0 && b <= 0.0 && c <= 0.0);
+        if !is_inside {
+            continue;
+        }
+        // T = S_z (U A_z + V B_z + W C_z) / (U + V + W); a NaN for a triangle seen from its edge.
         let sum = a + b + c;
         let t = (a * az + b * bz + c * cz) * query.shear[2] / sum;
-        let is_inside = (a >= 0.0 && b >= 0.0 && c >= 0.0) || (a <= 0.0 && b <= 0.0 && c <= 0.0);
-        // Where the sum is zero, all three are, and `t` is a NaN.
-        if is_inside && t > 0.0 {
-            found |= best.update(t, block.triangles[lane], b, c, sum);
+        if t > 0.0 {
+            best.update(tree, number, lane as u32, [t, b, c, sum]);
         }
     }
-    found
 }

@@ -67,8 +67,8 @@ pub(super) fn prepare(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Prep
 }
 
 fn check(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<()> {
-    // Node and block numbers have 31 bits; there are fewer of both than triangles.
-    if triangles.len() >= 1 << 31 {
+    // Node and block numbers have 31 bits; there are no more of either than triangles and one.
+    if triangles.len() >= 1 << 30 {
         return Err(Error::new(ErrorKind::TooLarge, format!("the mesh has {} triangles", triangles.len()))
             .remedy("use a mesh of fewer triangles"));
     }

@@ -1,20 +1,19 @@
 //! What one ray needs over and over on its walk.
 
 use super::Ray;
-use glam::Vec3;
 
 /// A ray made ready for the walk.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Query {
     /// Start of the ray.
     pub origin: [f32; 3],
-    /// One over each component of the direction; infinite, with its sign, for a component of zero.
+    /// One over each component of the direction.
     pub inverse: [f32; 3],
-    /// Origin for the plane where the ray enters a box and the one where it leaves: moved towards the plane along
-    /// each axis by [`Query::new`]'s padding.
-    pub origin_entry: [f32; 3],
-    /// See [`Query::origin_entry`].
-    pub origin_exit: [f32; 3],
+    /// A plane at `p` across an axis is met at `p * inverse + offset`. Where the ray enters a box, the plane is first
+    /// moved towards the ray's start by the padding.
+    pub entry_offset: [f32; 3],
+    /// The same where the ray leaves a box; the plane is first moved away by the padding.
+    pub exit_offset: [f32; 3],
     /// Which row of a node's planes the ray enters through, axis by axis.
     pub entry_row: [usize; 3],
     /// Which row of a node's planes the ray leaves through, axis by axis.
@@ -27,50 +26,50 @@ pub(super) struct Query {
     pub t_max: f32,
 }
 
+/// Components of the direction below this fraction of the largest one are raised to it, so that no inverse is infinite.
+/// Over the whole scene that moves a ray by less than the padding of the boxes.
+const LEAST_COMPONENT: f32 = 1.0 / (1u64 << 40) as f32;
+/// Up to this multiple of the scene's largest coordinate, all origins share one padding.
+pub(super) const NEAR: f32 = 4.0;
+
+/// By how much boxes are padded, for a ray that starts at coordinates of at most `farthest`.
+///
+/// Ize 2013 ("Robust BVH ray traversal") pads by a factor on `t`. Here the padding is a length, because the triangle
+/// test subtracts the origin from the corners and shears them, which moves them sideways by some units in the last
+/// place of their distance: a ray that meets the triangle so moved may pass its box by that length, whatever its angle
+/// to the side of the box. The sums of the box test itself err by about as much.
+#[inline]
+pub(super) fn padding(farthest: f32, largest_coordinate: f32) -> f32 {
+    (largest_coordinate + farthest.max(NEAR * largest_coordinate)) * (4.0 * f32::EPSILON)
+}
+
 impl Query {
-    /// Prepares a ray for a scene within `bounds`; `None` when it is no ray.
-    ///
-    /// The boxes are padded, as Ize 2013 ("Robust BVH ray traversal") asks, but by a length in place of a relative
-    /// `t`: the triangle test subtracts the origin from the corners and shears them, which moves them sideways by some
-    /// units in the last place of their distance. A ray that meets the triangle so moved may pass its box by the
-    /// same length, whatever its angle to that side of the box.
-    pub fn new(ray: &Ray, bounds: (Vec3, Vec3)) -> Option<Query> {
-        let usable = ray.origin.is_finite() && ray.direction.is_finite() && ray.direction != Vec3::ZERO;
-        if !usable || ray.t_max.is_nan() || ray.t_max <= 0.0 {
+    /// Prepares a ray for a scene of this largest coordinate; `None` when it is no ray.
+    pub fn new(ray: &Ray, largest_coordinate: f32) -> Option<Query> {
+        let (origin, direction) = (ray.origin.to_array(), ray.direction.to_array());
+        let length = ray.direction.abs().max_element();
+        let is_ray = ray.origin.is_finite() && ray.direction.is_finite() && length > 0.0 && ray.t_max > 0.0;
+        if !is_ray {
             return None;
         }
-        let reach = (bounds.0 - ray.origin).abs().max((bounds.1 - ray.origin).abs()).max_element();
-        let padding = reach * (4.0 * f32::EPSILON);
-        let origin = ray.origin.to_array();
-        let direction = ray.direction.to_array();
-        let mut query = Query {
-            origin,
-            inverse: direction.map(f32::recip),
-            origin_entry: origin,
-            origin_exit: origin,
-            entry_row: [0, 1, 2],
-            exit_row: [3, 4, 5],
-            axes: [0; 3],
-            shear: [0.0; 3],
-            t_max: ray.t_max,
-        };
-        for axis in 0..3 {
-            let is_negative = direction[axis].is_sign_negative();
-            if is_negative {
-                (query.entry_row[axis], query.exit_row[axis]) = (3 + axis, axis);
-            }
-            let towards_entry = if is_negative { -padding } else { padding };
-            query.origin_entry[axis] = origin[axis] + towards_entry;
-            query.origin_exit[axis] = origin[axis] - towards_entry;
-        }
+        let least = length * LEAST_COMPONENT;
+        let inverse = direction.map(|component| component.abs().max(least).copysign(component).recip());
+        let is_negative = direction.map(|component| usize::from(component.is_sign_negative()));
+        let padding = padding(ray.origin.abs().max_element(), largest_coordinate);
+        let towards_entry = direction.map(|component| padding.copysign(component));
         // Shear constants of Woop, Benthin and Wald 2013 ("Watertight ray/triangle intersection"), section 3.
         let last = ray.direction.abs().max_position();
-        query.axes = [(last + 1) % 3, (last + 2) % 3, last];
-        query.shear = [
-            direction[query.axes[0]] / direction[last],
-            direction[query.axes[1]] / direction[last],
-            1.0 / direction[last],
-        ];
-        Some(query)
+        let axes = [(last + 1) % 3, (last + 2) % 3, last];
+        Some(Query {
+            origin,
+            inverse,
+            entry_offset: [0, 1, 2].map(|axis| -(origin[axis] + towards_entry[axis]) * inverse[axis]),
+            exit_offset: [0, 1, 2].map(|axis| -(origin[axis] - towards_entry[axis]) * inverse[axis]),
+            entry_row: [0, 1, 2].map(|axis| axis + 3 * is_negative[axis]),
+            exit_row: [0, 1, 2].map(|axis| axis + 3 - 3 * is_negative[axis]),
+            axes,
+            shear: [direction[axes[0]] * inverse[last], direction[axes[1]] * inverse[last], inverse[last]],
+            t_max: ray.t_max,
+        })
     }
 }
