@@ -22,6 +22,7 @@
 //! | [`export`] | the run folder and the files in it |
 //! | [`job`] | the only door between a fit and whoever watches it |
 //! | [`cli`] | the command line; it holds no algorithm |
+//! | `studio` | the window, behind the feature of that name; it holds no algorithm either |
 //!
 //! # Conventions
 //! * **World**: right-handed, +y up. Directions towards the light. Lengths in the units of the mesh.
@@ -77,6 +78,8 @@ pub mod material;
 pub mod math;
 pub mod render;
 pub mod scene;
+#[cfg(feature = "studio")]
+pub mod studio;
 pub mod trace;
 
 pub use error::{Error, ErrorKind, Finding, Place, Result, Severity};

@@ -3,6 +3,7 @@
 //! Read [`raster`] first: an image is a row-major table of pixels, row 0 at the top. Values are linear; transfer
 //! curves ([`transfer`]) are applied by [`mod@file`] at the file border and nowhere else.
 
+pub mod display;
 pub mod file;
 pub mod linear;
 pub mod metrics;

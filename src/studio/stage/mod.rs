@@ -1,0 +1,1 @@
+//! The stage: the mesh in 3-D, drawn by wgpu.
