@@ -207,6 +207,9 @@ pub struct Finding {
     pub message: String,
     /// Where, as text; empty when nowhere in particular.
     pub place: String,
+    /// The same place for a program that goes there.
+    #[serde(skip)]
+    pub target: Place,
     /// What the user can do; may be empty.
     pub remedy: String,
 }
@@ -214,12 +217,20 @@ pub struct Finding {
 impl Finding {
     /// A finding of this severity; `code` is its stable name.
     pub fn new(severity: Severity, code: &'static str, message: impl Into<String>) -> Self {
-        Finding { severity, code, message: message.into(), place: String::new(), remedy: String::new() }
+        Finding {
+            severity,
+            code,
+            message: message.into(),
+            place: String::new(),
+            target: Place::Nowhere,
+            remedy: String::new(),
+        }
     }
 
     /// The same finding at a place.
     pub fn at(mut self, place: Place) -> Self {
         self.place = place.to_string();
+        self.target = place;
         self
     }
 

@@ -8,7 +8,7 @@
 //!   splitting where they fail;
 //! * `merge` neighbouring charts that lie flat together become one;
 //! * `shape`, `pack` charts as texels on the square, gutters kept;
-//! * `raster` texels covered by charts, overlaps, dilation; `quality` what is reported.
+//! * `border` outlines for drawing; `raster` texels covered by charts, overlaps, dilation; `quality` what is reported.
 //!
 //! What it refuses to do: it moves no vertex except to collapse edges that have no length, it never mirrors a chart, it
 //! makes no chart that touches another one's gutter, and it does not compute normals (a mesh without normals stays
@@ -21,6 +21,7 @@
 //! and cutting it would only add borders; what its map must be (no flip, no overlap, low distortion) is checked all
 //! the same. Charts with handles and closed ones are split.
 
+mod border;
 mod chart;
 pub mod clean;
 mod cluster;
@@ -35,6 +36,7 @@ mod raster;
 mod shape;
 mod topology;
 
+pub use border::chart_borders;
 pub use quality::AtlasQuality;
 pub use raster::{covered_texels, dilate, nearest_covered, overlaps};
 

@@ -1,9 +1,9 @@
 //! What can be typed. The text of each field is its help.
 
 use crate::atlas::KeepUv;
-use crate::fit::FitSettings;
+use crate::fit::{FitSettings, Preset};
 use crate::scene::settings::{BackgroundChoice, PixelCentre, Up};
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, FromArgMatches, Parser, Subcommand};
 use std::path::PathBuf;
 
 /// Turns a photographed scene into materials one can relight.
@@ -24,6 +24,8 @@ pub struct Arguments {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Task {
+    /// Open the window; also what `patina` does without a task.
+    Studio(StudioOptions),
     /// Build the demo scene in code, photograph it, fit it, relight it, and report the error against the truth.
     Demo(DemoOptions),
     /// Look a scene over before a fit: findings with place and remedy, and mesh outlines over every photo.
@@ -34,6 +36,8 @@ pub enum Task {
     Resume(ResumeOptions),
     /// Render a run under other lights.
     Relight(RelightOptions),
+    /// Move a run along what photos leave open, reflectance against light, into a new run folder.
+    Gauge(super::gauge::GaugeOptions),
     /// Render a run from a scene's cameras, as pictures or layers in linear EXR.
     Render(RenderOptions),
     /// Score a run against the photographs of a scene.
@@ -47,6 +51,19 @@ pub enum Task {
     /// Fit scenes with a known truth many times over and write tables and plots.
     #[command(subcommand)]
     Study(StudyTask),
+}
+
+/// Options of `patina studio`.
+#[derive(Clone, Debug, Default, Args)]
+pub struct StudioOptions {
+    /// A scene or run folder to open at once.
+    pub path: Option<PathBuf>,
+    /// Open the built-in demo at once.
+    #[arg(long, conflicts_with = "path")]
+    pub demo: bool,
+    /// Remember settings in this file instead of the user's own.
+    #[arg(long, value_name = "FILE")]
+    pub settings_file: Option<PathBuf>,
 }
 
 /// What to audit.
@@ -160,7 +177,11 @@ pub struct ReadOptions {
 impl ReadOptions {
     /// The settings of the reader.
     pub fn settings(&self) -> crate::scene::ReadSettings {
-        let mut settings = crate::scene::ReadSettings::default();
+        self.over(crate::scene::ReadSettings::default())
+    }
+
+    /// `settings` with everything that was typed.
+    pub fn over(&self, mut settings: crate::scene::ReadSettings) -> crate::scene::ReadSettings {
         if let Some(up) = self.up {
             settings.up = up;
         }
@@ -216,9 +237,54 @@ pub struct FitOptions {
     /// How the scene is read.
     #[command(flatten)]
     pub read: ReadOptions,
+    /// A whole set of settings to begin with; options on the command line win.
+    #[arg(long, value_enum, conflicts_with = "settings")]
+    pub preset: Option<Preset>,
     /// How the maps are fitted.
     #[command(flatten)]
-    pub fit: FitSettings,
+    pub fit: TypedSettings,
+}
+
+/// Settings of a fit, and which of them were typed.
+#[derive(Clone, Debug, Default)]
+pub struct TypedSettings {
+    /// The settings; what was not typed has its default.
+    pub values: FitSettings,
+    /// Names of those that were typed.
+    pub typed: Vec<String>,
+}
+
+impl TypedSettings {
+    /// `base` with everything that was typed.
+    pub fn over(&self, base: &FitSettings) -> crate::Result<FitSettings> {
+        base.with(&self.typed, &self.values)
+    }
+}
+
+impl FromArgMatches for TypedSettings {
+    fn from_arg_matches(matches: &clap::ArgMatches) -> Result<Self, clap::Error> {
+        // Arguments are known by the names of the fields.
+        let is_typed = |name: &String| {
+            matches.value_source(&name.replace('-', "_")) == Some(clap::parser::ValueSource::CommandLine)
+        };
+        let names = FitSettings::described().into_iter().map(|setting| setting.name);
+        Ok(TypedSettings { values: FitSettings::from_arg_matches(matches)?, typed: names.filter(is_typed).collect() })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &clap::ArgMatches) -> Result<(), clap::Error> {
+        *self = TypedSettings::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl Args for TypedSettings {
+    fn augment_args(command: clap::Command) -> clap::Command {
+        FitSettings::augment_args(command)
+    }
+
+    fn augment_args_for_update(command: clap::Command) -> clap::Command {
+        FitSettings::augment_args_for_update(command)
+    }
 }
 
 /// Options of `patina resume`.
@@ -266,6 +332,9 @@ pub struct RelightOptions {
     /// Hide the light behind the surface.
     #[arg(long)]
     pub hide_background: bool,
+    /// A turntable instead of single pictures.
+    #[command(flatten)]
+    pub turntable: super::turntable::TurntableOptions,
     /// Folder of the pictures; `relight` in the run folder when not given.
     #[arg(short, long)]
     pub output: Option<PathBuf>,

@@ -3,6 +3,7 @@
 use super::arguments::{CheckOptions, CompareOptions, Layer, RelightOptions, RenderOptions};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::export::RunFolder;
+use crate::fit::views::{ViewUse, uses_of};
 use crate::image::{GreyImage, Image, file};
 use crate::insight::scores::{aggregate, score_view};
 use crate::job::outcome::exposure_of;
@@ -101,6 +102,18 @@ pub fn relight(options: &RelightOptions) -> Result<()> {
         let (stem, light) = light_of(name, 256)?;
         let light = light.rotated_about_up(options.rotate.to_radians());
         let light = if options.absolute { light } else { matched(&light, &result.environment).0 };
+        if let Some(frames) = options.turntable.turntable {
+            let Some(&first) = views.first() else {
+                return Err(Error::new(ErrorKind::InvalidScene, "the scene has no view for the camera to start from")
+                    .remedy("name a scene with cameras: --cameras SCENE"));
+            };
+            let start = scene.views[first].camera.shrunk(options.shrink.max(1));
+            let lit = Parameters::new(own.texels.clone(), &light);
+            let folder = output.join(format!("turntable_{stem}"));
+            let (turn, exposure) = (&options.turntable, options.exposure);
+            super::turntable::write(&folder, &surface, &lit, &start, turn, frames, &picture_settings, exposure)?;
+            continue;
+        }
         for &view in &views {
             let camera = scene.views[view].camera.shrunk(options.shrink.max(1));
             let picture = relit(&surface, &own, &light, &camera, view, &picture_settings, &AtomicBool::new(false));
@@ -199,16 +212,20 @@ pub fn compare(options: &CompareOptions, json: bool) -> Result<()> {
         ..Default::default()
     };
     let mut scored = Vec::new();
-    for (index, view) in scene.views.iter().enumerate() {
+    let uses = uses_of(&scene, &settings.fit.exclude);
+    for (index, (view, kind)) in scene.views.iter().zip(uses).enumerate() {
         let picture =
             render_picture(&surface, &view.camera, &own, index as u32, &picture_settings, &AtomicBool::new(false));
         let coverage = fully_covered(&picture.coverage);
         let photo = view.photo.to_linear();
         let scores = score_view(&photo, &picture.radiance, &view.states, Some(&coverage), exposure_of(&scene))?;
         if json {
-            println!("{}", serde_json::json!({"view": view.name, "held_out": view.held_out, "scores": scores}));
+            println!(
+                "{}",
+                serde_json::json!({"view": view.name, "held_out": view.held_out, "use": kind, "scores": scores})
+            );
         } else {
-            let kind = if view.held_out { "held out" } else { "training" };
+            let kind = kind.label();
             println!(
                 "{:12} {kind}: RMSE {:.4}, PSNR {:.2} dB, SSIM {:.3} (aligned {:.4}, {:.2} dB, {:.3})",
                 view.name,
@@ -220,10 +237,10 @@ pub fn compare(options: &CompareOptions, json: bool) -> Result<()> {
                 scores.aligned.ssim_srgb
             );
         }
-        scored.push((view.held_out, scores));
+        scored.push((kind, scores));
     }
-    for (name, held_out) in [("held-out views", true), ("training views", false)] {
-        let of_kind: Vec<_> = scored.iter().filter(|(own, _)| *own == held_out).map(|(_, scores)| scores).collect();
+    for (name, kind) in [("held-out views", ViewUse::HeldOut), ("training views", ViewUse::Training)] {
+        let of_kind: Vec<_> = scored.iter().filter(|(own, _)| *own == kind).map(|(_, scores)| scores).collect();
         if !of_kind.is_empty() && !json {
             let score = aggregate(of_kind);
             println!(

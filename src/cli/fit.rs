@@ -3,13 +3,11 @@
 use super::arguments::{DemoOptions, FitOptions, ResumeOptions};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::export::RunFolder;
-use crate::fit::{FitSettings, Fitter, checkpoint};
-use crate::insight::report::data::{ReportData, StageTime};
-use crate::job::prepare::{Prepared, RunSettings, prepare, read_scene};
+use crate::fit::FitSettings;
+use crate::insight::report::data::ReportData;
+use crate::job::open::{self, OpenStage, Tell};
+use crate::job::prepare::RunSettings;
 use crate::job::{self, Event, JobHandle, demo};
-use crate::light::Environment;
-use crate::render::Surface;
-use crate::scene::Scene;
 use crate::scene::demo::DemoSettings;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
@@ -33,12 +31,13 @@ pub fn demo(options: &DemoOptions, json: bool) -> Result<()> {
         table.extend(changes);
         settings.fit = FitSettings::from_toml(&table.to_string())?;
     }
-    let mut timings = Vec::new();
-    let bar = share_bar(json, "photographing the demo scene");
     let demo_settings = DemoSettings { seed: options.seed, ..DemoSettings::default() };
-    let scene = demo::scene(&demo_settings, &mut timings, &stop, &|share| bar.set_position((share * 1000.0) as u64))?;
-    bar.finish_and_clear();
-    start_new(scene, Vec::new(), settings, folder, timings, stop, json)
+    let (prepared, fitter, settings) = with_bar(json, |tell| {
+        let opened = open::open_demo(&demo_settings, &stop, tell)?;
+        open::start_new(opened, settings, &stop, tell)
+    })?;
+    let job = job::start(prepared, fitter, settings, folder.clone())?;
+    watch(job, &folder, &stop, json)
 }
 
 /// Fits a scene.
@@ -46,17 +45,24 @@ pub fn fit(options: &FitOptions, json: bool) -> Result<()> {
     let settings = run_settings(options)?;
     settings.fit.validate()?;
     let folder = RunFolder::create(&options.output)?;
-    let mut timings = Vec::new();
     if !json {
         eprintln!("reading and checking {}", settings.scene.display());
     }
-    let (scene, findings) = read_scene(&settings.scene, &settings.read, &mut timings)?;
     let stop = Arc::new(AtomicBool::new(false));
     stop_on_interrupt(Arc::clone(&stop));
-    start_new(scene, findings, settings, folder, timings, stop, json)
+    let (prepared, fitter, settings) = with_bar(json, |tell| {
+        let opened = open::open_scene(&settings.scene, &settings.read, &stop, tell)?;
+        open::start_new(opened, settings, &stop, tell)
+    })?;
+    let job = job::start(prepared, fitter, settings, folder.clone())?;
+    watch(job, &folder, &stop, json)
 }
 
-fn run_settings(options: &FitOptions) -> Result<RunSettings> {
+/// The settings that options ask for: a preset or a settings file, and what was typed over it.
+///
+/// # Errors
+/// A settings file that cannot be read.
+pub fn run_settings(options: &FitOptions) -> Result<RunSettings> {
     let mut settings = match &options.settings {
         Some(path) => {
             let text = std::fs::read_to_string(path).map_err(|source| Error::reading(path, source))?;
@@ -66,85 +72,30 @@ fn run_settings(options: &FitOptions) -> Result<RunSettings> {
                     .remedy("take the settings.toml of a run folder as a pattern")
             })?
         }
-        None => RunSettings::default(),
+        None => RunSettings { fit: FitSettings::preset(options.preset.unwrap_or_default()), ..Default::default() },
     };
+    // What was typed wins, even where it equals the default.
     settings.scene = absolute(&options.scene);
     settings.known_light = options.env.as_deref().map(absolute).unwrap_or(settings.known_light);
-    if options.settings.is_none() {
-        settings.read = options.read.settings();
-        settings.fit = options.fit.clone();
-    } else {
-        // What was typed wins over the file; what was not typed equals its default.
-        settings.fit = overlaid(&settings.fit, &options.fit)?;
-    }
+    settings.read = options.read.over(settings.read);
+    settings.fit = options.fit.over(&settings.fit)?;
     if let Some(uv) = options.uv {
         settings.atlas.keep_uv = uv;
     }
     Ok(settings)
 }
 
-/// `base` with every setting of `typed` that differs from the default.
-fn overlaid(base: &FitSettings, typed: &FitSettings) -> Result<FitSettings> {
-    let mut table = toml::Table::try_from(base).unwrap_or_default();
-    let typed: toml::Table = toml::from_str(&typed.to_toml()).unwrap_or_default();
-    table.extend(typed);
-    FitSettings::from_toml(&table.to_string())
-}
-
 fn absolute(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.into())
-}
-
-fn start_new(
-    scene: Scene,
-    findings: Vec<crate::Finding>,
-    settings: RunSettings,
-    folder: RunFolder,
-    timings: Vec<StageTime>,
-    stop: Arc<AtomicBool>,
-    json: bool,
-) -> Result<()> {
-    let bar = share_bar(json, "making the atlas");
-    let prepared = prepare(scene, findings, &settings, timings, &|share| bar.set_position((share * 1000.0) as u64))?;
-    bar.finish_and_clear();
-    let known_light = match settings.known_light.as_os_str().is_empty() {
-        true => None,
-        false => Some(Environment::read(&settings.known_light)?.0),
-    };
-    let fitter = Fitter::new(
-        Arc::clone(&prepared.scene),
-        Arc::clone(&prepared.surface),
-        settings.fit.clone(),
-        known_light.as_ref(),
-    )?;
-    if stop.load(Ordering::Relaxed) {
-        return Err(Error::new(ErrorKind::Stopped, "stopped before the fit began"));
-    }
-    let job = job::start(prepared, fitter, settings, folder.clone())?;
-    watch(job, &folder, &stop, json)
 }
 
 /// Takes up a run.
 pub fn resume(options: &ResumeOptions, json: bool) -> Result<()> {
     let folder = RunFolder::open(&options.run)?;
-    let mut settings: RunSettings = folder.read_settings()?;
-    let state = checkpoint::read(&folder.checkpoint_path())?;
-    let mut timings = Vec::new();
     let stop = Arc::new(AtomicBool::new(false));
     stop_on_interrupt(Arc::clone(&stop));
-    if let Some(scene) = &options.scene {
-        settings.scene = absolute(scene);
-    }
-    let (scene, findings) = if settings.scene.as_os_str().is_empty() {
-        let demo_settings = DemoSettings { seed: settings.fit.seed, ..DemoSettings::default() };
-        (demo::scene(&demo_settings, &mut timings, &stop, &|_| {})?, Vec::new())
-    } else {
-        read_scene(&settings.scene, &settings.read, &mut timings)?
-    };
-    let surface = Arc::new(Surface::new(crate::export::obj::read(&folder.file("mesh.obj"))?)?);
-    let scene = Arc::new(scene);
-    let fitter = Fitter::resume(Arc::clone(&scene), Arc::clone(&surface), settings.fit.clone(), state)?;
-    let prepared = Prepared { scene, surface, quality: None, findings, timings };
+    let (prepared, fitter, settings) =
+        with_bar(json, |tell| open::resume(&folder, options.scene.as_deref(), &stop, tell))?;
     let job = job::start(prepared, fitter, settings, folder.clone())?;
     watch(job, &folder, &stop, json)
 }
@@ -159,13 +110,16 @@ pub(super) fn stop_on_interrupt(stop: Arc<AtomicBool>) {
     });
 }
 
-fn share_bar(json: bool, what: &str) -> ProgressBar {
-    if json {
-        return ProgressBar::hidden();
-    }
-    let bar = ProgressBar::new(1000).with_message(what.to_string());
+/// Shows how far something is that is opened.
+fn with_bar<T>(json: bool, work: impl FnOnce(Tell) -> Result<T>) -> Result<T> {
+    let bar = if json { ProgressBar::hidden() } else { ProgressBar::new(1000) };
     bar.set_style(ProgressStyle::with_template("{msg} [{bar:30}] {percent} %").unwrap_or(ProgressStyle::default_bar()));
-    bar
+    let outcome = work(&|stage: OpenStage, share: f32| {
+        bar.set_message(stage.label());
+        bar.set_position((share * 1000.0) as u64);
+    });
+    bar.finish_and_clear();
+    outcome
 }
 
 /// Shows the events of a job until it ends.
@@ -215,6 +169,7 @@ fn watch(job: JobHandle, folder: &RunFolder, stop: &AtomicBool, json: bool) -> R
                 }
             }
             Event::Finding(finding) if !json => say(finding.to_string()),
+            Event::Refused(error) if !json => say(format!("refused: {error}")),
             Event::Finishing(what) if !json => {
                 bar.set_prefix("writing");
                 bar.set_message(what);
@@ -246,6 +201,8 @@ fn line_of(event: &Event) -> serde_json::Value {
         Event::Progress(progress) => json!({"event": "progress", "progress": progress}),
         Event::Finding(finding) => json!({"event": "finding", "finding": finding}),
         Event::Checkpoint(path) => json!({"event": "checkpoint", "path": path}),
+        Event::SettingsChanged(settings) => json!({"event": "settings-changed", "settings": settings}),
+        Event::Refused(error) => json!({"event": "refused", "message": error.to_string()}),
         Event::Paused => json!({"event": "paused"}),
         Event::Resumed => json!({"event": "resumed"}),
         Event::Finishing(what) => json!({"event": "finishing", "what": what}),

@@ -1,16 +1,19 @@
 //! The command line; it holds no algorithm.
 //!
 //! [`arguments`] is what can be typed, [`fit`] drives a job and shows its events, [`measure`] audits and benches,
-//! [`study`] runs studies, [`commands`] holds the rest. Whatever is asked here can be asked of the library in the same words.
+//! [`study`] runs studies, [`gauge`] moves the scale of a run, [`turntable`] belongs to `relight`, [`commands`] holds
+//! the rest. Whatever is asked here can be asked of the library in the same words.
 
 pub mod arguments;
 pub mod commands;
 pub mod fit;
+pub mod gauge;
 pub mod measure;
 pub mod study;
+pub mod turntable;
 
-use crate::error::{Error, ErrorKind};
-use arguments::{Arguments, AuditTask, BenchTask, StudyTask, Task};
+use crate::error::{Error, ErrorKind, Result};
+use arguments::{Arguments, AuditTask, BenchTask, StudioOptions, StudyTask, Task};
 use clap::Parser;
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -36,15 +39,14 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Task::Resume(options)) => fit::resume(&options, json),
         Some(Task::Check(options)) => commands::check(&options, json),
         Some(Task::Relight(options)) => commands::relight(&options),
+        Some(Task::Gauge(options)) => gauge::gauge(&options, json),
         Some(Task::Render(options)) => commands::render(&options),
         Some(Task::Compare(options)) => commands::compare(&options, json),
         Some(Task::Audit(AuditTask::Gradients(options))) => measure::audit_gradients(&options, json),
         Some(Task::Bench(BenchTask::Scale(options))) => measure::bench_scale(&options, json),
         Some(Task::Study(StudyTask::Mvcl(options))) => study::mvcl(&options, json),
-        None => {
-            eprintln!("Patina has no window in this build. Try `patina demo`, or `patina --help`.");
-            return ExitCode::from(2);
-        }
+        Some(Task::Studio(options)) => window(&options),
+        None => window(&StudioOptions::default()),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -53,6 +55,20 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             ExitCode::from(if error.kind() == ErrorKind::Stopped { 3 } else { 1 })
         }
     }
+}
+
+/// Opens the window.
+#[cfg(feature = "studio")]
+fn window(options: &StudioOptions) -> Result<()> {
+    let StudioOptions { path, demo, settings_file } = options.clone();
+    crate::studio::run(crate::studio::StudioOptions { path, demo, settings_file })
+}
+
+/// Says why there is no window.
+#[cfg(not(feature = "studio"))]
+fn window(_: &StudioOptions) -> Result<()> {
+    Err(Error::new(ErrorKind::Unsupported, "this program was built without its window")
+        .remedy("build it with the feature `studio`, or try `patina demo` and `patina --help`"))
 }
 
 fn show(error: &Error, json: bool) {

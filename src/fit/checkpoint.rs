@@ -4,18 +4,22 @@
 //! little-endian `f32` in a fixed order, then eight bytes with a checksum over all before them.
 
 use super::adam::Moments;
+use super::schedule::Stage;
 use super::state::{FitState, LossRow};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::files::write_atomically;
 use crate::material::texels::Texel;
 use serde::{Deserialize, Serialize};
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::Path;
 
 const MAGIC: &[u8] = b"PATINA CHECKPOINT 1\n";
 
 #[derive(Serialize, Deserialize)]
 struct Header {
+    /// Empty in files of versions that could not change it on the way.
+    #[serde(default)]
+    plan: Vec<Stage>,
     stage: usize,
     step_in_stage: usize,
     step: usize,
@@ -31,6 +35,7 @@ struct Header {
 /// Writes a state; the file that was there before stays until the new one is complete.
 pub fn write(path: &Path, state: &FitState) -> Result<()> {
     let header = Header {
+        plan: state.plan.clone(),
         stage: state.stage,
         step_in_stage: state.step_in_stage,
         step: state.step,
@@ -68,6 +73,49 @@ pub fn write(path: &Path, state: &FitState) -> Result<()> {
         put(bytemuck::cast_slice(&state.log_gains))?;
         let checksum = checksum.0;
         writer.write_all(&checksum.to_le_bytes())
+    })
+}
+
+/// How far a checkpoint is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Summary {
+    /// Steps done.
+    pub step: usize,
+    /// Steps of all stages; 0 in files of versions that did not write them.
+    pub steps_total: usize,
+    /// Width and height of the maps in texels.
+    pub map_size: usize,
+    /// The curve so far.
+    pub losses: Vec<LossRow>,
+}
+
+/// Reads how far a checkpoint is, without its arrays and without looking at its checksum.
+///
+/// # Errors
+/// `Missing`, `Unreadable` or `Malformed`, with the place.
+pub fn summary(path: &Path) -> Result<Summary> {
+    let mut file = std::fs::File::open(path).map_err(|source| Error::reading(path, source))?;
+    let broken = || {
+        Error::new(ErrorKind::Malformed, "not a whole checkpoint: its header is damaged")
+            .at(Place::Byte(path.into(), 0))
+            .remedy("start the run again, or copy the checkpoint anew")
+    };
+    let size = file.metadata().map_err(|source| Error::reading(path, source))?.len();
+    let mut front = [0u8; MAGIC.len() + 8];
+    file.read_exact(&mut front).map_err(|_| broken())?;
+    let (magic, length) = front.split_at(MAGIC.len());
+    let length = u64::from_le_bytes(length.try_into().unwrap_or_default());
+    if magic != MAGIC || length > size {
+        return Err(broken());
+    }
+    let mut json = vec![0u8; length as usize];
+    file.read_exact(&mut json).map_err(|_| broken())?;
+    let header: Header = serde_json::from_slice(&json).map_err(|_| broken())?;
+    Ok(Summary {
+        step: header.step,
+        steps_total: header.plan.iter().map(|stage| stage.steps).sum(),
+        map_size: header.map_size,
+        losses: header.losses,
     })
 }
 
@@ -118,6 +166,7 @@ pub fn read(path: &Path) -> Result<FitState> {
         return Err(broken(body_end - rest.len(), "it is too long"));
     }
     Ok(FitState {
+        plan: header.plan,
         stage: header.stage,
         step_in_stage: header.step_in_stage,
         step: header.step,
@@ -154,6 +203,7 @@ mod tests {
 
     fn state() -> FitState {
         FitState {
+            plan: crate::fit::schedule::stages(&crate::fit::FitSettings::default()),
             stage: 1,
             step_in_stage: 2,
             step: 7,
@@ -185,10 +235,13 @@ mod tests {
         let path = folder.path().join("checkpoint");
         write(&path, &state()).unwrap();
         assert_eq!(read(&path).unwrap(), state());
+        let summary_of = |path: &Path| summary(path).map(|summary| (summary.step, summary.steps_total));
+        assert_eq!(summary_of(&path).unwrap(), (7, 300));
         let good = std::fs::read(&path).unwrap();
         for cut in [0, 5, MAGIC.len() + 3, good.len() / 2, good.len() - 1] {
             crate::files::write_bytes(&path, &good[..cut]).unwrap();
             assert_eq!(read(&path).unwrap_err().kind(), ErrorKind::Malformed, "cut at {cut}");
+            assert!(cut >= good.len() / 2 || summary(&path).is_err(), "cut at {cut}");
         }
         let mut flipped = good.clone();
         flipped[good.len() / 2] ^= 1;

@@ -5,7 +5,9 @@
 //! interrupted.
 
 use super::adam::Moments;
+use super::change::replan;
 use super::evidence;
+use super::figures::LiveFigures;
 use super::gauge::GaugeRule;
 use super::held_out::held_out_targets;
 use super::schedule::{Stage, stages};
@@ -13,6 +15,7 @@ use super::settings::{FitSettings, Start};
 use super::start;
 use super::state::{FitState, LossRow};
 use super::targets::{Target, targets};
+use super::views::{ViewUse, training_views, unknown_names, uses_of};
 use super::work::StageWork;
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::light::Environment;
@@ -40,10 +43,11 @@ pub struct Fitter {
     pub(super) scene: Arc<Scene>,
     pub(super) surface: Arc<Surface>,
     pub(super) settings: FitSettings,
-    pub(super) stages: Vec<Stage>,
+    pub(super) uses: Vec<ViewUse>,
     pub(super) training: Vec<usize>,
     pub(super) held_out: Vec<Target>,
     pub(super) state: FitState,
+    pub(super) figures: LiveFigures,
     pub(super) work: Option<StageWork>,
 }
 
@@ -56,11 +60,12 @@ impl Fitter {
         known_light: Option<&Environment>,
     ) -> Result<Self> {
         let mut fitter = Fitter::prepare(scene, surface, settings)?;
-        let first = fitter.stages[0];
+        fitter.state.plan = stages(&fitter.settings);
+        let first_size = fitter.state.plan.first().map_or(fitter.settings.map_size, |stage| stage.map_size);
         let state = &mut fitter.state;
         state.log_gains = vec![0.0; fitter.scene.views.len()];
         state.gain_moments = Moments::zeros(fitter.scene.views.len());
-        state.map_size = first.map_size;
+        state.map_size = first_size;
         let values = match fitter.settings.start {
             Start::Measured => fitter.measured_start(),
             Start::Paper => start::paper(&fitter.settings),
@@ -71,19 +76,40 @@ impl Fitter {
     }
 
     /// Takes up a fit from a saved state.
-    pub fn resume(scene: Arc<Scene>, surface: Arc<Surface>, settings: FitSettings, state: FitState) -> Result<Self> {
+    ///
+    /// Settings that may change while a fit runs may differ from those of the run so far: it then goes on with the new
+    /// ones, as after [`Fitter::change`].
+    pub fn resume(
+        scene: Arc<Scene>,
+        surface: Arc<Surface>,
+        settings: FitSettings,
+        mut state: FitState,
+    ) -> Result<Self> {
         let mut fitter = Fitter::prepare(scene, surface, settings)?;
         let views = fitter.scene.views.len();
         let light = 2 * fitter.settings.environment_height * fitter.settings.environment_height;
         let texels = state.map_size.saturating_mul(state.map_size);
+        let foreign = |why: &str| {
+            Error::new(
+                ErrorKind::InvalidScene,
+                format!("the checkpoint belongs to another scene or other settings{why}"),
+            )
+            .remedy("resume with the scene and settings the run was started with")
+        };
+        if state.plan.is_empty() {
+            state.plan = stages(&fitter.settings);
+        }
+        if state.stage <= state.plan.len() {
+            replan(&mut state, &fitter.settings).map_err(|error| foreign(&format!(": {}", error.message())))?;
+        }
         // At the border of two stages the maps still have the size of the stage before.
-        let stage = fitter.stages.get(state.stage).or(fitter.stages.last());
+        let stage = state.plan.get(state.stage).or(state.plan.last());
         let fits = stage.is_some_and(|stage| {
             state.map_size.is_power_of_two()
                 && state.map_size <= stage.map_size
                 && (state.map_size == stage.map_size || state.step_in_stage == 0)
                 && state.step_in_stage <= stage.steps
-        }) && state.stage <= fitter.stages.len()
+        }) && state.stage <= state.plan.len()
             && state.texels.len() == texels
             && state.moments.is_of(texels)
             && state.light.len() == light
@@ -91,11 +117,7 @@ impl Fitter {
             && state.log_gains.len() == views
             && state.gain_moments.is_of(views);
         if !fits {
-            return Err(Error::new(
-                ErrorKind::InvalidScene,
-                "the checkpoint belongs to another scene or other settings",
-            )
-            .remedy("resume with the scene and settings the run was started with"));
+            return Err(foreign(""));
         }
         fitter.state = state;
         Ok(fitter)
@@ -103,19 +125,17 @@ impl Fitter {
 
     fn prepare(scene: Arc<Scene>, surface: Arc<Surface>, settings: FitSettings) -> Result<Self> {
         settings.validate()?;
-        let training: Vec<usize> = (0..scene.views.len()).filter(|&view| !scene.views[view].held_out).collect();
-        if training.is_empty() {
-            return Err(Error::new(ErrorKind::InvalidScene, "no view is left to fit to")
-                .remedy("hold out fewer views: --hold-out-every 0 keeps them all"));
-        }
+        let uses = uses_of(&scene, &settings.exclude);
+        let training = training_views(&uses, &settings)?;
         evidence::check(&scene, &training, &settings)?;
-        let held_out = held_out_targets(&scene);
-        let stages = stages(&settings);
-        Ok(Fitter { scene, surface, stages, settings, training, held_out, state: FitState::default(), work: None })
+        let held_out = held_out_targets(&scene, &uses);
+        let figures = LiveFigures::new(scene.views.len());
+        let state = FitState::default();
+        Ok(Fitter { scene, surface, settings, uses, training, held_out, state, figures, work: None })
     }
 
     pub(super) fn measured_start(&self) -> start::StartValues {
-        let level = self.stages[0].photo_level;
+        let level = self.state.plan.first().map_or(0, |stage| stage.photo_level);
         let targets = targets(&self.scene, &self.training, level);
         start::measured(&self.scene, &self.surface, &targets, &self.settings)
     }
@@ -153,14 +173,24 @@ impl Fitter {
         &self.state
     }
 
+    /// What each view of the scene serves.
+    pub fn view_uses(&self) -> &[ViewUse] {
+        &self.uses
+    }
+
+    /// What the last steps found out on the way: errors of views, agreement of views.
+    pub fn figures(&self) -> &LiveFigures {
+        &self.figures
+    }
+
     /// Number of steps of all stages.
     pub fn steps_total(&self) -> usize {
-        self.stages.iter().map(|stage| stage.steps).sum()
+        self.state.plan.iter().map(|stage| stage.steps).sum()
     }
 
     /// The stage of the next step; `None` at the end.
     pub fn stage(&self) -> Option<&Stage> {
-        self.stages.get(self.state.stage)
+        self.state.plan.get(self.state.stage)
     }
 
     /// What fixes the scale between reflectance and light.
@@ -197,7 +227,12 @@ impl Fitter {
             )
             .remedy("they were left out; look at that place of the photo or the mesh")
         });
-        events.chain(counts).collect()
+        events.chain(counts).chain(self.setting_findings()).collect()
+    }
+
+    /// What the settings ask for that this scene does not have.
+    pub fn setting_findings(&self) -> Vec<Finding> {
+        unknown_names(&self.scene, &self.settings.exclude)
     }
 
     /// Does one step. `stop` may be raised by another thread at any time: the step in progress is then dropped.
@@ -206,20 +241,21 @@ impl Fitter {
         if !self.look_at_held_out(stop) {
             return Ok(StepOutcome::Interrupted);
         }
-        while self.stages.get(self.state.stage).is_some_and(|stage| self.state.step_in_stage >= stage.steps) {
+        while self.stage().is_some_and(|stage| self.state.step_in_stage >= stage.steps) {
             self.state.stage += 1;
             self.state.step_in_stage = 0;
             self.work = None;
         }
-        let Some(&stage) = self.stages.get(self.state.stage) else { return Ok(StepOutcome::Finished) };
+        let Some(&stage) = self.stage() else { return Ok(StepOutcome::Finished) };
         self.enter(&stage);
 
-        let Some(sums) = self.sum_gradient(&stage, stop)? else { return Ok(StepOutcome::Interrupted) };
+        let Some(mut sums) = self.sum_gradient(&stage, stop)? else { return Ok(StepOutcome::Interrupted) };
         if self.state.step == 0 && self.leave_saddle() {
             self.enter(&stage);
             return self.step(stop);
         }
         self.move_parameters(&stage, &sums);
+        self.figures.keep(&mut sums, stage.map_size);
 
         self.state.step += 1;
         self.state.step_in_stage += 1;

@@ -3,6 +3,7 @@
 use super::fitter::Fitter;
 use super::schedule::Stage;
 use super::targets::Target;
+use super::views::ViewUse;
 use crate::light::EnvironmentSampler;
 use crate::render::PathArena;
 use crate::render::accumulate::{PassKey, estimate_pixel};
@@ -16,9 +17,9 @@ use std::time::Instant;
 const HELD_OUT_PIXELS: usize = 20_000;
 
 /// The held-out views of a scene, shrunk to a size at which looking at them costs little.
-pub(super) fn held_out_targets(scene: &Scene) -> Vec<Target> {
+pub(super) fn held_out_targets(scene: &Scene, uses: &[ViewUse]) -> Vec<Target> {
     (0..scene.views.len())
-        .filter(|&view| scene.views[view].held_out)
+        .filter(|&view| uses[view] == ViewUse::HeldOut)
         .map(|view| {
             let camera = &scene.views[view].camera;
             let mut level = 0;
@@ -43,9 +44,9 @@ impl Fitter {
         }
         let began = Instant::now();
         // The stage of the step that was done, which `step` has not left yet.
-        let Some(&stage) = self.stages.get(self.state.stage) else { return true };
+        let Some(&stage) = self.stage() else { return true };
         self.enter(&stage);
-        let rmse = self.held_out_rmse(&stage, stop);
+        let (rmse, of_views) = self.held_out_rmse(&stage, stop);
         if stop.load(Ordering::Relaxed) {
             return false;
         }
@@ -53,12 +54,15 @@ impl Fitter {
         if let Some(row) = self.state.losses.last_mut() {
             row.held_out_rmse = rmse;
         }
+        self.figures.keep_errors(&of_views);
         true
     }
 
-    /// Root mean squared error over the held-out views, on shrunken photographs. `None` without such views.
-    pub(super) fn held_out_rmse(&self, stage: &Stage, stop: &AtomicBool) -> Option<f64> {
-        let work = self.work.as_ref()?;
+    /// Root mean squared error over the held-out views, on shrunken photographs, and of each of them. `None` without
+    /// such views.
+    fn held_out_rmse(&self, stage: &Stage, stop: &AtomicBool) -> (Option<f64>, Vec<(usize, f32)>) {
+        let Some(work) = self.work.as_ref() else { return (None, Vec::new()) };
+        let mut of_views = Vec::with_capacity(self.held_out.len());
         let sampler = EnvironmentSampler::new(&work.parameters.environment());
         let (mut sum, mut count) = (0.0f64, 0.0f64);
         for target in &self.held_out {
@@ -79,11 +83,16 @@ impl Fitter {
                     (estimate.escaped == 0.0 && error.is_finite()).then_some(error / 3.0)
                 })
                 .collect();
+            let (sum_before, count_before) = (sum, count);
             for error in errors.into_iter().flatten() {
                 sum += error;
                 count += 1.0;
             }
+            if count > count_before {
+                let mean = (sum - sum_before) / (count - count_before);
+                of_views.push((target.view, mean.max(0.0).sqrt() as f32));
+            }
         }
-        (count > 0.0).then(|| (sum / count).max(0.0).sqrt())
+        ((count > 0.0).then(|| (sum / count).max(0.0).sqrt()), of_views)
     }
 }

@@ -5,6 +5,8 @@
 //! gradients of views, [`adam`] moves the numbers, and [`fitter`] is the loop body: one call, one step.
 //! Its parts stand in the order they run: `evidence` looks at what is given, `work` prepares a stage, `batch` picks views and pixels, `gradient` adds them
 //! up, `weigh` applies consistency, `advance` moves the numbers, `held_out` judges them. [`state`] is all they change.
+//! `change` takes other settings between two steps, [`views`] leaves photos out, [`figures`] are for who watches.
+//! [`describe`] lists, reads and sets each setting by name, [`presets`] are whole sets of them.
 //! [`start`] chooses where to begin, [`gauge`] names the freedom that photographs leave, [`checkpoint`] saves it all.
 //!
 //! A fit knows nothing of threads that watch it, of files it came from or of windows: that is `job`.
@@ -12,23 +14,31 @@
 pub mod adam;
 mod advance;
 mod batch;
+mod change;
 pub mod checkpoint;
 pub mod consistency;
+pub mod describe;
 mod evidence;
+pub mod figures;
 pub mod fitter;
 pub mod gauge;
 mod gradient;
 mod held_out;
 pub mod light_prior;
 pub mod loss;
+pub mod presets;
 pub mod schedule;
 pub mod settings;
 pub mod start;
 pub mod state;
 pub mod targets;
+pub mod views;
 mod weigh;
 mod work;
 
+pub use figures::LiveFigures;
 pub use fitter::{Fitter, StepOutcome};
+pub use presets::Preset;
 pub use settings::FitSettings;
 pub use state::{FitState, LossRow};
+pub use views::ViewUse;

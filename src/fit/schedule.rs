@@ -1,9 +1,11 @@
 //! From settings to stages: which parameters move, at which resolution, for how many steps.
 
 use super::settings::{FitSettings, Steps};
+use crate::error::{Error, ErrorKind, Place, Result};
+use serde::{Deserialize, Serialize};
 
 /// Which maps move in a stage. The light moves in all of them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum StageKind {
     /// Diffuse alone; the specular lobe is absent (first step of the paper).
@@ -13,7 +15,7 @@ pub enum StageKind {
 }
 
 /// A run of steps at one resolution.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Stage {
     /// Which maps move.
     pub kind: StageKind,
@@ -56,24 +58,30 @@ impl Stage {
     }
 }
 
-/// The stages of a fit. The first step goes from coarse to fine with maps that grow along; the second works on maps of
-/// full size, on halved photographs first.
-pub fn stages(settings: &FitSettings) -> Vec<Stage> {
-    let mut stages = Vec::new();
-    let levels = settings.levels;
-    let mut add = |kind: StageKind, total: usize, levels_used: usize, maps_grow: bool| {
-        let mut before = 0;
-        for (position, photo_level) in (0..levels_used).rev().enumerate() {
-            let end = total * (position + 1) / levels_used;
+/// A place in the order of stages, whether or not steps fall to it.
+struct Position {
+    kind: StageKind,
+    photo_level: usize,
+    map_size: usize,
+    /// Steps of all positions of the kind.
+    total: usize,
+    /// Which of the positions of its kind it is, and how many there are.
+    place: usize,
+    places: usize,
+}
+
+/// All positions of a fit, in order. The first step goes from coarse to fine with maps that grow along; the second works
+/// on maps of full size, on halved photographs first.
+fn positions(settings: &FitSettings) -> Vec<Position> {
+    let mut positions = Vec::new();
+    let mut add = |kind: StageKind, total: usize, places: usize, maps_grow: bool| {
+        let places = if total > 0 { places } else { 0 };
+        for (place, photo_level) in (0..places).rev().enumerate() {
             let map_size = if maps_grow { settings.map_size >> photo_level } else { settings.map_size };
-            let steps = end - before;
-            if steps > 0 {
-                let stage = Stage { kind, photo_level, map_size, steps, steps_before: before, steps_of_kind: total };
-                stages.push(stage);
-            }
-            before = end;
+            positions.push(Position { kind, photo_level, map_size, total, place, places });
         }
     };
+    let levels = settings.levels;
     match settings.steps {
         Steps::TwoStep => {
             add(StageKind::Diffuse, settings.steps_diffuse, levels, true);
@@ -82,7 +90,122 @@ pub fn stages(settings: &FitSettings) -> Vec<Stage> {
         }
         Steps::OneStep => add(StageKind::All, settings.steps_diffuse + settings.steps_all, levels, true),
     }
+    positions
+}
+
+/// The stages of a fit that begins: the steps of a kind are shared evenly over its levels; a level without any is left
+/// out.
+pub fn stages(settings: &FitSettings) -> Vec<Stage> {
+    let mut stages = Vec::new();
+    let mut before = 0;
+    for position in positions(settings) {
+        before = if position.place == 0 { 0 } else { before };
+        let end = position.total * (position.place + 1) / position.places;
+        add_stage(&mut stages, &position, before, end);
+        before = end;
+    }
     stages
+}
+
+fn add_stage(stages: &mut Vec<Stage>, position: &Position, before: usize, end: usize) {
+    if end > before {
+        stages.push(Stage {
+            kind: position.kind,
+            photo_level: position.photo_level,
+            map_size: position.map_size,
+            steps: end - before,
+            steps_before: before,
+            steps_of_kind: position.total,
+        });
+    }
+}
+
+/// The stages of a fit that is under way, for settings that may ask for other numbers of steps than `plan` was made for.
+///
+/// Stages before number `stage` keep their steps; that one has done `step_in_stage`. What is left of a kind falls to its
+/// levels as if it had been asked for from the start, as far as steps that are done allow. For the settings of `plan`
+/// the result is `plan`.
+///
+/// # Errors
+/// `InvalidSetting` at `steps-diffuse` or `steps-all` when fewer steps are asked for than are done, or when the step
+/// they belong to is over; without a place when `plan` is not one of these settings at all.
+pub fn revised(settings: &FitSettings, plan: &[Stage], stage: usize, step_in_stage: usize) -> Result<Vec<Stage>> {
+    let foreign = || {
+        Error::new(ErrorKind::InvalidSetting, "the stages that are done are not those of these settings")
+            .remedy("go on with the settings the run was started with")
+    };
+    // At the end the last stage counts as the one in progress, so that it can be made longer.
+    let (stage, step_in_stage) = match (plan.get(stage), plan.last()) {
+        (Some(_), _) => (stage, step_in_stage),
+        (None, Some(last)) => (plan.len() - 1, last.steps),
+        (None, None) => return Err(foreign()),
+    };
+    let positions = positions(settings);
+    let is_at = |stage: &Stage, position: &Position| {
+        (stage.kind, stage.photo_level, stage.map_size) == (position.kind, position.photo_level, position.map_size)
+    };
+    if !plan[..stage].iter().all(|done| positions.iter().any(|position| is_at(done, position))) {
+        return Err(over_or(foreign(), settings, plan));
+    }
+    let Some(current) = positions.iter().position(|position| is_at(&plan[stage], position)) else {
+        return Err(over_or(foreign(), settings, plan));
+    };
+    let mut stages = Vec::new();
+    let mut before = 0;
+    for (number, position) in positions.iter().enumerate() {
+        before = if position.place == 0 { 0 } else { before };
+        let is_last = position.place + 1 == position.places;
+        let ideal = position.total * (position.place + 1) / position.places;
+        let end = match number.cmp(&current) {
+            std::cmp::Ordering::Less => {
+                let done = plan[..stage].iter().find(|stage| is_at(stage, position));
+                before + done.map_or(0, |stage| stage.steps)
+            }
+            std::cmp::Ordering::Equal => {
+                let done = before + step_in_stage;
+                // The finest level must come to its turn: maps reach their full size there.
+                let least = if is_last { done } else { done + 1 };
+                if position.total < least {
+                    let message = format!("{done} steps are done already; {least} is the least");
+                    return Err(of_steps(settings, position.kind, message));
+                }
+                ideal.max(done)
+            }
+            std::cmp::Ordering::Greater => ideal.max(before),
+        };
+        if is_last && end != position.total {
+            let message = format!("these steps are over: {end} were done");
+            return Err(of_steps(settings, position.kind, message));
+        }
+        add_stage(&mut stages, position, before, end);
+        before = end;
+    }
+    Ok(stages)
+}
+
+/// A plan has no place in these settings since a kind was taken away or added whole: then that setting is named.
+fn over_or(otherwise: Error, settings: &FitSettings, plan: &[Stage]) -> Error {
+    let (own, other) = (plan.iter().map(|stage| stage.kind), positions(settings));
+    for kind in own {
+        if !other.iter().any(|position| position.kind == kind) {
+            return of_steps(settings, kind, "these steps have begun".into());
+        }
+    }
+    let asked = other.iter().any(|position| position.kind == StageKind::Diffuse);
+    if asked && plan.iter().all(|stage| stage.kind != StageKind::Diffuse) {
+        return of_steps(settings, StageKind::Diffuse, "these steps are over: none was done".into());
+    }
+    otherwise
+}
+
+fn of_steps(settings: &FitSettings, kind: StageKind, message: String) -> Error {
+    let name = match (kind, settings.steps) {
+        (StageKind::Diffuse, _) => "steps-diffuse",
+        (StageKind::All, _) => "steps-all",
+    };
+    Error::new(ErrorKind::InvalidSetting, message)
+        .at(Place::Setting(name.into()))
+        .remedy("steps that are done stay done: ask for at least as many, or start a new run")
 }
 
 #[cfg(test)]
@@ -100,5 +223,70 @@ mod tests {
         assert!(stages[3].lobe_strength(0, 20) > 0.0);
         assert!((stages[0].rate(0, 0.1) - 1.0).abs() < 1e-6);
         assert!(stages[2].rate(stages[2].steps, 0.1) < 0.11);
+    }
+
+    /// Walks a plan step by step: (stage, step in stage) before each step, and at the very end.
+    fn walk(plan: &[Stage]) -> Vec<(usize, usize)> {
+        let places = plan.iter().enumerate().flat_map(|(stage, own)| (0..=own.steps).map(move |step| (stage, step)));
+        places.chain([(plan.len(), 0)]).collect()
+    }
+
+    #[test]
+    fn the_same_settings_keep_the_plan_wherever_it_is() {
+        for (steps_diffuse, steps_all, levels) in [(10, 7, 3), (0, 11, 4), (2, 0, 3), (1, 1, 2), (10, 3, 4)] {
+            for steps in [Steps::TwoStep, Steps::OneStep] {
+                let settings =
+                    FitSettings { steps, steps_diffuse, steps_all, levels, map_size: 64, ..Default::default() };
+                let plan = stages(&settings);
+                for (stage, step) in walk(&plan) {
+                    assert_eq!(
+                        revised(&settings, &plan, stage, step).unwrap(),
+                        plan,
+                        "{settings:?} at {stage}, {step}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn other_numbers_of_steps_keep_what_is_done_and_reach_the_finest_level() {
+        let of = |steps_diffuse, steps_all| FitSettings {
+            steps_diffuse,
+            steps_all,
+            levels: 3,
+            map_size: 64,
+            ..Default::default()
+        };
+        let before = of(10, 7);
+        let plan = stages(&before);
+        for (stage, step) in walk(&plan) {
+            for (steps_diffuse, steps_all) in [(10, 20), (40, 7), (5, 7), (10, 4), (12, 0), (0, 7), (4, 3)] {
+                let after = of(steps_diffuse, steps_all);
+                let done: usize = plan[..stage].iter().map(|stage| stage.steps).sum::<usize>() + step;
+                match revised(&after, &plan, stage, step) {
+                    Ok(new) => {
+                        assert_eq!(new.iter().map(|stage| stage.steps).sum::<usize>(), steps_diffuse + steps_all);
+                        assert_eq!(new.last().unwrap().map_size, 64);
+                        let kept = stage.min(plan.len() - 1);
+                        let steps = |plan: &[Stage]| plan[..kept].iter().map(|stage| stage.steps).collect::<Vec<_>>();
+                        assert_eq!(steps(&new), steps(&plan));
+                        assert!(new.windows(2).all(|pair| pair[0].map_size <= pair[1].map_size));
+                        // Asking again changes nothing, a step later neither.
+                        assert_eq!(revised(&after, &new, stage, step).unwrap(), new);
+                        if new.get(stage).is_some_and(|stage| stage.steps > step) {
+                            assert_eq!(revised(&after, &new, stage, step + 1).unwrap(), new);
+                        }
+                    }
+                    Err(error) => {
+                        assert!(error.to_string().contains("--steps-"), "{error}");
+                        assert!(done >= steps_diffuse.min(10) || steps_diffuse == 0, "{error} after {done} steps");
+                    }
+                }
+            }
+        }
+        assert!(revised(&of(9, 7), &plan, 3, 1).unwrap_err().to_string().contains("--steps-diffuse"));
+        assert!(revised(&of(10, 2), &plan, 4, 0).unwrap_err().to_string().contains("--steps-all"));
+        assert_eq!(revised(&of(10, 9), &plan, plan.len(), 0).unwrap().last().unwrap().steps, plan[4].steps + 2);
     }
 }

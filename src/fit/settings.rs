@@ -137,6 +137,9 @@ pub struct FitSettings {
     /// Optimiser steps between two looks at the held-out views; 0 never looks.
     #[arg(long, default_value_t = FitSettings::default().held_out_interval)]
     pub held_out_interval: usize,
+    /// Leave a photo out, by its name: it is neither fitted nor used to judge the fit. May be given more than once.
+    #[arg(long, value_name = "NAME")]
+    pub exclude: Vec<String>,
 }
 
 impl Default for FitSettings {
@@ -168,6 +171,7 @@ impl Default for FitSettings {
             lobe_ramp: 20,
             first_hits_mib: 0,
             held_out_interval: 10,
+            exclude: Vec::new(),
         }
     }
 }
@@ -183,6 +187,10 @@ impl FitSettings {
         let wrong = |name: &str, message: &str| {
             Err(Error::new(ErrorKind::InvalidSetting, message).at(Place::Setting(name.into())))
         };
+        // A settings file holds signed numbers of 64 bits.
+        if i64::try_from(self.seed).is_err() {
+            return wrong("seed", "must be at most 9223372036854775807");
+        }
         if !self.map_size.is_power_of_two() || !(16..=8192).contains(&self.map_size) {
             return wrong("map-size", "must be a power of two from 16 to 8192");
         }

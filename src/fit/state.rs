@@ -1,6 +1,7 @@
 //! What a fit changes, and its history: all that a checkpoint holds.
 
 use super::adam::Moments;
+use super::schedule::Stage;
 use crate::material::texels::Texel;
 use serde::{Deserialize, Serialize};
 
@@ -26,7 +27,9 @@ pub struct LossRow {
 /// Everything a fit changes: what a checkpoint holds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FitState {
-    /// Index of the stage.
+    /// The stages, those that are done and those to come: numbers of steps may change on the way.
+    pub plan: Vec<Stage>,
+    /// Index of the stage in the plan; its length at the end.
     pub stage: usize,
     /// Steps done in the stage.
     pub step_in_stage: usize,

@@ -27,7 +27,7 @@ impl Fitter {
         stop: &AtomicBool,
     ) -> bool {
         let count = stage.map_size * stage.map_size;
-        let agreement = Agreement::of(view_gradients, count, None, f64::from);
+        let mut agreement = Agreement::of(view_gradients, count, None, f64::from);
         sums.consistency = agreement.value;
         let scale_all = |gradient: &mut Parameters<f32>, factor: f32| {
             for texel in &mut gradient.texels.levels[0].texels {
@@ -70,6 +70,7 @@ impl Fitter {
                 }
             }
         }
+        sums.agreement = Some(std::mem::take(&mut agreement.per_texel));
         true
     }
 

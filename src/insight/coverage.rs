@@ -13,6 +13,11 @@ use rayon::prelude::*;
 /// block of texels counts, so that a map finer than the photos is not speckled with unseen texels.
 pub fn times_seen(scene: &Scene, surface: &Surface, map_size: usize) -> GreyImage {
     let training: Vec<usize> = (0..scene.views.len()).filter(|&view| !scene.views[view].held_out).collect();
+    times_seen_by(scene, surface, &training, map_size)
+}
+
+/// In how many of the given views, by index, each texel of square maps is seen; see [`times_seen`].
+pub fn times_seen_by(scene: &Scene, surface: &Surface, training: &[usize], map_size: usize) -> GreyImage {
     let mut counts = vec![0u16; map_size * map_size];
     // A few views at once: each needs a map of bits of its own.
     for group in training.chunks(8) {

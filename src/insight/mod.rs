@@ -4,17 +4,22 @@
 //! and light with a known truth, [`report`] makes the one page that shows it all, [`study`] gathers numbers over seeds.
 //! Every score comes twice, raw and scale-aligned, because reflectance times c with light over c is the same picture.
 //!
-//! [`coverage`] counts which texels photographs see. [`audit`] checks derivatives against differences.
+//! [`coverage`] counts which texels photographs see. [`audit`] checks derivatives against differences. [`cursor`] leads
+//! between photo, surface and map; [`record`] says what each photo and the model say of one point,
+//! [`surface_layers`] what all photos together say of each texel.
 //!
 //! What this folder refuses to do: it changes no map, and scores only pictures that are handed to it.
 
 pub mod audit;
 pub mod coverage;
+pub mod cursor;
 pub mod memory;
 pub mod plot;
+pub mod record;
 pub mod report;
 pub mod scores;
 pub mod study;
+pub mod surface_layers;
 pub mod truth;
 
 pub use report::{ReportData, ReportImages, write_report};

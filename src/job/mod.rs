@@ -1,34 +1,45 @@
 //! The only door between a fit and whoever watches it.
 //!
-//! A job owns a thread. [`Command`]s go in, bounded [`Event`]s come out, and a [`Slot`] holds the newest [`Snapshot`] of
-//! maps and light: a watcher that is slow misses steps, never the last state, and never slows the fit. The command line
+//! A job owns a thread. [`Command`]s go in, [`Event`]s come out, and a [`Slot`] holds the newest [`Snapshot`] of maps and
+//! light: a watcher that is slow misses steps, never the last state, and never slows the fit. The command line
 //! and the window drive the same job, so neither can do what the other cannot.
 //!
-//! [`prepare`] turns a scene into a surface with an atlas, [`worker`] is the thread, [`outcome`] renders, scores and
+//! [`open`] opens scenes and runs, begins fits and takes them up; [`prepare`] turns a scene into a surface with an atlas,
+//! [`worker`] is the thread, `save` keeps the run folder whole while it runs, [`outcome`] renders, scores and
 //! writes the run folder, [`demo`] makes the built-in scene, [`study`]
-//! fits many times over and makes tables.
+//! fits many times over and makes tables. [`preview`] draws for a window beside a fit. After a fit, [`gallery`] makes
+//! what a user shows, [`gauge`] moves its scale, [`entanglement`] tells how much light is baked into the maps.
 
 pub mod demo;
+pub mod entanglement;
+pub mod gallery;
+pub mod gauge;
+pub mod open;
 pub mod outcome;
 pub mod pictures;
 pub mod prepare;
+pub mod preview;
+mod save;
 pub mod scale;
 pub mod slot;
 pub mod study;
+mod view;
 pub mod worker;
 
 pub use prepare::RunSettings;
 pub use slot::Slot;
-pub use worker::{JobHandle, start};
+pub use worker::{JobHandle, JobOptions, Wake, start, start_with};
 
 use crate::error::{Error, Finding};
-use crate::fit::LossRow;
+use crate::fit::{FitSettings, LossRow};
+use crate::image::GreyImage;
 use crate::light::Environment;
 use crate::material::MaterialMaps;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// What a watcher may ask of a job.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Command {
     /// Hold after the step in progress.
     Pause,
@@ -38,11 +49,15 @@ pub enum Command {
     StepOnce,
     /// Write a checkpoint after the step in progress.
     Checkpoint,
+    /// Go on with other settings after the step in progress: [`Fitter::change`](crate::fit::Fitter::change). Answered by
+    /// [`Event::SettingsChanged`] or [`Event::Refused`].
+    Change(Box<FitSettings>),
     /// Drop the step in progress, write a checkpoint and end.
     Stop,
 }
 
-/// What a job tells. Progress is dropped when nobody reads it; everything else waits for a reader.
+/// What a job tells. Progress is dropped when nobody reads it; everything else is kept for the reader. The fit never
+/// waits for one.
 #[derive(Clone, Debug)]
 pub enum Event {
     /// The fit begins or goes on.
@@ -58,6 +73,10 @@ pub enum Event {
     Finding(Finding),
     /// A checkpoint was written.
     Checkpoint(PathBuf),
+    /// The fit goes on with these settings.
+    SettingsChanged(Box<FitSettings>),
+    /// Settings that were asked for cannot be taken; the fit goes on with those it has.
+    Refused(Error),
     /// The job holds.
     Paused,
     /// The job goes on.
@@ -94,9 +113,20 @@ pub struct Snapshot {
     /// Steps done.
     pub step: usize,
     /// The maps, of the size of the stage.
-    pub maps: MaterialMaps,
+    pub maps: Arc<MaterialMaps>,
     /// The light.
-    pub environment: Environment,
+    pub environment: Arc<Environment>,
     /// The curve so far.
     pub losses: Vec<LossRow>,
+    /// Steps of the whole fit.
+    pub steps_total: usize,
+    /// Name of the stage, such as `diffuse 1/4`; that of the last stage at the end.
+    pub stage: String,
+    /// Root mean squared error of each view in linear radiance, as last known in this session:
+    /// [`LiveFigures::view_rmse`](crate::fit::LiveFigures::view_rmse).
+    pub view_rmse: Vec<Option<f32>>,
+    /// Logarithm of each view's gain; 0 when gains are not fitted.
+    pub log_gains: Vec<f32>,
+    /// Disagreement of the views at each texel in the last step; `None` without consistency.
+    pub agreement: Option<Arc<GreyImage>>,
 }

@@ -5,10 +5,11 @@ use super::prepare::{Prepared, RunSettings, covered, timed};
 use crate::atlas::{AtlasQuality, dilate, nearest_covered};
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::export::{LossRow, RunFolder, RunResult};
-use crate::fit::Fitter;
 use crate::fit::settings::BackgroundEvidence;
 use crate::fit::state::FitState;
 use crate::fit::targets::Target;
+use crate::fit::views::views_of;
+use crate::fit::{Fitter, ViewUse};
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::insight::report::data::{
     Fact, NamedAggregate, NonFiniteCount, ReportData, SettingLine, StageTime, TexelCounts, TruthErrors, ViewLine,
@@ -55,6 +56,7 @@ pub fn loss_rows(state: &FitState) -> Vec<LossRow> {
 /// A view at the size the report shows, with its score.
 struct ScoredView {
     index: usize,
+    kind: ViewUse,
     scores: ViewScores,
     pictures: ViewPictures,
 }
@@ -75,7 +77,9 @@ pub fn write(
     // The clock of the job began after these, and after earlier sessions of a resumed fit.
     let before_job: f64 = timings.iter().filter(|time| time.stage != "fit").map(|time| time.seconds).sum();
     tell("maps");
-    let times_seen = timed(&mut timings, "coverage", || coverage::times_seen(scene, surface, settings.fit.map_size));
+    let training = views_of(fitter.view_uses(), ViewUse::Training);
+    let times_seen =
+        timed(&mut timings, "coverage", || coverage::times_seen_by(scene, surface, &training, settings.fit.map_size));
     let covered = covered(surface, settings.fit.map_size);
     let maps = fill_outside(&fitter.maps(), &times_seen, &covered);
     let environment = fitter.environment();
@@ -88,7 +92,7 @@ pub fn write(
     let views = timed(&mut timings, "score views", || score_views(fitter, surface, &own, settings, stop))?;
     tell("relit pictures");
     let (relit, relit_errors) =
-        timed(&mut timings, "relight", || relit_strips(scene, surface, &own, &result, settings, stop))?;
+        timed(&mut timings, "relight", || relit_strips(fitter, surface, &own, &result, settings, stop))?;
     if stop.load(Ordering::Relaxed) {
         return Err(Error::new(ErrorKind::Stopped, "stopped while the report was made")
             .remedy("the maps are written; `patina resume` makes the report"));
@@ -99,11 +103,12 @@ pub fn write(
         .iter()
         .map(|view| {
             let gain = f64::from(fitter.state().log_gains[view.index].exp());
-            ViewLine::new(&view.pictures.name, view.pictures.held_out, &view.scores, gain)
+            let line = ViewLine::new(&view.pictures.name, view.pictures.held_out, &view.scores, gain);
+            ViewLine { left_out: view.kind == ViewUse::LeftOut, ..line }
         })
         .collect();
-    for (name, held_out) in [("held-out views", true), ("training views", false)] {
-        let of_kind: Vec<_> = views.iter().filter(|view| view.pictures.held_out == held_out).collect();
+    for (name, kind) in [("held-out views", ViewUse::HeldOut), ("training views", ViewUse::Training)] {
+        let of_kind: Vec<_> = views.iter().filter(|view| view.kind == kind).collect();
         if !of_kind.is_empty() {
             let score = aggregate(of_kind.iter().map(|view| &view.scores));
             data.aggregates.push(NamedAggregate { name: name.into(), score });
@@ -122,7 +127,8 @@ pub fn write(
     tell("report");
     let truth = scene.truth.as_ref();
     let images = ReportImages {
-        views: views.into_iter().map(|view| view.pictures).collect(),
+        // What was left out is no evidence of how good the fit is: its scores are listed, its pictures are not shown.
+        views: views.into_iter().filter(|view| view.kind != ViewUse::LeftOut).map(|view| view.pictures).collect(),
         exposure_stops: exposure_of(scene),
         maps: Some(&result.maps),
         truth_maps: truth.map(|truth| &truth.maps).filter(|maps| !maps.diffuse.pixels().is_empty()),
@@ -187,9 +193,11 @@ fn score_views(
 ) -> Result<Vec<ScoredView>> {
     let scene = fitter.scene().as_ref();
     let mut scored = Vec::with_capacity(scene.views.len());
-    for (index, view) in scene.views.iter().enumerate() {
-        let (most, samples) =
-            if view.held_out { (HELD_OUT_PIXELS, HELD_OUT_SAMPLES) } else { (TRAINING_PIXELS, TRAINING_SAMPLES) };
+    for (index, (view, &kind)) in scene.views.iter().zip(fitter.view_uses()).enumerate() {
+        let (most, samples) = match kind {
+            ViewUse::HeldOut => (HELD_OUT_PIXELS, HELD_OUT_SAMPLES),
+            ViewUse::Training | ViewUse::LeftOut => (TRAINING_PIXELS, TRAINING_SAMPLES),
+        };
         let picture_settings = picture_settings(scene, settings, samples);
         let target = Target::new(scene, index, level_of(scene, index, most));
         let gain = fitter.state().log_gains[index].exp();
@@ -209,7 +217,7 @@ fn score_views(
             fit: picture.radiance,
             counted: Some(counted),
         };
-        scored.push(ScoredView { index, scores, pictures });
+        scored.push(ScoredView { index, kind, scores, pictures });
     }
     Ok(scored)
 }
@@ -235,13 +243,15 @@ pub fn exposure_of(scene: &Scene) -> f32 {
 
 /// Pictures under the light of the truth, when there is one, and under built-in skies.
 fn relit_strips(
-    scene: &Scene,
+    fitter: &Fitter,
     surface: &Surface,
     own: &Parameters<f32>,
     result: &RunResult,
     settings: &RunSettings,
     stop: &AtomicBool,
 ) -> Result<(Vec<RelitStrip>, Vec<ViewScores>)> {
+    let scene = fitter.scene().as_ref();
+    let uses = fitter.view_uses();
     let mut strips = Vec::new();
     let mut errors = Vec::new();
     if let Some(truth) = scene.truth.as_ref().and_then(|truth| truth.relight.as_ref()) {
@@ -268,8 +278,8 @@ fn relit_strips(
         strips.push(strip);
     }
     // Held-out views first: they are the ones a reader compares.
-    let mut order: Vec<usize> = (0..scene.views.len()).collect();
-    order.sort_by_key(|&view| !scene.views[view].held_out);
+    let mut order = views_of(uses, ViewUse::HeldOut);
+    order.extend(views_of(uses, ViewUse::Training));
     let shown: Vec<usize> = order.iter().copied().step_by((order.len() / 3).max(1)).take(3).collect();
     let relight_settings =
         PictureSettings { background_visible: true, ..picture_settings(scene, settings, RELIT_SAMPLES) };
@@ -375,11 +385,15 @@ fn describe(
     covered: &Image<bool>,
 ) -> ReportData {
     let scene = fitter.scene();
-    let held_out = scene.views.iter().filter(|view| view.held_out).count();
+    let count = |kind| fitter.view_uses().iter().filter(|own| **own == kind).count();
+    let left_out = match count(ViewUse::LeftOut) {
+        0 => String::new(),
+        count => format!(", {count} left out"),
+    };
     let fact = |name: &str, value: String| Fact { name: name.into(), value };
     let mut scene_facts = vec![
         fact("triangles", surface_size(fitter)),
-        fact("views", format!("{} to fit, {held_out} held out", scene.views.len() - held_out)),
+        fact("views", format!("{} to fit, {} held out{left_out}", count(ViewUse::Training), count(ViewUse::HeldOut))),
     ];
     if let Some(view) = scene.views.first() {
         scene_facts.push(fact("photographs", format!("{} x {} pixels", view.camera.width, view.camera.height)));

@@ -1,14 +1,16 @@
 //! From a scene folder to something a fit can start on.
 
+use super::open::{OpenStage, Tell, open_scene, told};
 use crate::atlas::{self, AtlasQuality, AtlasSettings, covered_texels};
-use crate::error::{Error, ErrorKind, Finding, Result, Severity};
+use crate::error::{Finding, Result};
 use crate::fit::FitSettings;
 use crate::insight::report::data::StageTime;
 use crate::render::Surface;
-use crate::scene::{ReadSettings, Scene, doctor};
+use crate::scene::{ReadSettings, Scene};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// Everything a run was started with: `settings.toml` of the run folder.
@@ -51,32 +53,47 @@ pub fn timed<T>(timings: &mut Vec<StageTime>, stage: &str, work: impl FnOnce() -
 
 /// Reads and checks a scene. A finding that is fatal is an error: nothing starts a long fit on a scene that cannot work.
 pub fn read_scene(path: &Path, settings: &ReadSettings, timings: &mut Vec<StageTime>) -> Result<(Scene, Vec<Finding>)> {
-    let scene = timed(timings, "read", || crate::scene::read(path, settings))?;
-    let report = timed(timings, "check", || doctor::check(&scene));
-    let findings = report.findings;
-    if let Some(fatal) = findings.iter().find(|finding| finding.severity == Severity::Fatal) {
-        let place = if fatal.place.is_empty() { String::new() } else { format!("{}: ", fatal.place) };
-        return Err(Error::new(ErrorKind::InvalidScene, format!("the scene cannot work: {place}{}", fatal.message))
-            .remedy(fatal.remedy.clone()));
-    }
-    Ok((scene, findings))
+    let opened = open_scene(path, settings, &AtomicBool::new(false), &|_, _| {})?;
+    opened.refuse_fatal()?;
+    timings.extend(opened.timings);
+    Ok((opened.scene, opened.report.findings))
 }
 
 /// Makes the atlas and the surface of a checked scene.
 pub fn prepare(
     scene: Scene,
+    findings: Vec<Finding>,
+    settings: &RunSettings,
+    timings: Vec<StageTime>,
+    progress: &(dyn Fn(f32) + Sync),
+) -> Result<Prepared> {
+    let tell = |stage, share| {
+        if stage == OpenStage::Atlas {
+            progress(share);
+        }
+    };
+    prepare_with(Arc::new(scene), findings, settings, timings, &AtomicBool::new(false), &tell)
+}
+
+/// [`prepare`] that tells of its stages and honours a stop flag between them.
+pub fn prepare_with(
+    scene: Arc<Scene>,
     mut findings: Vec<Finding>,
     settings: &RunSettings,
     mut timings: Vec<StageTime>,
-    progress: &(dyn Fn(f32) + Sync),
+    stop: &AtomicBool,
+    tell: Tell,
 ) -> Result<Prepared> {
     // Charts keep their distance at the size the maps are stored in.
     let atlas_settings = AtlasSettings { resolution_texels: settings.fit.map_size, ..settings.atlas.clone() };
-    let atlas = timed(&mut timings, "atlas", || atlas::build(&scene.mesh, &atlas_settings, progress))?;
+    let progress = |share: f32| tell(OpenStage::Atlas, share);
+    let atlas = told(OpenStage::Atlas, stop, tell, || {
+        timed(&mut timings, "atlas", || atlas::build(&scene.mesh, &atlas_settings, &progress))
+    })?;
     findings.extend(atlas.findings);
     let mesh = atlas.mesh;
-    let surface = timed(&mut timings, "tracer", || Surface::new(mesh))?;
-    Ok(Prepared { scene: Arc::new(scene), surface: Arc::new(surface), quality: Some(atlas.quality), findings, timings })
+    let surface = told(OpenStage::Tracer, stop, tell, || timed(&mut timings, "tracer", || Surface::new(mesh)))?;
+    Ok(Prepared { scene, surface: Arc::new(surface), quality: Some(atlas.quality), findings, timings })
 }
 
 /// Texels of a chart, at a size.

@@ -2,21 +2,37 @@
 
 use super::outcome;
 use super::prepare::{Prepared, RunSettings};
+use super::save::Saver;
 use super::{Command, Event, Progress, Slot, Snapshot};
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::export::RunFolder;
-use crate::fit::{Fitter, StepOutcome, checkpoint};
+use crate::fit::{FitSettings, Fitter, LossRow, StepOutcome};
 use crate::insight::report::data::StageTime;
-use crossbeam_channel::{Receiver, Sender, TryRecvError, bounded};
+use crossbeam_channel::{Receiver, Sender, unbounded};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Seconds between two checkpoints.
-const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(60);
-/// Seconds between two snapshots, at least; maps of 2048^2 texels take a while to copy.
+/// Time between two snapshots, at least; maps of 2048^2 texels take a while to copy.
 const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(500);
+/// Events that may wait for a reader before progress is dropped.
+const MOST_WAITING_EVENTS: usize = 256;
+/// How long a job that holds waits for a command before it looks at its stop flag.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+/// Called after each event and snapshot, on the thread of the fit: it must return at once. A window repaints then.
+pub type Wake = Arc<dyn Fn() + Send + Sync>;
+
+/// What a job may be given beside its work.
+#[derive(Default)]
+pub struct JobOptions {
+    /// Called after each event and snapshot.
+    pub wake: Option<Wake>,
+    /// Called before each step with the number of steps done; a seam for tests of faults.
+    #[doc(hidden)]
+    pub before_step: Option<Box<dyn FnMut(usize) + Send>>,
+}
 
 /// A running job.
 pub struct JobHandle {
@@ -34,7 +50,7 @@ impl JobHandle {
     /// Asks the job to end within a tile of pixels; it writes a checkpoint first.
     pub fn stop(&self) {
         self.stop.store(true, Ordering::Relaxed);
-        let _ = self.commands.try_send(Command::Stop);
+        let _ = self.commands.send(Command::Stop);
     }
 
     /// A flag that stops the job when raised; for signal handlers.
@@ -57,21 +73,42 @@ impl Drop for JobHandle {
 }
 
 /// Starts a job over a prepared scene. `fitter` may be new or resumed; results go to `folder`.
+///
+/// # Errors
+/// `Internal` when no thread can be started. What goes wrong later is told as [`Event::Failed`].
 pub fn start(prepared: Prepared, fitter: Fitter, settings: RunSettings, folder: RunFolder) -> Result<JobHandle> {
-    let (commands, command_receiver) = bounded(64);
-    let (event_sender, events) = bounded(256);
+    start_with(prepared, fitter, settings, folder, JobOptions::default())
+}
+
+/// [`start`] with options.
+///
+/// # Errors
+/// As of [`start`].
+pub fn start_with(
+    prepared: Prepared,
+    fitter: Fitter,
+    settings: RunSettings,
+    folder: RunFolder,
+    options: JobOptions,
+) -> Result<JobHandle> {
+    // Neither channel makes its sender wait; what is sent is little, since progress is dropped when nobody reads it.
+    let (commands, command_receiver) = unbounded();
+    let (event_sender, events) = unbounded();
     let snapshot = Arc::new(Slot::default());
     let stop = Arc::new(AtomicBool::new(false));
+    let teller = Teller { events: event_sender, wake: options.wake };
     let worker = Worker {
         fitter,
         settings,
-        folder,
+        saver: Saver::new(folder),
         commands: command_receiver,
-        events: event_sender.clone(),
+        teller: teller.clone(),
+        before_step: options.before_step,
         snapshot: Arc::clone(&snapshot),
         stop: Arc::clone(&stop),
         began: Instant::now(),
         paused: false,
+        steps_asked: 0,
     };
     let thread = std::thread::Builder::new()
         .name("patina-fit".into())
@@ -87,147 +124,228 @@ pub fn start(prepared: Prepared, fitter: Fitter, settings: RunSettings, folder: 
                         .remedy("a defect of this program; the last checkpoint is whole: `patina resume`")
                 }
             };
-            let _ = event_sender.send(Event::Failed(error));
+            teller.send(Event::Failed(error));
         })
         .map_err(|source| Error::new(ErrorKind::Internal, format!("cannot start a thread: {source}")))?;
     Ok(JobHandle { commands, events, snapshot, stop, thread: Some(thread) })
 }
 
+/// Where events go.
+#[derive(Clone)]
+struct Teller {
+    events: Sender<Event>,
+    wake: Option<Wake>,
+}
+
+impl Teller {
+    /// Sends an event without waiting; progress only while the reader keeps up.
+    fn send(&self, event: Event) {
+        if matches!(event, Event::Progress(_)) && self.events.len() >= MOST_WAITING_EVENTS {
+            return;
+        }
+        // Nobody listens any more: the fit goes on, its files are what counts.
+        let _ = self.events.send(event);
+        self.wake();
+    }
+
+    fn wake(&self) {
+        if let Some(wake) = &self.wake {
+            wake();
+        }
+    }
+}
+
 struct Worker {
     fitter: Fitter,
     settings: RunSettings,
-    folder: RunFolder,
+    saver: Saver,
     commands: Receiver<Command>,
-    events: Sender<Event>,
+    teller: Teller,
+    before_step: Option<Box<dyn FnMut(usize) + Send>>,
     snapshot: Arc<Slot<Snapshot>>,
     stop: Arc<AtomicBool>,
     began: Instant,
     paused: bool,
+    /// Single steps that were asked for and not done yet.
+    steps_asked: usize,
 }
 
 impl Worker {
     fn run(mut self, mut prepared: Prepared) -> Result<()> {
-        self.folder.write_settings(&self.settings)?;
-        crate::export::obj::write(&self.folder.file("mesh.obj"), self.fitter.surface().mesh())?;
-        let steps_total = self.fitter.steps_total();
-        self.send(Event::Started { steps_done: self.fitter.state().step, steps_total });
-        for finding in &prepared.findings {
-            self.send(Event::Finding(finding.clone()));
+        // Nothing is lost yet: a folder that cannot be written is an error here, and a warning from now on.
+        let steps_done = self.fitter.state().step;
+        crate::export::obj::write(&self.saver.folder().file("mesh.obj"), self.fitter.surface().mesh())?;
+        if steps_done == 0 {
+            // The checkpoint of an earlier run in the folder must not be taken for one of this run.
+            self.saver.save(&self.fitter, &self.settings)?;
+        } else {
+            self.saver.folder().write_settings(&self.settings)?;
         }
+        self.teller.send(Event::Started { steps_done, steps_total: self.fitter.steps_total() });
+        for finding in prepared.findings.iter().cloned().chain(self.fitter.setting_findings()) {
+            self.teller.send(Event::Finding(finding));
+        }
+        self.put_snapshot();
+        let mut last_snapshot = Instant::now();
         let mut told_events = 0;
-        let mut last_checkpoint = Instant::now();
-        let mut last_snapshot: Option<Instant> = None;
-        let mut step_once = false;
         loop {
-            match self.next_command()? {
-                Some(Command::Stop) => return self.end_early(),
-                Some(Command::Pause) => self.set_paused(true)?,
-                Some(Command::Resume) => self.set_paused(false)?,
-                Some(Command::StepOnce) => step_once = true,
-                Some(Command::Checkpoint) => self.write_checkpoint()?,
-                None => {}
+            if self.obey() {
+                return self.end_early();
             }
-            if self.paused && !step_once {
+            if self.saver.is_due() {
+                self.save();
+            }
+            if self.paused && self.steps_asked == 0 {
                 continue;
             }
-            step_once = false;
+            if let Some(hook) = &mut self.before_step {
+                hook(self.fitter.state().step);
+            }
             match self.fitter.step(&self.stop)? {
                 StepOutcome::Interrupted => return self.end_early(),
                 StepOutcome::Finished => break,
                 StepOutcome::Stepped(row) => {
                     let state = self.fitter.state();
                     for event in &state.events[told_events..] {
-                        let finding = crate::error::Finding::new(crate::Severity::Note, "fit-event", event.clone());
-                        self.send(Event::Finding(finding));
+                        self.teller.send(Event::Finding(Finding::new(Severity::Note, "fit-event", event.clone())));
                     }
                     told_events = state.events.len();
-                    let _ = self.events.try_send(Event::Progress(self.progress(row, steps_total)));
+                    self.teller.send(Event::Progress(self.progress(row)));
                 }
             }
-            if last_snapshot.is_none_or(|then| then.elapsed() > SNAPSHOT_INTERVAL) {
-                self.put_snapshot();
-                last_snapshot = Some(Instant::now());
+            let was_single = self.steps_asked > 0;
+            self.steps_asked = self.steps_asked.saturating_sub(1);
+            if was_single && !self.paused && self.steps_asked == 0 {
+                self.set_paused(true);
             }
-            if last_checkpoint.elapsed() > CHECKPOINT_INTERVAL {
-                self.write_checkpoint()?;
-                last_checkpoint = Instant::now();
+            // While it holds, what is seen is what a single step did.
+            if self.paused || last_snapshot.elapsed() > SNAPSHOT_INTERVAL {
+                self.put_snapshot();
+                last_snapshot = Instant::now();
             }
         }
         self.put_snapshot();
-        self.write_checkpoint()?;
-        let fit_seconds = self.fitter.state().seconds;
-        prepared.timings.push(StageTime { stage: "fit".into(), seconds: fit_seconds });
-        let data =
-            outcome::write(&self.fitter, prepared, &self.settings, &self.folder, self.began, &self.stop, &|what| {
-                self.send(Event::Finishing(what.into()));
-            })?;
-        self.send(Event::Finished(Box::new(data)));
+        self.save();
+        prepared.timings.push(StageTime { stage: "fit".into(), seconds: self.fitter.state().seconds });
+        let folder = self.saver.folder();
+        let tell = |what: &str| self.teller.send(Event::Finishing(what.into()));
+        let data = outcome::write(&self.fitter, prepared, &self.settings, folder, self.began, &self.stop, &tell)?;
+        self.teller.send(Event::Finished(Box::new(data)));
         Ok(())
     }
 
-    /// The next command; waits for one while paused. A watcher that went away stops the job.
-    fn next_command(&mut self) -> Result<Option<Command>> {
-        if self.stop.load(Ordering::Relaxed) {
-            return Ok(Some(Command::Stop));
+    /// Does what was asked since the last step; waits a moment for it while the job holds. `true` to end.
+    fn obey(&mut self) -> bool {
+        let mut changed = Vec::new();
+        let mut save = false;
+        let first = if self.paused && self.steps_asked == 0 {
+            self.commands.recv_timeout(PATIENCE).ok()
+        } else {
+            self.commands.try_recv().ok()
+        };
+        let mut next = first;
+        // The flag may be raised without a command.
+        let mut stop = self.stop.load(Ordering::Relaxed);
+        while let (Some(command), false) = (next.take(), stop) {
+            match command {
+                Command::Stop => stop = true,
+                Command::Pause => self.set_paused(true),
+                Command::Resume => self.set_paused(false),
+                Command::StepOnce => self.steps_asked += 1,
+                Command::Checkpoint => save = true,
+                Command::Change(settings) => changed.extend(self.change(*settings)),
+            }
+            next = self.commands.try_recv().ok();
         }
-        if self.paused {
-            // The flag may be raised without a command, so look at it now and then.
-            return Ok(self.commands.recv_timeout(Duration::from_millis(50)).ok());
+        // Several changes at once, as of a slider, are written once; the end writes for itself.
+        if (save || !changed.is_empty()) && !stop {
+            self.save();
         }
-        match self.commands.try_recv() {
-            Ok(command) => Ok(Some(command)),
-            Err(TryRecvError::Empty | TryRecvError::Disconnected) => Ok(None),
+        for settings in changed {
+            self.teller.send(Event::SettingsChanged(Box::new(settings)));
         }
+        stop
     }
 
-    fn set_paused(&mut self, paused: bool) -> Result<()> {
-        if self.paused != paused {
-            self.paused = paused;
-            self.send(if paused { Event::Paused } else { Event::Resumed });
-            if paused {
-                self.put_snapshot();
-                self.write_checkpoint()?;
+    /// Takes other settings; returns them when they were taken.
+    fn change(&mut self, settings: FitSettings) -> Option<FitSettings> {
+        let findings_before = self.fitter.setting_findings();
+        if let Err(error) = self.fitter.change(settings.clone()) {
+            self.teller.send(Event::Refused(error));
+            return None;
+        }
+        self.settings.fit = settings.clone();
+        for finding in self.fitter.setting_findings() {
+            if !findings_before.contains(&finding) {
+                self.teller.send(Event::Finding(finding));
             }
         }
+        Some(settings)
+    }
+
+    fn set_paused(&mut self, paused: bool) {
+        if !paused {
+            self.steps_asked = 0;
+        }
+        if self.paused != paused {
+            self.paused = paused;
+            if paused {
+                // Whoever hears of the pause sees where it holds.
+                self.put_snapshot();
+            }
+            self.teller.send(if paused { Event::Paused } else { Event::Resumed });
+            if paused {
+                self.save();
+            }
+        }
+    }
+
+    /// Ends before the fit does. Here a checkpoint that cannot be written is an error: the steps since the last one are
+    /// lost.
+    fn end_early(mut self) -> Result<()> {
+        let path = self.saver.save(&self.fitter, &self.settings)?;
+        self.teller.send(Event::Checkpoint(path));
+        self.teller.send(Event::Stopped { steps_done: self.fitter.state().step });
         Ok(())
     }
 
-    fn end_early(&self) -> Result<()> {
-        self.write_checkpoint()?;
-        self.send(Event::Stopped { steps_done: self.fitter.state().step });
-        Ok(())
-    }
-
-    fn write_checkpoint(&self) -> Result<()> {
-        let path = self.folder.checkpoint_path();
-        checkpoint::write(&path, self.fitter.state())?;
-        self.folder.write_loss(&outcome::loss_rows(self.fitter.state()))?;
-        self.send(Event::Checkpoint(path));
-        Ok(())
+    /// Writes a checkpoint and tells how it went.
+    fn save(&mut self) {
+        let outcome = self.saver.save(&self.fitter, &self.settings);
+        if let Some(finding) = self.saver.news(&outcome) {
+            self.teller.send(Event::Finding(finding));
+        }
+        if let Ok(path) = outcome {
+            self.teller.send(Event::Checkpoint(path));
+        }
     }
 
     fn put_snapshot(&self) {
+        let state = self.fitter.state();
+        let stage = self.fitter.stage().or(state.plan.last());
         self.snapshot.put(Snapshot {
-            step: self.fitter.state().step,
-            maps: self.fitter.maps(),
-            environment: self.fitter.environment(),
-            losses: self.fitter.state().losses.clone(),
+            step: state.step,
+            maps: Arc::new(self.fitter.maps()),
+            environment: Arc::new(self.fitter.environment()),
+            losses: state.losses.clone(),
+            steps_total: self.fitter.steps_total(),
+            stage: stage.map(crate::fit::schedule::Stage::name).unwrap_or_default(),
+            view_rmse: self.fitter.figures().view_rmse.clone(),
+            log_gains: state.log_gains.clone(),
+            agreement: self.fitter.figures().agreement.clone(),
         });
+        self.teller.wake();
     }
 
-    fn progress(&self, row: crate::fit::LossRow, steps_total: usize) -> Progress {
+    fn progress(&self, row: LossRow) -> Progress {
         let losses = &self.fitter.state().losses;
+        let steps_total = self.fitter.steps_total();
         // The pace of the last steps of the same stage; later stages are taken to go as fast.
         let same_stage = losses.iter().rev().take_while(|other| other.stage == row.stage).take(12).count();
         let first = losses.len() - same_stage;
         let before = if first > 0 { losses[first - 1].seconds } else { 0.0 };
         let steps_per_second = same_stage as f64 / (row.seconds - before).max(1e-9);
-        let seconds_left = (steps_total - row.step) as f64 / steps_per_second;
+        let seconds_left = steps_total.saturating_sub(row.step) as f64 / steps_per_second;
         Progress { row, steps_total, steps_per_second, seconds_left }
-    }
-
-    fn send(&self, event: Event) {
-        // Nobody listens any more: the fit goes on, its files are what counts.
-        let _ = self.events.send_timeout(event, Duration::from_secs(5));
     }
 }

@@ -9,6 +9,7 @@
 //!    Hessian-vector products.
 //! 4. [`accumulate`]: pixels in parallel, gradients reduced in a fixed order.
 //! 5. [`picture`]: pictures and layers. [`first_hits`]: primary rays traced once.
+//!    [`progressive`]: a picture that refines.
 //!
 //! The record replaces a second tracing pass: it lives for one pixel, so memory grows neither with the picture nor
 //! with the number of steps, and the reverse pass casts no ray. Silhouettes do not move (geometry and cameras are
@@ -19,6 +20,7 @@ pub mod accumulate;
 pub mod first_hits;
 pub mod path;
 pub mod picture;
+pub mod progressive;
 pub mod sums;
 pub mod surface;
 

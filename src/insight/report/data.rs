@@ -106,6 +106,9 @@ pub struct ViewLine {
     pub name: String,
     /// Kept out of the fit.
     pub held_out: bool,
+    /// Left out by the user: neither fitted nor in any mean.
+    #[serde(default)]
+    pub left_out: bool,
     /// As rendered.
     pub raw: PictureScore,
     /// After the view's own best factor per channel.
@@ -128,6 +131,7 @@ impl ViewLine {
         ViewLine {
             name: name.into(),
             held_out,
+            left_out: false,
             raw: scores.raw,
             aligned: scores.aligned,
             exposure_gain,

@@ -148,11 +148,15 @@ pub fn views(data: &ReportData) -> String {
         return empty("No view was scored.");
     }
     let mut sorted: Vec<_> = data.views.iter().collect();
-    sorted.sort_by_key(|view| !view.held_out);
+    sorted.sort_by_key(|view| (view.left_out, !view.held_out));
     let rows: Vec<Vec<String>> = sorted
         .into_iter()
         .map(|view| {
-            let kind = if view.held_out { " <span class=tag>held out</span>" } else { "" };
+            let kind = match (view.left_out, view.held_out) {
+                (true, _) => " <span class=tag>left out</span>",
+                (false, true) => " <span class=tag>held out</span>",
+                (false, false) => "",
+            };
             let mut row = vec![format!("{}{kind}", escaped(&view.name))];
             row.extend(score_cells(&view.raw, &view.aligned));
             row.push(fixed(view.exposure_gain, 3));

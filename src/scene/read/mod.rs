@@ -41,11 +41,34 @@ pub fn read(path: &Path, settings: &ReadSettings) -> Result<Scene> {
     assemble(find(path)?, settings)
 }
 
+/// Where the files of a scene are listed, and in which form.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Located {
+    /// A manifest, `scene.toml`.
+    Manifest(PathBuf),
+    /// An exchange folder.
+    Exchange(PathBuf),
+    /// A BlendedMVS folder.
+    BlendedMvs(PathBuf),
+}
+
 /// Finds out the kind of the scene and lists it.
 fn find(path: &Path) -> Result<SourceScene> {
+    match locate(path)? {
+        Located::Manifest(file) => manifest::read(&file),
+        Located::Exchange(folder) => exchange::read(&folder),
+        Located::BlendedMvs(folder) => blended_mvs::read(&folder),
+    }
+}
+
+/// Finds out whether a scene is at a path, and of which kind, by the names of files alone.
+///
+/// # Errors
+/// `Missing` or `Unsupported`, with what a scene must hold as the remedy.
+pub fn locate(path: &Path) -> Result<Located> {
     if path.is_file() {
         if path.extension().is_some_and(|extension| extension == "toml") {
-            return manifest::read(path);
+            return Ok(Located::Manifest(path.into()));
         }
         return Err(Error::new(ErrorKind::Unsupported, "a scene is a folder or a scene.toml")
             .at(Place::File(path.into()))
@@ -60,13 +83,13 @@ fn find(path: &Path) -> Result<SourceScene> {
     let mut folder = path.to_path_buf();
     for _ in 0..4 {
         if folder.join(manifest::FILE_NAME).is_file() {
-            return manifest::read(&folder.join(manifest::FILE_NAME));
+            return Ok(Located::Manifest(folder.join(manifest::FILE_NAME)));
         }
         if exchange::is_folder_of_this_kind(&folder) {
-            return exchange::read(&folder);
+            return Ok(Located::Exchange(folder));
         }
         if blended_mvs::is_folder_of_this_kind(&folder) {
-            return blended_mvs::read(&folder);
+            return Ok(Located::BlendedMvs(folder));
         }
         match only_subfolder(&folder)? {
             Some(inner) => folder = inner,

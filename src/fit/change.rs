@@ -1,0 +1,79 @@
+//! Settings that change while a fit runs.
+//!
+//! A change takes effect between two steps. What a step draws stays a function of settings and state alone, so a fit
+//! that is changed, saved and taken up with the new settings goes on bit for bit like one that was not interrupted.
+
+use super::evidence;
+use super::fitter::Fitter;
+use super::held_out::held_out_targets;
+use super::schedule::revised;
+use super::settings::FitSettings;
+use super::state::FitState;
+use super::views::{ViewUse, training_views, uses_of};
+use crate::error::{Error, ErrorKind, Place, Result};
+
+/// Settings that cannot change: shapes, random numbers and the order of stages hang on them.
+const FIXED: [&str; 6] = ["seed", "map-size", "environment-height", "levels", "steps", "start"];
+/// Settings that what a stage keeps between its steps was made for.
+const OF_STAGE_WORK: [&str; 7] =
+    ["exclude", "samples", "pixel-filter", "views-per-step", "pixels-per-step", "consistency", "first-hits-mib"];
+
+impl FitSettings {
+    /// Whether a setting, by its name on the command line, may change while a fit runs. `false` for unknown names.
+    pub fn changes_mid_run(name: &str) -> bool {
+        !FIXED.contains(&name) && FitSettings::default().get(name).is_ok()
+    }
+}
+
+impl Fitter {
+    /// Goes on with other settings from the next step on.
+    ///
+    /// # Errors
+    /// `InvalidSetting` naming the setting when it is out of its range, cannot change while a fit runs, asks for fewer
+    /// steps than are done, or leaves no view to fit to. The fit then goes on as it was.
+    pub fn change(&mut self, settings: FitSettings) -> Result<()> {
+        settings.validate()?;
+        let changed: Vec<String> = self.settings.differences(&settings).into_iter().map(|(name, _, _)| name).collect();
+        if let Some(name) = changed.iter().find(|name| FIXED.contains(&name.as_str())) {
+            return Err(Error::new(ErrorKind::InvalidSetting, "this cannot change while a fit runs")
+                .at(Place::Setting(name.clone()))
+                .remedy("start a new run with it"));
+        }
+        let uses = uses_of(&self.scene, &settings.exclude);
+        let training = training_views(&uses, &settings)?;
+        evidence::check(&self.scene, &training, &settings)?;
+        let stage_before = self.stage().map(|stage| (stage.kind, stage.photo_level));
+        replan(&mut self.state, &settings)?;
+
+        // Nothing fails from here on.
+        if uses != self.uses {
+            self.held_out = held_out_targets(&self.scene, &uses);
+            for (rmse, _) in self.figures.view_rmse.iter_mut().zip(&uses).filter(|(_, own)| **own == ViewUse::LeftOut) {
+                *rmse = None;
+            }
+        }
+        let stage_moved = self.stage().map(|stage| (stage.kind, stage.photo_level)) != stage_before;
+        if stage_moved || changed.iter().any(|name| OF_STAGE_WORK.contains(&name.as_str())) {
+            self.work = None;
+        }
+        self.uses = uses;
+        self.training = training;
+        self.settings = settings;
+        Ok(())
+    }
+}
+
+/// Puts the plan of other numbers of steps into a state; the state is as it was when that fails.
+pub(super) fn replan(state: &mut FitState, settings: &FitSettings) -> Result<()> {
+    let plan = revised(settings, &state.plan, state.stage, state.step_in_stage)?;
+    // A fit that had ended goes on in its last stage when that was made longer.
+    if let (true, Some(last)) = (state.stage >= state.plan.len(), state.plan.last()) {
+        let number = state.plan.len() - 1;
+        if plan.get(number).is_some_and(|stage| stage.steps > last.steps) {
+            state.stage = number;
+            state.step_in_stage = last.steps;
+        }
+    }
+    state.plan = plan;
+    Ok(())
+}

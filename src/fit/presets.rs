@@ -1,0 +1,62 @@
+//! Whole sets of settings under a name.
+
+use super::settings::FitSettings;
+
+/// How much work a fit may be.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, clap::ValueEnum)]
+pub enum Preset {
+    /// A first look within minutes: small maps, few steps, direct light only.
+    Quick,
+    /// The defaults.
+    #[default]
+    Balanced,
+    /// For the last run: more steps and paths, three bounces, a gain for each photo.
+    Careful,
+}
+
+impl Preset {
+    /// All of them, from little work to much.
+    pub const ALL: [Preset; 3] = [Preset::Quick, Preset::Balanced, Preset::Careful];
+
+    /// Its name on screen.
+    pub fn label(self) -> &'static str {
+        match self {
+            Preset::Quick => "Quick",
+            Preset::Balanced => "Balanced",
+            Preset::Careful => "Careful",
+        }
+    }
+}
+
+impl FitSettings {
+    /// The settings of a preset.
+    pub fn preset(preset: Preset) -> Self {
+        let balanced = FitSettings::default();
+        match preset {
+            Preset::Quick => FitSettings {
+                map_size: 512,
+                steps_diffuse: 45,
+                steps_all: 60,
+                views_per_step: 4,
+                pixels_per_step: 60_000,
+                samples: 2,
+                bounces: 1,
+                lobe_ramp: 10,
+                ..balanced
+            },
+            Preset::Balanced => balanced,
+            Preset::Careful => FitSettings {
+                steps_diffuse: 180,
+                steps_all: 360,
+                views_per_step: 8,
+                pixels_per_step: 400_000,
+                samples: 8,
+                bounces: 3,
+                exposure: true,
+                lobe_ramp: 40,
+                final_rate: 0.02,
+                ..balanced
+            },
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! Whether an act can be done now, and why not.
+
+use super::Act;
+use crate::studio::model::{FitStatus, Model};
+
+/// `Ok` when the act can be done; otherwise why not, as a short sentence without a full stop.
+pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
+    let need = |met: bool, why: &'static str| if met { Ok(()) } else { Err(why) };
+    let project = model.project.as_ref();
+    let has_views = project.is_some_and(|project| project.view_count() > 0);
+    let has_maps = project.is_some_and(|project| project.maps.is_some());
+    let status = &model.fit.status;
+    match act {
+        Act::OpenFolder
+        | Act::OpenDemo
+        | Act::Quit
+        | Act::Palette
+        | Act::Help
+        | Act::NextTheme
+        | Act::ZoomIn
+        | Act::ZoomOut
+        | Act::ZoomReset
+        | Act::AddLight
+        | Act::ExposureUp
+        | Act::ExposureDown
+        | Act::ResetDisplay
+        | Act::NextCurve
+        | Act::FalseColour
+        | Act::Stripes => Ok(()),
+        Act::Undo => need(model.history.can_undo(&model.edits), "nothing was changed"),
+        Act::Redo => need(model.history.can_redo(&model.edits), "nothing was taken back"),
+        Act::Start => {
+            need(project.is_some(), "open a scene first")?;
+            need(has_views, "this run's scene is not here, so there are no photos to fit")?;
+            need(project.is_some_and(|project| project.surface.is_some()), "the scene is still being prepared")?;
+            need(!status.is_live(), "a fit is in progress")?;
+            need(!model.tasks.is_running(crate::studio::model::starting::TITLE), "the fit is about to start")
+        }
+        Act::PauseOrGoOn => {
+            need(matches!(status, FitStatus::Running | FitStatus::Pausing | FitStatus::Paused), "no fit is in progress")
+        }
+        Act::Stop => need(status.is_live() && *status != FitStatus::Stopping, "no fit is in progress"),
+        Act::StepOnce => need(*status == FitStatus::Paused, "pause the fit first"),
+        Act::Checkpoint => need(matches!(status, FitStatus::Running | FitStatus::Paused), "no fit is in progress"),
+        Act::OpenReport => {
+            let there = model.fit.folder.as_ref().is_some_and(|folder| folder.report_html_path().is_file());
+            need(there, "the report is written when a fit is done")
+        }
+        Act::SavePicture | Act::SaveTurntable | Act::SaveLightStrip => need(
+            has_maps && project.is_some_and(|project| project.surface.is_some()),
+            "there are no maps yet: start a fit",
+        ),
+        Act::LookThrough
+        | Act::NextView
+        | Act::PreviousView
+        | Act::ShowPhoto
+        | Act::WipePhoto
+        | Act::ExposureAuto
+        | Act::Frustums
+        | Act::Thumbnails
+        | Act::LeaveOut => need(has_views, "there are no photos"),
+        Act::ErrorOverlay | Act::LayerPhotoError | Act::LayerDisagreement | Act::SurfaceLayers => {
+            need(has_views, "there are no photos")?;
+            need(has_maps, "there are no maps yet: start a fit")
+        }
+        Act::LayerDiffuse | Act::LayerSpecular | Act::LayerRoughness | Act::LayerTimesSeen => {
+            need(has_maps, "there are no maps yet: start a fit")
+        }
+        Act::FittedLight => need(has_maps, "there is no fitted light yet"),
+        Act::ChartBorders => {
+            need(project.is_some_and(|project| project.surface.is_some()), "the atlas is not made yet")
+        }
+        _ => need(project.is_some(), "open a scene first"),
+    }
+}

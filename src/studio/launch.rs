@@ -1,0 +1,54 @@
+//! Opening the window, or saying in one sentence why there is none.
+
+use super::app::{Studio, StudioOptions};
+use super::model::store::Store;
+use crate::error::{Error, ErrorKind, Result};
+
+/// The packages of Debian that a window needs at run time, for the remedy of an error.
+const DEBIAN_PACKAGES: &str = "libx11-6 libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0 mesa-vulkan-drivers";
+
+/// Opens the window and returns when it is closed.
+///
+/// # Errors
+/// `Unsupported` when there is no display, or nothing on it can draw.
+pub fn run(options: StudioOptions) -> Result<()> {
+    check_display()?;
+    let store = options.settings_file.clone().map_or_else(Store::of_user, |path| Store::at(Some(path)));
+    let size = store.clone().read().0.window_size;
+    let viewport = egui::ViewportBuilder::default()
+        .with_title("Patina")
+        .with_app_id("patina")
+        .with_inner_size(size)
+        .with_min_inner_size([640.0, 400.0])
+        .with_drag_and_drop(true);
+    let native = eframe::NativeOptions { viewport, renderer: eframe::Renderer::Wgpu, ..Default::default() };
+    // A system library that is missing makes the window library panic: the person gets a sentence all the same.
+    let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(move || {
+        eframe::run_native("patina", native, Box::new(move |creation| Ok(Box::new(Studio::new(creation, &options)))))
+    }));
+    match outcome {
+        Ok(Ok(())) => Ok(()),
+        Ok(Err(source)) => Err(no_window(&source.to_string())),
+        Err(panic) => {
+            let text = panic.downcast_ref::<String>().map(String::as_str);
+            let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
+            Err(no_window(text))
+        }
+    }
+}
+
+fn no_window(why: &str) -> Error {
+    Error::new(ErrorKind::Unsupported, format!("the window cannot be opened: {why}")).remedy(format!(
+        "without a window: `patina demo` or `patina fit SCENE -o RUN`; on Debian a window needs: {DEBIAN_PACKAGES}"
+    ))
+}
+
+/// An error where the system says that there is no display.
+fn check_display() -> Result<()> {
+    let is_set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    if cfg!(target_os = "linux") && !is_set("DISPLAY") && !is_set("WAYLAND_DISPLAY") {
+        return Err(Error::new(ErrorKind::Unsupported, "there is no display to open a window on")
+            .remedy("without one, `patina demo` and `patina fit SCENE -o RUN` do the same work: see `patina --help`"));
+    }
+    Ok(())
+}

@@ -1,0 +1,166 @@
+//! What undo takes back: settings, lights, display, layer. Where the eye stands is not among them.
+
+use super::lights::LightName;
+use crate::fit::FitSettings;
+use crate::image::display::DisplaySettings;
+use crate::studio::stage::Layer;
+use egui::util::undoer::{Settings, Undoer};
+
+/// How the photo is laid against the stage.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum PhotoLook {
+    /// Not at all.
+    #[default]
+    Off,
+    /// Over the stage with this opacity.
+    Over(f32),
+    /// Left of a line at this share of the width.
+    Wipe(f32),
+}
+
+/// The light or the two lights in which the stage is seen.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Relight {
+    /// The light; left of the line when there are two.
+    pub first: LightName,
+    /// The light right of the line.
+    pub second: Option<LightName>,
+    /// Place of the line as a share of the width.
+    pub wipe: f32,
+    /// Turn about the up axis, in degrees.
+    pub turn_degrees: f32,
+    /// Strength of the light as a power of two.
+    pub strength_stops: f32,
+    /// Whether other lights are brought to the brightness of the fitted one.
+    pub matched: bool,
+    /// Whether the light shows behind the surface.
+    pub as_background: bool,
+}
+
+impl Default for Relight {
+    fn default() -> Self {
+        Relight {
+            first: LightName::Fitted,
+            second: None,
+            wipe: 0.5,
+            turn_degrees: 0.0,
+            strength_stops: 0.0,
+            matched: true,
+            as_background: true,
+        }
+    }
+}
+
+/// What undo takes back.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Edits {
+    /// Settings of the fit: of the one in progress where it can still change, of the next one otherwise.
+    pub fit: FitSettings,
+    /// How pictures are shown.
+    pub display: DisplaySettings,
+    /// What the stage shows on the surface.
+    pub layer: Layer,
+    /// The light of the stage.
+    pub relight: Relight,
+    /// The photo against the stage.
+    pub photo: PhotoLook,
+}
+
+impl Default for Edits {
+    fn default() -> Self {
+        Edits {
+            fit: FitSettings::default(),
+            display: DisplaySettings::default(),
+            layer: Layer::Lit,
+            relight: Relight::default(),
+            photo: PhotoLook::Off,
+        }
+    }
+}
+
+/// Remembers edits. A change counts when nothing has moved for half a second, so a drag is one step of undo.
+pub struct History(Undoer<Edits>);
+
+impl Default for History {
+    fn default() -> Self {
+        History(Undoer::with_settings(Settings { max_undos: 200, stable_time: 0.5, auto_save_interval: 20.0 }))
+    }
+}
+
+impl History {
+    /// Tells the history how things are, once a frame.
+    pub fn feed(&mut self, seconds: f64, edits: &Edits) {
+        self.0.feed_state(seconds, edits);
+    }
+
+    /// Begins anew, with nothing to take back.
+    pub fn restart(&mut self, edits: &Edits) {
+        *self = History::default();
+        self.0.add_undo(edits);
+    }
+
+    /// Counts what was changed so far as one step.
+    pub fn mark(&mut self, edits: &Edits) {
+        self.0.add_undo(edits);
+    }
+
+    /// Whether something can be taken back.
+    pub fn can_undo(&self, edits: &Edits) -> bool {
+        self.0.has_undo(edits)
+    }
+
+    /// Whether something can be done again.
+    pub fn can_redo(&self, edits: &Edits) -> bool {
+        self.0.has_redo(edits)
+    }
+
+    /// Takes back the last change.
+    pub fn undo(&mut self, edits: &mut Edits) {
+        if let Some(before) = self.0.undo(edits) {
+            *edits = before.clone();
+        }
+    }
+
+    /// Does again what was taken back.
+    pub fn redo(&mut self, edits: &mut Edits) {
+        if let Some(after) = self.0.redo(edits) {
+            *edits = after.clone();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_drag_is_one_step_and_redo_ends_with_a_new_change() {
+        let mut edits = Edits::default();
+        let mut history = History::default();
+        let mut seconds = 0.0;
+        let mut settle = |history: &mut History, edits: &Edits| {
+            for _ in 0..3 {
+                seconds += 1.0;
+                history.feed(seconds, edits);
+            }
+        };
+        settle(&mut history, &edits);
+        for step in 1..=10 {
+            edits.display.exposure_stops = step as f32 / 10.0;
+            history.feed(3.0 + f64::from(step) * 0.01, &edits);
+        }
+        settle(&mut history, &edits);
+        edits.layer = Layer::Diffuse;
+        settle(&mut history, &edits);
+        history.undo(&mut edits);
+        assert_eq!((edits.layer, edits.display.exposure_stops), (Layer::Lit, 1.0));
+        history.undo(&mut edits);
+        assert_eq!(edits, Edits::default());
+        assert!(!history.can_undo(&edits) && history.can_redo(&edits));
+        history.redo(&mut edits);
+        assert_eq!(edits.display.exposure_stops, 1.0);
+        edits.relight.turn_degrees = 15.0;
+        settle(&mut history, &edits);
+        assert!(!history.can_redo(&edits));
+    }
+}

@@ -1,0 +1,155 @@
+//! What was noticed, newest last: findings, errors, what was done.
+
+use crate::error::{Error, Finding, Place, Severity};
+use std::time::Instant;
+
+/// A line of the log.
+#[derive(Clone, Debug)]
+pub struct Message {
+    /// How much it matters.
+    pub severity: Severity,
+    /// Whether something failed, so that a person should see it at once.
+    pub is_error: bool,
+    /// One sentence.
+    pub text: String,
+    /// What can be done; may be empty.
+    pub remedy: String,
+    /// Where.
+    pub place: Place,
+    /// When.
+    pub at: Instant,
+}
+
+impl Message {
+    /// A line without place and remedy.
+    pub fn note(text: impl Into<String>) -> Self {
+        Message {
+            severity: Severity::Note,
+            is_error: false,
+            text: text.into(),
+            remedy: String::new(),
+            place: Place::Nowhere,
+            at: Instant::now(),
+        }
+    }
+
+    /// The sentence with its place before it.
+    pub fn sentence(&self) -> String {
+        match self.place {
+            Place::Nowhere => capitalised(&self.text),
+            _ => capitalised(&format!("{}: {}", self.place, self.text)),
+        }
+    }
+}
+
+impl From<&Finding> for Message {
+    fn from(finding: &Finding) -> Self {
+        Message {
+            severity: finding.severity,
+            remedy: finding.remedy.clone(),
+            place: finding.target.clone(),
+            ..Message::note(finding.message.clone())
+        }
+    }
+}
+
+impl From<&Error> for Message {
+    fn from(error: &Error) -> Self {
+        Message {
+            severity: Severity::Fatal,
+            is_error: true,
+            remedy: error.remedy_text().into(),
+            place: error.place().clone(),
+            ..Message::note(error.message())
+        }
+    }
+}
+
+/// A text with its first letter large.
+pub fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// The newest messages.
+#[derive(Clone, Debug, Default)]
+pub struct Log {
+    messages: Vec<Message>,
+    /// The error that stands across the window until it is dismissed.
+    banner: Option<Message>,
+    /// Messages since the panel was last looked at.
+    pub unread: usize,
+}
+
+/// Messages kept, at most.
+const MOST_MESSAGES: usize = 2000;
+
+impl Log {
+    /// Adds a message; an error also goes to the banner.
+    pub fn add(&mut self, message: Message) {
+        if message.is_error {
+            self.banner = Some(message.clone());
+        }
+        if message.severity > Severity::Note {
+            self.unread += 1;
+        }
+        self.messages.push(message);
+        if self.messages.len() > MOST_MESSAGES {
+            self.messages.drain(..MOST_MESSAGES / 2);
+        }
+    }
+
+    /// Adds a line of news.
+    pub fn note(&mut self, text: impl Into<String>) {
+        self.add(Message::note(text));
+    }
+
+    /// Adds an error.
+    pub fn error(&mut self, error: &Error) {
+        self.add(Message::from(error));
+    }
+
+    /// All messages, oldest first.
+    pub fn messages(&self) -> &[Message] {
+        &self.messages
+    }
+
+    /// The newest message.
+    pub fn newest(&self) -> Option<&Message> {
+        self.messages.last()
+    }
+
+    /// The error that waits to be dismissed.
+    pub fn banner(&self) -> Option<&Message> {
+        self.banner.as_ref()
+    }
+
+    /// Dismisses the error.
+    pub fn dismiss(&mut self) {
+        self.banner = None;
+    }
+
+    /// Forgets all messages.
+    pub fn clear(&mut self) {
+        *self = Log::default();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::ErrorKind;
+
+    #[test]
+    fn an_error_stays_on_the_banner_until_dismissed_and_the_list_is_bounded() {
+        let mut log = Log::default();
+        log.error(&Error::new(ErrorKind::Missing, "the mesh is not there").remedy("copy it"));
+        for number in 0..3000 {
+            log.note(format!("step {number}"));
+        }
+        assert!(log.messages().len() <= MOST_MESSAGES);
+        assert_eq!(log.banner().map(Message::sentence).as_deref(), Some("The mesh is not there"));
+        log.dismiss();
+        assert!(log.banner().is_none());
+    }
+}

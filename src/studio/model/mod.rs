@@ -1,0 +1,405 @@
+//! What the window knows, without any widget.
+//!
+//! [`Model`] joins the parts: [`project`] is what is open, [`fit`] the job, [`edits`] what undo covers, [`lights`] the
+//! shelf, [`tasks`] work beside the window, [`log`] what was noticed, [`store`] what is remembered. [`opening`] and
+//! [`starting`] are how a folder becomes a project and a project a fit, [`viewing`] where the eye stands. Panels read the model and queue acts; they change
+//! nothing but [`Edits`] directly.
+
+pub mod edits;
+pub mod fit;
+pub mod lights;
+pub mod log;
+pub mod opening;
+pub mod project;
+pub mod starting;
+pub mod store;
+pub mod tasks;
+pub mod viewing;
+
+pub use edits::Edits;
+pub use fit::{FitControl, FitStatus};
+pub use lights::LightName;
+pub use project::Project;
+
+use crate::error::{Place, Result};
+use crate::studio::act::Act;
+use crate::studio::layout::Panel;
+use crate::studio::stage::eye::OrbitEye;
+use edits::History;
+use glam::{Vec2, Vec3};
+use lights::{Shelf, ShelfLight};
+use log::Log;
+use std::path::PathBuf;
+use std::sync::Arc;
+use store::{Preferences, Store};
+use tasks::{Tasks, Wake};
+
+/// What a task brings.
+pub enum Done {
+    /// A scene was read and checked.
+    SceneRead(Box<opening::SceneRead>),
+    /// The atlas and the tracer of a scene are made.
+    Prepared(Box<opening::PreparedScene>),
+    /// A run folder was read.
+    RunOpened(Box<opening::RunRead>),
+    /// A job was started.
+    FitStarted(Box<starting::Started>),
+    /// A light was read.
+    LightRead(Box<ShelfLight>),
+    /// A folder or file was chosen in the system's dialog; `None` when it was closed.
+    Picked(PickFor, Option<PathBuf>),
+    /// Files were saved.
+    Saved(Vec<PathBuf>),
+    /// The error of the photos was spread over the surface.
+    Layers(Box<crate::insight::surface_layers::SurfaceLayers>),
+    /// Pictures under other lights were compared with the truth.
+    Entangled(Box<crate::job::entanglement::Entanglement>),
+}
+
+/// What a path is picked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PickFor {
+    /// To open a scene or run folder.
+    Open,
+    /// To put a light on the shelf.
+    Light,
+    /// To write new runs into.
+    RunsFolder,
+    /// To save a picture.
+    Save,
+}
+
+/// A window over the window.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Dialog {
+    /// None.
+    #[default]
+    None,
+    /// Finds acts by name.
+    Palette(String),
+    /// Lists acts and keys.
+    Help,
+    /// Asks for the path of a scene, run or light.
+    Path {
+        /// What for.
+        purpose: PickFor,
+        /// What was typed.
+        text: String,
+    },
+    /// Asks how and where to save.
+    Save(SaveRequest),
+}
+
+/// What is saved, and how.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SaveRequest {
+    /// What is saved.
+    pub what: SaveWhat,
+    /// Where to; a file for a picture, a folder for several.
+    pub path: String,
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// Paths a pixel.
+    pub samples: usize,
+    /// Number of frames of a turntable.
+    pub frames: usize,
+}
+
+/// What can be saved from the stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SaveWhat {
+    /// One picture.
+    Picture,
+    /// A round about the scene.
+    Turntable,
+    /// The view under every light of the shelf.
+    Strip,
+}
+
+/// Switches of the stage that undo does not cover.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StageSwitches {
+    /// Refine by path tracing while nothing moves.
+    pub traced: bool,
+    /// Draw the cameras.
+    pub frustums: bool,
+    /// Draw small photos on them.
+    pub thumbnails: bool,
+    /// Draw chart borders on the maps.
+    pub chart_borders: bool,
+    /// The eye is where the chosen photo was taken.
+    pub looking_through: bool,
+    /// Show the stage alone.
+    pub alone: bool,
+}
+
+impl Default for StageSwitches {
+    fn default() -> Self {
+        StageSwitches {
+            traced: true,
+            frustums: true,
+            thumbnails: false,
+            chart_borders: false,
+            looking_through: false,
+            alone: false,
+        }
+    }
+}
+
+/// The place under the cursor, wherever the mouse is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cursor {
+    /// The panel the mouse is over.
+    pub over: Panel,
+    /// Position in the world.
+    pub position: Vec3,
+    /// Unit normal there.
+    pub normal: Vec3,
+    /// Texture coordinate, v up.
+    pub uv: Vec2,
+    /// Whether it stays although the mouse moves on.
+    pub pinned: bool,
+}
+
+/// Everything the window knows.
+pub struct Model {
+    /// What is open.
+    pub project: Option<Project>,
+    /// The fit.
+    pub fit: FitControl,
+    /// What undo takes back.
+    pub edits: Edits,
+    /// Former edits.
+    pub history: History,
+    /// Work beside the window.
+    pub tasks: Tasks<Done>,
+    /// What was noticed.
+    pub log: Log,
+    /// What is remembered.
+    pub preferences: Preferences,
+    /// Where it is remembered.
+    pub store: Store,
+    /// Lights to look at the materials in.
+    pub shelf: Shelf,
+    /// The eye, while it is not a photo's.
+    pub eye: OrbitEye,
+    /// Switches of the stage.
+    pub switches: StageSwitches,
+    /// The linked cursor.
+    pub cursor: Option<Cursor>,
+    /// The window over the window.
+    pub dialog: Dialog,
+    /// Acts to be done after the panels are drawn.
+    pub acts: Vec<Act>,
+    /// Panel to bring to the front.
+    pub activate: Option<Panel>,
+    /// A place of a finding that panels should go to.
+    pub go_to: Option<Place>,
+    /// What draws the stage, in plain words; empty when nothing can.
+    pub adapter: String,
+    /// Whether the processor draws in place of a graphics card.
+    pub software_adapter: bool,
+    /// A run that was in progress when the program last ended without a word.
+    pub interrupted_run: Option<PathBuf>,
+    /// Place and value under the mouse, for the line at the bottom; emptied every frame.
+    pub hovered_value: String,
+    /// The sky that lit the stage before there was a fitted light; the fitted light takes its place.
+    pub light_was_chosen_for_us: Option<LightName>,
+    /// Shift is held over the stage: the photo shows as long.
+    pub peek_photo: bool,
+    /// Called from any thread when the window should look again.
+    pub wake: Wake,
+}
+
+impl Model {
+    /// A model without a project.
+    pub fn new(mut store: Store, wake: Wake) -> Self {
+        let (mut preferences, damaged) = store.read();
+        let mut log = Log::default();
+        if let Some(error) = damaged {
+            log.error(&error);
+        }
+        let interrupted_run = preferences.running.take().filter(|run| run.join("checkpoint").is_file());
+        let edits = Edits { display: preferences.display, ..Edits::default() };
+        let mut history = History::default();
+        history.restart(&edits);
+        let mut model = Model {
+            project: None,
+            fit: FitControl::default(),
+            edits,
+            history,
+            tasks: Tasks::new(Arc::clone(&wake)),
+            log,
+            preferences,
+            store,
+            shelf: Shelf::built_in(),
+            eye: OrbitEye::default(),
+            switches: StageSwitches::default(),
+            cursor: None,
+            dialog: Dialog::None,
+            acts: Vec::new(),
+            activate: None,
+            go_to: None,
+            adapter: String::new(),
+            software_adapter: false,
+            interrupted_run,
+            hovered_value: String::new(),
+            peek_photo: false,
+            light_was_chosen_for_us: None,
+            wake,
+        };
+        for path in model.preferences.lights.clone() {
+            model.add_light(path);
+        }
+        model
+    }
+
+    /// Queues an act.
+    pub fn act(&mut self, act: Act) {
+        self.acts.push(act);
+    }
+
+    /// Takes in what tasks and the job brought. True when something changed.
+    pub fn poll(&mut self) -> bool {
+        let mut changed = false;
+        for (title, outcome) in self.tasks.finished() {
+            changed = true;
+            match outcome {
+                Ok(done) => self.take_in(done),
+                Err(error) if error.kind() == crate::ErrorKind::Stopped => self.log.note(format!("Stopped: {title}")),
+                Err(error) => self.log.error(&error),
+            }
+        }
+        changed |= self.fit.poll(&mut self.log);
+        self.take_back_refused();
+        self.take_snapshot();
+        self.remember_run();
+        changed
+    }
+
+    fn take_in(&mut self, done: Done) {
+        match done {
+            Done::SceneRead(read) => self.scene_was_read(*read),
+            Done::Prepared(prepared) => self.scene_was_prepared(*prepared),
+            Done::RunOpened(run) => self.run_was_opened(*run),
+            Done::FitStarted(started) => self.fit_was_started(*started),
+            Done::LightRead(light) => {
+                if let LightName::File(path) = &light.name
+                    && !self.preferences.lights.contains(path)
+                {
+                    self.preferences.lights.push(path.clone());
+                }
+                self.log.note(format!("{} is on the shelf", light.name.label()));
+                self.shelf.put(*light);
+            }
+            Done::Picked(_, None) => {}
+            Done::Picked(purpose, Some(path)) => self.picked(purpose, path),
+            Done::Saved(paths) => {
+                let first = paths.first().map(|path| path.display().to_string()).unwrap_or_default();
+                self.log.note(match paths.len() {
+                    0 | 1 => format!("Saved {first}"),
+                    count => format!("Saved {count} pictures, the first is {first}"),
+                });
+            }
+            Done::Layers(layers) => self.layers_were_measured(*layers),
+            Done::Entangled(table) => {
+                if let Some(project) = &mut self.project {
+                    project.entanglement = Some(Arc::from(table));
+                }
+            }
+        }
+    }
+
+    fn picked(&mut self, purpose: PickFor, path: PathBuf) {
+        match purpose {
+            PickFor::Open => self.open(path),
+            PickFor::Light => self.add_light(path),
+            PickFor::RunsFolder => self.preferences.runs_folder = path,
+            PickFor::Save => {
+                if let Dialog::Save(request) = &mut self.dialog {
+                    request.path = path.display().to_string();
+                }
+            }
+        }
+    }
+
+    /// Reads an HDR map and puts it on the shelf.
+    pub fn add_light(&mut self, path: PathBuf) {
+        self.tasks.spawn(format!("Reading {}", path.display()), move |_| {
+            lights::read(&path).map(|light| Done::LightRead(Box::new(light)))
+        });
+    }
+
+    /// Opens the system's file dialog on a thread of its own.
+    pub fn pick(&mut self, purpose: PickFor) {
+        self.tasks.spawn("Choosing", move |_| {
+            let dialog = rfd::FileDialog::new();
+            let path = match purpose {
+                PickFor::Open => dialog.set_title("Open a scene or run folder").pick_folder(),
+                PickFor::RunsFolder => dialog.set_title("Folder for new runs").pick_folder(),
+                PickFor::Light => dialog
+                    .set_title("Add an HDR map")
+                    .add_filter("HDR maps", &["hdr", "exr", "pfm", "png", "jpg"])
+                    .pick_file(),
+                PickFor::Save => dialog.set_title("Save picture").add_filter("Pictures", &["png", "exr"]).save_file(),
+            };
+            Ok(Done::Picked(purpose, path))
+        });
+    }
+
+    /// The newest snapshot becomes what the panels show.
+    fn take_snapshot(&mut self) {
+        let (Some(project), Some(snapshot)) = (&mut self.project, &self.fit.snapshot) else { return };
+        let newer = project.environment.as_ref().is_none_or(|own| !Arc::ptr_eq(own, &snapshot.environment));
+        if newer {
+            project.maps = Some(Arc::clone(&snapshot.maps));
+            project.environment = Some(Arc::clone(&snapshot.environment));
+            project.view_errors.clone_from(&snapshot.view_rmse);
+            // What was measured on older maps no longer holds.
+            project.photo_error = None;
+            project.disagreement = None;
+            self.shelf.put(ShelfLight::new(LightName::Fitted, Arc::clone(&snapshot.environment)));
+            if self.light_was_chosen_for_us.take().is_some_and(|sky| self.edits.relight.first == sky) {
+                self.edits.relight.first = LightName::Fitted;
+                self.history.restart(&self.edits);
+            }
+        }
+    }
+
+    /// Keeps the run in progress in the remembered settings, so that a start after a crash finds it.
+    fn remember_run(&mut self) {
+        let running = self.fit.status.is_live().then(|| self.fit.folder.as_ref().map(|folder| folder.path().into()));
+        let running: Option<PathBuf> = running.flatten();
+        if self.preferences.running != running {
+            self.preferences.running = running;
+            self.write_preferences();
+        }
+    }
+
+    /// Writes what should be remembered; a failure is told once.
+    pub fn write_preferences(&mut self) {
+        self.preferences.display = self.edits.display;
+        let outcome: Result<()> = self.store.write(&self.preferences);
+        if let Err(error) = outcome {
+            self.log.note(format!("Settings could not be remembered: {error}"));
+            // Once is enough: from here on nothing is remembered.
+            self.store = Store::at(None);
+        }
+    }
+
+    /// Words for the window's title.
+    pub fn window_title(&self) -> String {
+        let Some(project) = &self.project else { return "Patina".into() };
+        match &self.fit.status {
+            FitStatus::Running | FitStatus::Pausing | FitStatus::Paused if self.fit.steps_total > 0 => {
+                let step = self.fit.losses.last().map_or(0, |row| row.step);
+                let share = 100 * step / self.fit.steps_total.max(1);
+                format!("{share} % {} - {} - Patina", self.fit.status.words().to_lowercase(), project.title)
+            }
+            FitStatus::Idle => format!("{} - Patina", project.title),
+            status => format!("{} - {} - Patina", status.words(), project.title),
+        }
+    }
+}

@@ -1,0 +1,298 @@
+//! From a path to a project: reading, checking and preparing happen beside the window, step by step, and each step shows
+//! what it brought.
+
+use super::lights::{LightName, ShelfLight};
+use super::log::Message;
+use super::project::Atlas;
+use super::{Cursor, Done, Edits, Model, Project, StageSwitches};
+use crate::error::{Finding, Severity};
+use crate::export::RunFolder;
+use crate::image::RgbImage;
+use crate::insight::report::data::StageTime;
+use crate::job::demo;
+use crate::job::open::{self, OpenStage, OpenedRun, OpenedScene, PathKind};
+use crate::job::prepare::{Prepared, RunSettings, prepare_with};
+use crate::scene::demo::DemoSettings;
+use crate::scene::{Mesh, Scene};
+use crate::studio::stage::eye::OrbitEye;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Title of the task that opens a scene or run.
+pub const TITLE: &str = "Opening";
+/// Longest side of the small picture of a photo, in pixels.
+const THUMBNAIL_SIDE: usize = 128;
+
+/// A scene that was read and checked.
+pub struct SceneRead {
+    path: Option<PathBuf>,
+    settings: RunSettings,
+    scene: Arc<Scene>,
+    mesh: Arc<Mesh>,
+    findings: Vec<Finding>,
+    timings: Vec<StageTime>,
+    thumbnails: Vec<Arc<RgbImage>>,
+    clipped_shares: Vec<f32>,
+}
+
+/// A scene with its atlas.
+pub struct PreparedScene {
+    prepared: Prepared,
+    atlas: Atlas,
+}
+
+/// A run that was read.
+pub struct RunRead {
+    folder: RunFolder,
+    run: OpenedRun,
+    atlas: Atlas,
+    thumbnails: Vec<Arc<RgbImage>>,
+    clipped_shares: Vec<f32>,
+}
+
+impl Model {
+    /// Opens a scene or run folder.
+    pub fn open(&mut self, path: PathBuf) {
+        self.close();
+        self.log.dismiss();
+        let path = std::path::absolute(&path).unwrap_or(path);
+        let settings = RunSettings { scene: path.clone(), ..RunSettings::default() };
+        self.tasks.spawn(TITLE, move |context| {
+            let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
+            context.tell("looking at the folder", 0.0);
+            match open::kind_of(&path)? {
+                PathKind::Run => {
+                    let folder = RunFolder::open(&path)?;
+                    let run = open::view_run(&folder, None, &context.stop, &tell)?;
+                    context.tell("small pictures", 0.0);
+                    Ok(Done::RunOpened(Box::new(RunRead::new(folder, run))))
+                }
+                PathKind::Scene => {
+                    let opened = open::open_scene(&path, &settings.read, &context.stop, &tell)?;
+                    context.tell("small pictures", 0.0);
+                    Ok(Done::SceneRead(Box::new(SceneRead::new(Some(path), settings, opened))))
+                }
+            }
+        });
+    }
+
+    /// Photographs and opens the built-in scene.
+    pub fn open_demo(&mut self) {
+        self.close();
+        self.tasks.spawn(TITLE, move |context| {
+            let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
+            let settings = demo::settings();
+            let opened = open::open_demo(&DemoSettings::default(), &context.stop, &tell)?;
+            Ok(Done::SceneRead(Box::new(SceneRead::new(None, settings, opened))))
+        });
+    }
+
+    /// Takes in what was dropped on the window: a picture is a light, anything else a scene or run.
+    pub fn dropped(&mut self, path: PathBuf) {
+        let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+        match ending.as_str() {
+            "hdr" | "exr" | "pfm" | "png" | "jpg" | "jpeg" => self.add_light(path),
+            _ => self.open(path),
+        }
+    }
+
+    /// Goes back to the first page. A fit in progress is stopped; its checkpoint keeps what was done.
+    pub fn close(&mut self) {
+        self.tasks.stop_all();
+        self.fit.forget();
+        self.project = None;
+        self.cursor = None;
+        self.shelf.forget_scene();
+        self.switches = StageSwitches { traced: self.switches.traced, ..StageSwitches::default() };
+        self.edits = Edits { display: self.edits.display, ..Edits::default() };
+        self.history.restart(&self.edits);
+    }
+
+    pub(super) fn scene_was_read(&mut self, read: SceneRead) {
+        self.note_findings(&read.findings);
+        if let Some(path) = &read.path {
+            self.preferences.remember(path, false);
+        }
+        let views = read.scene.views.len();
+        self.edits.fit = read.settings.fit.clone();
+        self.eye = OrbitEye::around(bounds(&read.mesh));
+        if let Some(truth) = &read.scene.truth {
+            let light = Arc::new(truth.environment.clone());
+            self.shelf.put(ShelfLight::new(LightName::Truth, light));
+            if let Some(unseen) = &truth.relight {
+                self.shelf.put(ShelfLight::new(LightName::Unseen, Arc::new(unseen.environment.clone())));
+            }
+        }
+        let (scene, settings) = (Arc::clone(&read.scene), read.settings.clone());
+        let (findings, timings) = (read.findings.clone(), read.timings.clone());
+        self.project = Some(Project {
+            title: read.scene.name.clone(),
+            path: read.path,
+            is_run: false,
+            scene: Some(read.scene),
+            mesh: read.mesh,
+            surface: None,
+            settings: read.settings,
+            findings: read.findings,
+            timings: read.timings,
+            view_errors: vec![None; views],
+            clipped_shares: read.clipped_shares,
+            thumbnails: read.thumbnails,
+            ..Project::default()
+        });
+        self.history.restart(&self.edits);
+        self.first_light();
+        self.tasks.spawn(TITLE, move |context| {
+            let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
+            let prepared = prepare_with(scene, findings, &settings, timings, &context.stop, &tell)?;
+            let atlas = Atlas::of(Arc::clone(&prepared.surface));
+            Ok(Done::Prepared(Box::new(PreparedScene { prepared, atlas })))
+        });
+    }
+
+    pub(super) fn scene_was_prepared(&mut self, done: PreparedScene) {
+        let Some(project) = &mut self.project else { return };
+        let known = project.findings.len();
+        project.findings = done.prepared.findings;
+        project.timings = done.prepared.timings;
+        project.take_atlas(done.atlas);
+        project.quality.clone_from(&done.prepared.quality);
+        if let Some(quality) = &done.prepared.quality {
+            self.log.note(format!(
+                "The atlas has {} charts and fills {:.0} % of its square",
+                quality.charts,
+                100.0 * quality.share_of_area
+            ));
+        }
+        let findings: Vec<Finding> = self.project.as_ref().map_or(Vec::new(), |own| own.findings[known..].to_vec());
+        self.note_findings(&findings);
+    }
+
+    pub(super) fn run_was_opened(&mut self, read: RunRead) {
+        let RunRead { folder, run, atlas, thumbnails, clipped_shares } = read;
+        self.note_findings(&run.findings);
+        self.preferences.remember(folder.path(), true);
+        self.edits.fit = run.settings.fit.clone();
+        self.eye = OrbitEye::around(bounds(&atlas.mesh));
+        let views = run.scene.as_ref().map_or(0, |scene| scene.views.len());
+        let environment = Arc::new(run.environment);
+        self.shelf.put(ShelfLight::new(LightName::Fitted, Arc::clone(&environment)));
+        if let Some(truth) = run.scene.as_ref().and_then(|scene| scene.truth.as_ref()) {
+            self.shelf.put(ShelfLight::new(LightName::Truth, Arc::new(truth.environment.clone())));
+        }
+        let errors = run.report.as_ref().map(|report| view_errors(report, run.scene.as_deref()));
+        self.fit.folder = Some(folder.clone());
+        self.fit.losses = run.losses;
+        self.fit.report = run.report.map(Arc::new);
+        if self.fit.report.is_some() {
+            self.fit.status = super::FitStatus::Finished;
+        }
+        let title = folder.path().file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let mut project = Project {
+            title,
+            path: Some(folder.path().into()),
+            is_run: true,
+            scene: run.scene,
+            settings: run.settings,
+            findings: run.findings,
+            maps: Some(Arc::new(run.maps)),
+            environment: Some(environment),
+            times_seen: run.times_seen.map(Arc::new),
+            view_errors: errors.unwrap_or_else(|| vec![None; views]),
+            clipped_shares,
+            thumbnails,
+            ..Project::default()
+        };
+        project.take_atlas(atlas);
+        self.project = Some(project);
+        self.history.restart(&self.edits);
+        if self.fit.report.is_none() {
+            self.log.note("This run has not ended: Start goes on from its checkpoint");
+        }
+    }
+
+    /// Before there is a fitted light the stage is lit by the first light of the shelf.
+    fn first_light(&mut self) {
+        if self.shelf.find(&LightName::Fitted).is_none()
+            && let Some(light) = self.shelf.lights().iter().find(|light| matches!(light.name, LightName::Sky(_)))
+        {
+            self.edits.relight.first = light.name.clone();
+            self.light_was_chosen_for_us = Some(light.name.clone());
+            self.history.restart(&self.edits);
+        }
+    }
+
+    fn note_findings(&mut self, findings: &[Finding]) {
+        for finding in findings {
+            self.log.add(Message::from(finding));
+        }
+        let warnings = findings.iter().filter(|finding| finding.severity == Severity::Warning).count();
+        if warnings > 0 {
+            self.activate = Some(crate::studio::layout::Panel::Messages);
+        }
+    }
+
+    /// Forgets the place under the cursor unless it is pinned.
+    pub fn move_cursor(&mut self, cursor: Option<Cursor>) {
+        let pinned = self.cursor.is_some_and(|own| own.pinned);
+        if !pinned {
+            self.cursor = cursor;
+        }
+    }
+}
+
+impl SceneRead {
+    fn new(path: Option<PathBuf>, settings: RunSettings, opened: OpenedScene) -> Self {
+        let OpenedScene { scene, report, timings } = opened;
+        let mut mesh = scene.mesh.clone();
+        if mesh.normals.len() != mesh.positions.len() {
+            mesh.compute_normals();
+        }
+        let (thumbnails, clipped_shares) = small_pictures(&scene);
+        SceneRead {
+            path,
+            settings,
+            scene: Arc::new(scene),
+            mesh: Arc::new(mesh),
+            findings: report.findings,
+            timings,
+            thumbnails,
+            clipped_shares,
+        }
+    }
+}
+
+impl RunRead {
+    fn new(folder: RunFolder, run: OpenedRun) -> Self {
+        let atlas = Atlas::of(Arc::clone(&run.surface));
+        let (thumbnails, clipped_shares) = run.scene.as_deref().map(small_pictures).unwrap_or_default();
+        RunRead { folder, run, atlas, thumbnails, clipped_shares }
+    }
+}
+
+/// A small picture of each photo, and the share of each photo's surface pixels that are clipped.
+fn small_pictures(scene: &Scene) -> (Vec<Arc<RgbImage>>, Vec<f32>) {
+    let shares = scene.views.iter().map(|view| {
+        let surface = view.states.pixels().iter().filter(|state| state.is_surface()).count();
+        let clipped = view.states.pixels().iter().filter(|state| state.is_clipped()).count();
+        clipped as f32 / surface.max(1) as f32
+    });
+    let shares = shares.collect();
+    let small = |view: &crate::scene::View| {
+        let (photo, size) = (&view.photo, (view.photo.width(), view.photo.height()));
+        Arc::new(crate::image::area::thumbnail_of(size, |row, column| photo.radiance(row, column), THUMBNAIL_SIDE))
+    };
+    (scene.views.iter().map(small).collect(), shares)
+}
+
+/// Root mean square errors of a report, in the order of a scene's views.
+fn view_errors(report: &crate::insight::report::ReportData, scene: Option<&Scene>) -> Vec<Option<f32>> {
+    let Some(scene) = scene else { return Vec::new() };
+    let of = |name: &str| report.views.iter().find(|line| line.name == name).map(|line| line.raw.rmse_linear as f32);
+    scene.views.iter().map(|view| of(&view.name)).collect()
+}
+
+/// Lower and upper corner of a mesh; a box about the origin for one without vertices.
+pub fn bounds(mesh: &Mesh) -> (glam::Vec3, glam::Vec3) {
+    mesh.bounds().unwrap_or((glam::Vec3::NEG_ONE, glam::Vec3::ONE))
+}

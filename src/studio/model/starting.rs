@@ -1,0 +1,135 @@
+//! From a project to a fit, and settings that change on the way.
+
+use super::{Done, FitStatus, Model, store};
+use crate::error::Result;
+use crate::export::RunFolder;
+use crate::fit::{FitSettings, Fitter};
+use crate::job::open::{self, OpenStage};
+use crate::job::prepare::{Prepared, RunSettings, prepare_with};
+use crate::job::{self, Command, JobHandle, JobOptions};
+use crate::render::Surface;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Title of the task that starts a fit.
+pub const TITLE: &str = "Starting the fit";
+
+/// A job that was started.
+pub struct Started {
+    job: JobHandle,
+    folder: RunFolder,
+    settings: FitSettings,
+    surface: Arc<Surface>,
+}
+
+impl Started {
+    fn new(
+        prepared: Prepared,
+        fitter: Fitter,
+        settings: RunSettings,
+        folder: RunFolder,
+        wake: super::tasks::Wake,
+    ) -> Result<Self> {
+        let (fit, surface) = (settings.fit.clone(), Arc::clone(&prepared.surface));
+        let options = JobOptions { wake: Some(wake), ..JobOptions::default() };
+        let job = job::start_with(prepared, fitter, settings, folder.clone(), options)?;
+        Ok(Started { job, folder, settings: fit, surface })
+    }
+}
+
+impl Model {
+    /// The folder into which new runs go.
+    pub fn runs_folder(&self) -> PathBuf {
+        match self.preferences.runs_folder.as_os_str().is_empty() {
+            true => store::usual_runs_folder(),
+            false => self.preferences.runs_folder.clone(),
+        }
+    }
+
+    /// Starts a fit of what is open, or goes on with one from its checkpoint.
+    pub fn start_fit(&mut self) {
+        let Some(project) = &self.project else { return };
+        let (Some(scene), Some(surface)) = (project.scene.clone(), project.surface.clone()) else { return };
+        if let Some(folder) = self.fit.folder.clone().filter(|_| crate::studio::panel::fit::can_go_on(self)) {
+            return self.go_on_with(folder);
+        }
+        let mut settings = project.settings.clone();
+        settings.fit = self.edits.fit.clone();
+        let path = store::new_run_folder(&self.runs_folder(), &project.title);
+        let (findings, timings, quality) = (project.findings.clone(), project.timings.clone(), project.quality.clone());
+        let wake = Arc::clone(&self.wake);
+        // The atlas keeps its charts apart at the size it was made for; other map sizes need another atlas.
+        let same_atlas = project.settings.fit.map_size == settings.fit.map_size || project.is_run;
+        self.fit.losses.clear();
+        self.fit.report = None;
+        self.tasks.spawn(TITLE, move |context| {
+            let folder = RunFolder::create(&path)?;
+            let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
+            let prepared = match same_atlas {
+                true => Prepared { scene, surface, quality, findings, timings },
+                false => prepare_with(scene, findings, &settings, timings, &context.stop, &tell)?,
+            };
+            let (prepared, fitter, settings) = open::begin(prepared, settings, &context.stop, &tell)?;
+            let started = Started::new(prepared, fitter, settings, folder, wake)?;
+            Ok(Done::FitStarted(Box::new(started)))
+        });
+    }
+
+    fn go_on_with(&mut self, folder: RunFolder) {
+        let wake = Arc::clone(&self.wake);
+        let wanted = self.edits.fit.clone();
+        self.tasks.spawn(TITLE, move |context| {
+            let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
+            let (prepared, mut fitter, mut settings) = open::resume(&folder, None, &context.stop, &tell)?;
+            if settings.fit != wanted {
+                // What was changed while the fit stood still takes effect, as far as it can.
+                fitter.change(wanted.clone())?;
+                settings.fit = wanted;
+            }
+            let started = Started::new(prepared, fitter, settings, folder, wake)?;
+            Ok(Done::FitStarted(Box::new(started)))
+        });
+    }
+
+    pub(super) fn fit_was_started(&mut self, started: Started) {
+        let Started { job, folder, settings, surface } = started;
+        if let Some(project) = &mut self.project {
+            if project.surface.as_ref().is_none_or(|own| !Arc::ptr_eq(own, &surface)) {
+                // The atlas was made anew for another size of the maps.
+                project.take_surface(surface);
+            }
+            project.settings.fit = settings.clone();
+        }
+        self.preferences.remember(folder.path(), true);
+        self.log.note(format!("The run is written to {}", folder.path().display()));
+        self.fit.begin(job, folder, settings);
+    }
+
+    /// Sends settings that were changed to the running fit, once nothing moves any more.
+    pub fn send_changed_settings(&mut self, context: &egui::Context) {
+        let Some(in_force) = &self.fit.settings_in_force else { return };
+        if *in_force == self.edits.fit
+            || !matches!(self.fit.status, FitStatus::Running | FitStatus::Pausing | FitStatus::Paused)
+        {
+            return;
+        }
+        let moving = context.input(|input| input.pointer.any_down()) || context.text_edit_focused();
+        if moving || self.edits.fit.validate().is_err() {
+            return;
+        }
+        let wanted = self.edits.fit.clone();
+        // Taken as sent: if the worker refuses, its event brings back what is in force.
+        self.fit.settings_before_change = self.fit.settings_in_force.replace(wanted.clone());
+        self.fit.send(Command::Change(Box::new(wanted)));
+    }
+
+    /// Puts the form back to what is in force after the worker refused a change.
+    pub(super) fn take_back_refused(&mut self) {
+        if let Some(before) =
+            self.fit.settings_before_change.take().filter(|_| std::mem::take(&mut self.fit.was_refused))
+        {
+            self.fit.settings_in_force = Some(before.clone());
+            self.edits.fit = before;
+        }
+    }
+}

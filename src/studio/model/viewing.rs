@@ -1,0 +1,300 @@
+//! Where the eye stands, which light it sees by, and what is measured for it.
+
+use super::lights::LightName;
+use super::{Done, Model, SaveRequest, SaveWhat};
+use crate::error::Place;
+use crate::insight::surface_layers::{LayerSettings, SurfaceLayers, surface_layers};
+use crate::job::entanglement::{EntanglementSettings, entanglement};
+use crate::job::gallery::{self, NamedLight, Turning, TurntableSettings};
+use crate::job::pictures::parameters;
+use crate::light::Environment;
+use crate::render::Parameters;
+use crate::render::picture::PictureSettings;
+use crate::scene::Camera;
+use crate::studio::layout::Panel;
+use crate::studio::stage::eye::{Eye, OrbitEye};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Title of the task that compares pictures under other lights.
+pub const ENTANGLEMENT_TITLE: &str = "Comparing under other lights";
+/// Title of the task that measures the error of the photos.
+pub const LAYERS_TITLE: &str = "Measuring the error of the photos";
+
+impl Model {
+    /// Moves the eye so that the whole scene is seen.
+    pub fn frame_scene(&mut self) {
+        if let Some(project) = &self.project {
+            self.eye.fit(super::opening::bounds(&project.mesh), 1.4);
+            self.switches.looking_through = false;
+        }
+    }
+
+    /// Puts the eye where the chosen photo was taken, or leaves it there free to move.
+    pub fn look_through(&mut self, on: bool) {
+        if !on
+            && self.switches.looking_through
+            && let (Some(camera), Some(project)) = (self.chosen_camera(), &self.project)
+        {
+            self.eye = OrbitEye::from_camera(&camera, super::opening::bounds(&project.mesh));
+        }
+        self.switches.looking_through = on && self.chosen_camera().is_some();
+        if !self.switches.looking_through {
+            self.edits.photo = super::edits::PhotoLook::Off;
+        }
+    }
+
+    /// The camera of the chosen photo.
+    pub fn chosen_camera(&self) -> Option<Camera> {
+        let project = self.project.as_ref()?;
+        let scene = project.scene.as_ref()?;
+        scene.views.get(project.chosen_view).map(|view| view.camera)
+    }
+
+    /// The eye that is in force.
+    pub fn eye_in_force(&self) -> Eye {
+        match self.chosen_camera() {
+            Some(camera) if self.switches.looking_through => Eye::Photo(camera),
+            _ => Eye::Orbit(self.eye),
+        }
+    }
+
+    /// Shows the place of a finding.
+    pub fn go_to(&mut self, place: Place) {
+        match &place {
+            Place::View(name) | Place::Pixel { view: name, .. } => {
+                let name = name.clone();
+                if self.project.as_mut().is_some_and(|project| project.choose_by_name(&name)) {
+                    self.activate = Some(Panel::Photo);
+                }
+            }
+            Place::Texel { map, .. } => {
+                self.activate = Some(if map == "environment" { Panel::Light } else { Panel::Maps });
+            }
+            Place::Triangle(triangle) => {
+                if let Some(project) = &self.project
+                    && *triangle < project.mesh.triangles.len()
+                {
+                    let corners = project.mesh.corners(*triangle);
+                    self.eye.target = (corners[0] + corners[1] + corners[2]) / 3.0;
+                    self.switches.looking_through = false;
+                    self.activate = Some(Panel::Stage);
+                }
+            }
+            Place::Setting(_) => self.activate = Some(Panel::Fit),
+            Place::Nowhere | Place::File(_) | Place::Line(..) | Place::Byte(..) => {}
+        }
+        self.go_to = Some(place);
+    }
+
+    /// Brings the bright end of the chosen photo into range.
+    pub fn measure_exposure(&mut self) {
+        let Some(project) = &self.project else { return };
+        if let Some(small) = project.thumbnails.get(project.chosen_view) {
+            self.edits.display.exposure_stops = crate::image::histogram::auto_exposure(small.as_ref());
+        }
+    }
+
+    /// A light as it lights the stage: brought to the fitted one's brightness if so wished, made stronger; not turned.
+    pub fn stage_light(&self, name: &LightName) -> Option<Arc<Environment>> {
+        let relight = &self.edits.relight;
+        let light = match relight.matched {
+            true => self.shelf.matched(name)?.0,
+            false => Arc::clone(&self.shelf.find(name)?.environment),
+        };
+        Some(light)
+    }
+
+    /// The same with turn and strength in its texels, for the path tracer.
+    pub fn traced_light(&self, name: &LightName) -> Option<Environment> {
+        let light = self.stage_light(name)?;
+        let relight = &self.edits.relight;
+        let turned = light.rotated_about_up(relight.turn_degrees.to_radians());
+        let factor = relight.strength_stops.exp2();
+        Some(Environment { radiance: turned.radiance.map(|radiance| *radiance * factor) })
+    }
+
+    /// How the path tracer draws the stage.
+    pub fn picture_settings(&self, samples: usize) -> PictureSettings {
+        let fit = &self.edits.fit;
+        PictureSettings {
+            samples,
+            max_bounces: fit.bounces.max(2),
+            background_visible: self.edits.relight.as_background,
+            lobe_strength: if fit.has_lobe() { 1.0 } else { 0.0 },
+            two_sided: self
+                .project
+                .as_ref()
+                .and_then(|project| project.scene.as_ref())
+                .is_none_or(|scene| scene.truth.is_none()),
+            seed: 11,
+            ..PictureSettings::default()
+        }
+    }
+
+    /// Maps and light as the tracer reads them; `None` while there are no maps.
+    pub fn traced_parameters(&self, light: &LightName) -> Option<Parameters<f32>> {
+        let maps = self.project.as_ref()?.maps.as_ref()?;
+        Some(parameters(maps, &self.traced_light(light)?))
+    }
+
+    /// Maps and light of the run as it was fitted, whatever lights the stage.
+    pub fn run_parameters(&self) -> Option<Parameters<f32>> {
+        let project = self.project.as_ref()?;
+        Some(parameters(project.maps.as_ref()?, project.environment.as_ref()?))
+    }
+
+    /// Renders every photo again and spreads its error over the surface.
+    pub fn measure_layers(&mut self) {
+        let Some(project) = &self.project else { return };
+        let (Some(scene), Some(surface), Some(maps), Some(environment)) =
+            (project.scene.clone(), project.surface.clone(), project.maps.clone(), project.environment.clone())
+        else {
+            return;
+        };
+        if self.tasks.is_running(LAYERS_TITLE) {
+            return;
+        }
+        let excluded = scene.views.iter().map(|view| self.edits.fit.exclude.contains(&view.name)).collect();
+        let settings = LayerSettings {
+            picture: PictureSettings {
+                background_visible: scene.background == crate::scene::Background::Environment,
+                max_bounces: self.edits.fit.bounces,
+                ..self.picture_settings(8)
+            },
+            gains: self.gains(),
+            excluded,
+            ..LayerSettings::default()
+        };
+        self.tasks.spawn(LAYERS_TITLE, move |context| {
+            let own = parameters(&maps, &environment);
+            let layers = surface_layers(&scene, &surface, &own, &settings, &context.stop, &|share| {
+                context.tell("rendering", share);
+            })?;
+            Ok(Done::Layers(Box::new(layers)))
+        });
+    }
+
+    pub(super) fn layers_were_measured(&mut self, layers: SurfaceLayers) {
+        let Some(project) = &mut self.project else { return };
+        project.photo_error_range = [0.0, high_end(&layers.photo_error)];
+        project.disagreement_range = [0.0, high_end(&layers.disagreement)];
+        project.photo_error = Some(Arc::new(layers.photo_error));
+        project.disagreement = Some(Arc::new(layers.disagreement));
+        project.times_seen = Some(Arc::new(layers.times_seen));
+        for (own, measured) in project.view_errors.iter_mut().zip(&layers.views) {
+            *own = Some(measured.rmse as f32).filter(|rmse| rmse.is_finite());
+        }
+        self.log.note("The error of the photos is spread over the surface");
+    }
+
+    /// Factor of each photo that a fit with exposure gains found; empty for ones.
+    pub fn gains(&self) -> Vec<f32> {
+        let snapshot = self.fit.snapshot.as_ref();
+        snapshot.map(|snapshot| snapshot.log_gains.iter().map(|gain| gain.exp()).collect()).unwrap_or_default()
+    }
+
+    /// Opens the dialog that asks how and where to save.
+    pub fn ask_to_save(&mut self, what: SaveWhat) {
+        let Some(project) = &self.project else { return };
+        let folder = self.fit.folder.as_ref().map_or_else(|| self.runs_folder(), |folder| folder.path().into());
+        let light: String =
+            self.edits.relight.first.label().chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
+        let light = light.to_lowercase();
+        let view = match (self.switches.looking_through, project.chosen_name()) {
+            (true, Some(name)) => name.to_owned(),
+            _ => "stage".into(),
+        };
+        let path = match what {
+            SaveWhat::Picture => folder.join("pictures").join(format!("{view}_{light}.png")),
+            SaveWhat::Turntable => folder.join("pictures").join(format!("turntable_{light}")),
+            SaveWhat::Strip => folder.join("pictures").join(format!("{view}_lights")),
+        };
+        let (width, height) = match self.eye_in_force() {
+            Eye::Photo(camera) => (camera.width, camera.height),
+            Eye::Orbit(_) => (1280, 800),
+        };
+        self.dialog = super::Dialog::Save(SaveRequest {
+            what,
+            path: path.display().to_string(),
+            width,
+            height,
+            samples: 64,
+            frames: 48,
+        });
+    }
+
+    /// Renders and saves what was asked for, beside the window.
+    pub fn save(&mut self, request: SaveRequest) {
+        let Some(project) = &self.project else { return };
+        let Some(surface) = project.surface.clone() else { return };
+        let first = self.edits.relight.first.clone();
+        let Some(own) = self.traced_parameters(&first) else { return };
+        let camera = self.eye_in_force().as_camera(request.width, request.height);
+        let settings = self.picture_settings(request.samples);
+        let display = self.edits.display;
+        let path = PathBuf::from(request.path.trim());
+        let mut lights: Vec<NamedLight> = Vec::new();
+        if request.what == SaveWhat::Strip {
+            for light in self.shelf.lights() {
+                let name = light.name.label();
+                lights.extend(self.traced_light(&light.name).map(|environment| NamedLight { name, environment }));
+            }
+        }
+        self.tasks.spawn("Saving", move |context| {
+            let tell = |share: f32| context.tell("rendering", share);
+            let stop = &context.stop;
+            let saved = match request.what {
+                SaveWhat::Picture => {
+                    gallery::write_picture(&path, &surface, &own, &camera, &settings, &display, stop, &tell)?
+                }
+                SaveWhat::Turntable => {
+                    let size = (request.width, request.height);
+                    let turntable = TurntableSettings {
+                        frames: request.frames,
+                        size,
+                        turning: Turning::Camera,
+                        start: Some(camera),
+                    };
+                    gallery::write_turntable(&path, &surface, &own, &turntable, &settings, &display, stop, &tell)?
+                }
+                SaveWhat::Strip => {
+                    gallery::write_strip(&path, &surface, &own, &camera, &lights, &settings, &display, stop, &tell)?
+                }
+            };
+            Ok(Done::Saved(saved))
+        });
+    }
+
+    /// Compares pictures of the fit with those of the truth under lights it was not fitted to.
+    pub fn measure_entanglement(&mut self) {
+        let Some(project) = &self.project else { return };
+        let (Some(scene), Some(surface)) = (project.scene.clone(), project.surface.clone()) else { return };
+        let Some(own) = self.run_parameters() else { return };
+        let skies = self.shelf.lights().iter().filter(|light| matches!(light.name, LightName::Sky(_)));
+        let lights: Vec<NamedLight> = skies
+            .filter_map(|light| {
+                let (environment, _) = self.shelf.matched(&light.name)?;
+                Some(NamedLight { name: light.name.label(), environment: (*environment).clone() })
+            })
+            .collect();
+        let settings = EntanglementSettings {
+            picture: PictureSettings { background_visible: false, ..self.picture_settings(32) },
+            ..EntanglementSettings::default()
+        };
+        self.tasks.spawn(ENTANGLEMENT_TITLE, move |context| {
+            let table = entanglement(&scene, &surface, &own, &lights, &settings, &context.stop, &|share| {
+                context.tell("rendering", share);
+            })?;
+            Ok(Done::Entangled(Box::new(table)))
+        });
+    }
+}
+
+/// The value that all but the largest two in a hundred texels stay below; above zero.
+fn high_end(texels: &crate::image::GreyImage) -> f32 {
+    let values: Vec<f64> =
+        texels.pixels().iter().filter(|value| value.is_finite()).map(|&value| f64::from(value)).collect();
+    let high = crate::math::statistics::quantile(&values, 0.98) as f32;
+    if high > 0.0 { high } else { 1.0 }
+}

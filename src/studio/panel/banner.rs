@@ -1,0 +1,30 @@
+//! An error across the window: a sentence and a remedy, until it is dismissed.
+
+use crate::studio::model::Model;
+use crate::studio::model::log::capitalised;
+use crate::studio::theme;
+use egui::{Align2, Area, Context, Frame, Id, Order, RichText, Stroke, vec2};
+
+/// Draws the banner, if there is an error.
+pub fn show(context: &Context, model: &mut Model) {
+    let Some(message) = model.log.banner().cloned() else { return };
+    let colours = theme::palette(&context.global_style().visuals);
+    let mut dismissed = false;
+    Area::new(Id::unique("banner")).order(Order::Foreground).anchor(Align2::CENTER_TOP, vec2(0.0, 64.0)).show(
+        context,
+        |ui| {
+            Frame::popup(ui.style()).stroke(Stroke::new(1.5, colours.error)).inner_margin(12.0).show(ui, |ui| {
+                ui.set_max_width(620.0);
+                ui.label(RichText::new(message.sentence()).color(colours.error).strong());
+                if !message.remedy.is_empty() {
+                    ui.label(format!("What helps: {}", capitalised(&message.remedy)));
+                }
+                ui.add_space(4.0);
+                dismissed = ui.button("Dismiss").clicked();
+            });
+        },
+    );
+    if dismissed {
+        model.log.dismiss();
+    }
+}

@@ -1,0 +1,234 @@
+//! Windows over the window: the palette of acts, help, a path, how to save.
+
+use crate::studio::act::availability::availability;
+use crate::studio::act::{Act, ActInfo, Group, LIST};
+use crate::studio::model::{Dialog, Model, PickFor, SaveRequest, SaveWhat};
+use crate::studio::theme;
+use egui::{Button, Context, DragValue, Grid, Id, Key, Modal, RichText, ScrollArea, TextEdit, Ui};
+
+/// Draws the dialog that is open, if any.
+pub fn show(context: &Context, model: &mut Model) {
+    let dialog = std::mem::take(&mut model.dialog);
+    let id = match &dialog {
+        Dialog::None => return,
+        Dialog::Palette(_) => "palette",
+        Dialog::Help => "help",
+        Dialog::Path { .. } => "path",
+        Dialog::Save(_) => "save",
+    };
+    let mut next = dialog.clone();
+    let modal = Modal::new(Id::unique(id)).show(context, |ui| match &mut next {
+        Dialog::None => {}
+        Dialog::Palette(query) => {
+            if palette(ui, model, query) {
+                next = Dialog::None;
+            }
+        }
+        Dialog::Help => {
+            if help(ui) {
+                next = Dialog::None;
+            }
+        }
+        Dialog::Path { purpose, text } => {
+            let purpose = *purpose;
+            if path(ui, model, purpose, text) {
+                next = Dialog::None;
+            }
+        }
+        Dialog::Save(request) => {
+            if save(ui, model, request) {
+                next = Dialog::None;
+            }
+        }
+    });
+    if modal.should_close() {
+        next = Dialog::None;
+    }
+    // What was done within may have opened another dialog: that one stands.
+    if model.dialog == Dialog::None {
+        model.dialog = next;
+    }
+}
+
+/// Acts whose name or help holds all words of a query, those that begin with it first.
+fn found(query: &str) -> Vec<&'static ActInfo> {
+    let words: Vec<String> = query.to_lowercase().split_whitespace().map(str::to_owned).collect();
+    let holds = |text: &str| words.iter().all(|word| text.to_lowercase().contains(word));
+    let mut hits: Vec<&ActInfo> =
+        LIST.iter().filter(|info| info.act != Act::Palette && (holds(info.name) || holds(info.help))).collect();
+    let query = query.trim().to_lowercase();
+    hits.sort_by_key(|info| {
+        let name = info.name.to_lowercase();
+        (!name.starts_with(&query), !holds(info.name))
+    });
+    hits
+}
+
+fn palette(ui: &mut Ui, model: &mut Model, query: &mut String) -> bool {
+    ui.set_width(480.0);
+    let label = ui.label("Find an act");
+    let field = ui.add(TextEdit::singleline(query).desired_width(f32::INFINITY).hint_text("e.g. next light"));
+    let field = field.labelled_by(label.id);
+    field.request_focus();
+    let hits = found(query);
+    let enter = ui.input(|input| input.key_pressed(Key::Enter));
+    let mut chosen = None;
+    let place_id = Id::unique("palette place");
+    let mut place = ui.data(|data| data.get_temp::<usize>(place_id)).unwrap_or(0);
+    let (down, up) = ui.input(|input| (input.key_pressed(Key::ArrowDown), input.key_pressed(Key::ArrowUp)));
+    place = (place + usize::from(down)).saturating_sub(usize::from(up)).min(hits.len().saturating_sub(1));
+    ScrollArea::vertical().max_height(360.0).auto_shrink([false, true]).show(ui, |ui| {
+        for (index, info) in hits.iter().enumerate() {
+            let available = availability(info.act, model);
+            let mut button = Button::new(info.name).selected(index == place).min_size(egui::vec2(440.0, 0.0));
+            if let Some(shortcut) = info.shortcut {
+                button = button.shortcut_text(ui.ctx().format_shortcut(&shortcut));
+            }
+            let response = ui.add_enabled(available.is_ok(), button).on_hover_text(info.help);
+            if index == place && (down || up) {
+                response.scroll_to_me(None);
+            }
+            let response = match available {
+                Ok(()) => response,
+                Err(why) => response.on_disabled_hover_text(format!("Not now: {why}")),
+            };
+            if response.clicked() || (enter && index == place) {
+                chosen = Some(info.act);
+            }
+        }
+        if hits.is_empty() {
+            ui.label(RichText::new("No act is called so").weak());
+        }
+    });
+    if field.changed() {
+        place = 0;
+    }
+    ui.data_mut(|data| data.insert_temp(place_id, if chosen.is_some() { 0 } else { place }));
+    if let Some(act) = chosen {
+        model.act(act);
+    }
+    chosen.is_some()
+}
+
+fn help(ui: &mut Ui) -> bool {
+    ui.set_width(720.0);
+    ui.heading("Keys and help");
+    ui.label("Drag on the stage to orbit, right-drag to pan, wheel to zoom, Shift and drag to turn the light.");
+    ui.label("Click the surface to pin a texel: photo, stage and maps show the same place.");
+    ui.add_space(6.0);
+    ScrollArea::vertical().max_height(480.0).auto_shrink(false).show(ui, |ui| {
+        for (group, title) in Group::ALL {
+            super::heading(ui, title);
+            Grid::new(title).num_columns(3).spacing([14.0, 3.0]).striped(true).show(ui, |ui| {
+                for info in LIST.iter().filter(|info| info.group == group) {
+                    let keys = info.shortcut.map(|shortcut| ui.ctx().format_shortcut(&shortcut)).unwrap_or_default();
+                    ui.label(RichText::new(keys).monospace());
+                    ui.label(info.name);
+                    ui.label(RichText::new(info.help).weak());
+                    ui.end_row();
+                }
+            });
+        }
+    });
+    ui.add_space(6.0);
+    ui.button("Close").clicked()
+}
+
+fn path(ui: &mut Ui, model: &mut Model, purpose: PickFor, text: &mut String) -> bool {
+    ui.set_width(520.0);
+    let (title, hint) = match purpose {
+        PickFor::Light => ("Add an HDR map to the shelf", "/home/me/lights/garden.hdr"),
+        _ => ("Open a scene or a run", "/home/me/scenes/place"),
+    };
+    ui.heading(title);
+    let label = ui.label("Path");
+    let field = ui.add(TextEdit::singleline(text).desired_width(f32::INFINITY).hint_text(hint)).labelled_by(label.id);
+    if text.is_empty() {
+        field.request_focus();
+    }
+    let enter = field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+    let mut done = false;
+    ui.horizontal(|ui| {
+        let typed = !text.trim().is_empty();
+        if ui.add_enabled(typed, Button::new("Open this")).clicked() || (enter && typed) {
+            match purpose {
+                PickFor::Light => model.add_light(text.trim().into()),
+                _ => model.open(text.trim().into()),
+            }
+            done = true;
+        }
+        if ui.button("Browse…").on_hover_text("Opens the system's file dialog, where there is one").clicked() {
+            model.pick(purpose);
+            done = true;
+        }
+        done |= ui.button("Cancel").clicked();
+    });
+    ui.label(RichText::new("A folder or file can also be dropped on the window").weak());
+    done
+}
+
+fn save(ui: &mut Ui, model: &mut Model, request: &mut SaveRequest) -> bool {
+    ui.set_width(520.0);
+    ui.heading(match request.what {
+        SaveWhat::Picture => "Save picture",
+        SaveWhat::Turntable => "Save turntable",
+        SaveWhat::Strip => "Save strip of lights",
+    });
+    Grid::new("save").num_columns(2).spacing([12.0, 6.0]).show(ui, |ui| {
+        let label = ui.label(if request.what == SaveWhat::Picture { "File" } else { "Folder" });
+        ui.add(TextEdit::singleline(&mut request.path).desired_width(380.0))
+            .labelled_by(label.id)
+            .on_hover_text("PNG as shown on the stage, EXR in linear radiance; by the ending of the name");
+        ui.end_row();
+        ui.label("Size in pixels");
+        ui.horizontal(|ui| {
+            let side = |value| DragValue::new(value).range(16..=8192).speed(4.0);
+            ui.add(side(&mut request.width)).on_hover_text("Width");
+            ui.label("x");
+            ui.add(side(&mut request.height)).on_hover_text("Height");
+        });
+        ui.end_row();
+        let label = ui.label("Paths a pixel");
+        ui.add(DragValue::new(&mut request.samples).range(1..=4096))
+            .labelled_by(label.id)
+            .on_hover_text("Four times as many halve the noise and take four times as long");
+        ui.end_row();
+        if request.what == SaveWhat::Turntable {
+            let label = ui.label("Pictures");
+            ui.add(DragValue::new(&mut request.frames).range(2..=720)).labelled_by(label.id);
+            ui.end_row();
+        }
+    });
+    let millions = (request.width * request.height * request.samples) as f64 * 1e-6;
+    let frames = if request.what == SaveWhat::Turntable { request.frames as f64 } else { 1.0 };
+    ui.label(RichText::new(format!("{:.0} million paths", millions * frames)).weak());
+    let mut done = false;
+    ui.horizontal(|ui| {
+        let colours = theme::palette(ui.visuals());
+        let button = Button::new(RichText::new("Save").color(colours.on_accent)).fill(colours.accent);
+        if ui.add_enabled(!request.path.trim().is_empty(), button).clicked() {
+            model.save(request.clone());
+            done = true;
+        }
+        if request.what == SaveWhat::Picture && ui.button("Browse…").clicked() {
+            model.dialog = Dialog::Save(request.clone());
+            model.pick(PickFor::Save);
+        }
+        done |= ui.button("Cancel").clicked();
+    });
+    done
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_palette_finds_by_words_of_name_and_help() {
+        assert_eq!(found("next li").first().map(|info| info.act), Some(Act::NextLight));
+        assert_eq!(found("start fit").first().map(|info| info.act), Some(Act::Start));
+        assert!(found("shadows interreflection").iter().any(|info| info.act == Act::Traced));
+        assert!(found("xyzzy").is_empty());
+        assert_eq!(found("").len(), LIST.len() - 1);
+    }
+}

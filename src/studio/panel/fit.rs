@@ -1,0 +1,139 @@
+//! The fit: what is open, presets, settings, where the run goes.
+
+use super::{act_button, act_button_named, form, heading};
+use crate::fit::{FitSettings, Preset};
+use crate::insight::report::number;
+use crate::studio::act::Act;
+use crate::studio::model::store::Follow;
+use crate::studio::model::{FitStatus, Model, PickFor};
+use crate::studio::theme;
+use egui::{ComboBox, RichText, ScrollArea, Ui};
+
+/// Whether a start would go on from a checkpoint.
+pub fn can_go_on(model: &Model) -> bool {
+    let stopped = matches!(model.fit.status, FitStatus::Stopped | FitStatus::Failed(_) | FitStatus::Idle);
+    stopped && model.fit.folder.as_ref().is_some_and(|folder| folder.checkpoint_path().is_file())
+}
+
+/// Draws the panel.
+pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut form::FormMemory) {
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        facts(ui, model);
+        controls(ui, model);
+        presets(ui, model);
+        heading(ui, "Settings");
+        let live = model.fit.status.is_live();
+        form::show(ui, &mut model.edits.fit, live, memory);
+        if let Err(error) = model.edits.fit.validate() {
+            ui.label(RichText::new(error.to_string()).color(theme::palette(ui.visuals()).error));
+        }
+        run_folder(ui, model);
+    });
+}
+
+fn facts(ui: &mut Ui, model: &Model) {
+    let Some(project) = &model.project else { return };
+    ui.label(RichText::new(&project.title).strong().size(16.0));
+    let views = project.view_count();
+    let held_out = project.scene.as_ref().map_or(0, |scene| scene.views.iter().filter(|view| view.held_out).count());
+    let triangles = number::whole(project.mesh.triangles.len() as u64);
+    ui.label(RichText::new(format!("{triangles} triangles, {views} photos, {held_out} held out to judge")).weak());
+    let size = model.edits.fit.map_size as u64;
+    // Texels, their gradient and two moments, of 32 bytes each, with a third more for the mip chain.
+    let bytes = size * size * 32 * 4 * 4 / 3;
+    ui.label(
+        RichText::new(format!("Maps of {size} x {size} take about {} while fitting", number::memory(bytes))).weak(),
+    )
+    .on_hover_text("Texels, gradient and both moments of Adam, with their mip chains");
+}
+
+fn controls(ui: &mut Ui, model: &mut Model) {
+    ui.add_space(6.0);
+    ui.horizontal_wrapped(|ui| match model.fit.status.clone() {
+        FitStatus::Running => {
+            act_button_named(ui, model, Act::PauseOrGoOn, "Pause fit");
+            act_button_named(ui, model, Act::Checkpoint, "Checkpoint");
+        }
+        FitStatus::Paused => {
+            act_button_named(ui, model, Act::PauseOrGoOn, "Go on with fit");
+            act_button(ui, model, Act::StepOnce);
+            act_button_named(ui, model, Act::Checkpoint, "Checkpoint");
+        }
+        FitStatus::Pausing | FitStatus::Stopping | FitStatus::Finishing(_) => {
+            ui.label(model.fit.status.words());
+        }
+        FitStatus::Finished => {
+            act_button(ui, model, Act::OpenReport);
+            act_button(ui, model, Act::SavePicture);
+            act_button_named(ui, model, Act::Start, "Fit again");
+        }
+        FitStatus::Idle | FitStatus::Stopped | FitStatus::Failed(_) => {
+            let label = if can_go_on(model) { "Go on from the checkpoint" } else { "Start the fit" };
+            act_button_named(ui, model, Act::Start, label);
+        }
+    });
+    if let Some(then) = model.fit.last_checkpoint {
+        let ago = number::duration(then.elapsed().as_secs_f64());
+        ui.label(RichText::new(format!("Last checkpoint {ago} ago")).weak());
+    }
+}
+
+fn presets(ui: &mut Ui, model: &mut Model) {
+    heading(ui, "Preset");
+    let live = model.fit.status.is_live();
+    let own = model.edits.fit.clone();
+    ui.add_enabled_ui(!live, |ui| {
+        ui.horizontal(|ui| {
+            for preset in Preset::ALL {
+                let settings =
+                    FitSettings { exclude: own.exclude.clone(), seed: own.seed, ..FitSettings::preset(preset) };
+                let differences = settings.differences(&FitSettings::default());
+                let mut text = match differences.is_empty() {
+                    true => "The usual settings".to_owned(),
+                    false => "Differs from the usual settings in".to_owned(),
+                };
+                for (name, value, usual) in differences {
+                    text += &format!("\n{}: {value} instead of {usual}", form::words(&name));
+                }
+                let response = ui.selectable_label(own == settings, preset.label()).on_hover_text(text);
+                if response.clicked() {
+                    model.edits.fit = settings;
+                }
+            }
+        });
+    });
+    let changed = own.differences(&FitSettings::default());
+    if !changed.is_empty() {
+        let names: Vec<String> = changed.iter().map(|(name, value, _)| format!("{name} {value}")).collect();
+        ui.label(RichText::new(format!("Differs from the usual: {}", names.join(", "))).weak());
+    }
+}
+
+fn run_folder(ui: &mut Ui, model: &mut Model) {
+    heading(ui, "Where runs go");
+    if let Some(folder) = &model.fit.folder {
+        ui.label(RichText::new(folder.path().display().to_string()).weak()).on_hover_text("The folder of this run");
+    }
+    let folder = model.runs_folder();
+    ui.horizontal_wrapped(|ui| {
+        ui.label(RichText::new(format!("New runs: {}", folder.display())).weak());
+        if ui.button("Change…").on_hover_text("Chooses the folder for new runs").clicked() {
+            model.pick(PickFor::RunsFolder);
+        }
+    });
+    ui.horizontal(|ui| {
+        let label = ui.label("Follow").on_hover_text("How often stage, maps and curves follow a running fit");
+        let follow = &mut model.preferences.follow;
+        let names = [(Follow::Live, "Live"), (Follow::Seldom, "Every 5 s"), (Follow::Off, "Not at all")];
+        let chosen = names.iter().find(|(own, _)| own == follow).map_or("", |(_, name)| name);
+        ComboBox::from_id_salt("follow")
+            .selected_text(chosen)
+            .show_ui(ui, |ui| {
+                for (own, name) in names {
+                    ui.selectable_value(follow, own, name);
+                }
+            })
+            .response
+            .labelled_by(label.id);
+    });
+}

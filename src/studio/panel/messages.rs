@@ -1,0 +1,56 @@
+//! What was noticed: findings, errors, what was done. A line with a place goes there.
+
+use super::empty;
+use crate::error::{Place, Severity};
+use crate::studio::model::Model;
+use crate::studio::model::log::{Message, capitalised};
+use crate::studio::theme;
+use egui::{RichText, ScrollArea, Ui};
+
+/// Draws the list, newest first.
+pub fn show(ui: &mut Ui, model: &mut Model) {
+    model.log.unread = 0;
+    let messages: Vec<Message> = model.log.messages().iter().rev().take(300).cloned().collect();
+    if messages.is_empty() {
+        return empty(ui, "Nothing was noticed", "Findings of the check and of the fit appear here");
+    }
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        for (index, message) in messages.iter().enumerate() {
+            ui.push_id(index, |ui| line(ui, model, message));
+        }
+    });
+}
+
+/// Draws one message.
+pub fn line(ui: &mut Ui, model: &mut Model, message: &Message) {
+    let colours = theme::palette(ui.visuals());
+    let colour = colours.of(message.severity, ui.visuals().text_color());
+    let word = match message.severity {
+        Severity::Note => "Note",
+        Severity::Warning => "Warning",
+        Severity::Fatal => "Error",
+    };
+    ui.horizontal_wrapped(|ui| {
+        ui.label(RichText::new(word).color(colour).small());
+        if can_go(&message.place) {
+            let link = ui.link(message.place.to_string()).on_hover_text("Shows this place");
+            if link.clicked() {
+                model.go_to(message.place.clone());
+            }
+            ui.label(capitalised(&message.text));
+        } else {
+            ui.label(message.sentence());
+        }
+    });
+    if !message.remedy.is_empty() {
+        ui.horizontal_wrapped(|ui| {
+            ui.add_space(18.0);
+            ui.label(RichText::new(format!("What helps: {}", message.remedy)).weak());
+        });
+    }
+}
+
+/// Whether the window can show a place.
+fn can_go(place: &Place) -> bool {
+    matches!(place, Place::View(_) | Place::Pixel { .. } | Place::Texel { .. } | Place::Triangle(_) | Place::Setting(_))
+}

@@ -1,0 +1,197 @@
+//! The texel under the cursor: its values, the photos that see it, and what each of them says.
+
+use super::{empty, heading};
+use crate::insight::record::{RecordSettings, TexelRecord, texel_record};
+use crate::studio::model::{Cursor, Model};
+use crate::studio::theme;
+use egui::{Color32, Grid, RichText, ScrollArea, Ui};
+use glam::Vec3;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+
+/// Paths a pixel with which the model's radiance is traced.
+const SAMPLES: usize = 32;
+
+/// What the panel keeps.
+#[derive(Default)]
+pub struct RecordMemory {
+    record: Option<(u64, Box<TexelRecord>)>,
+    pending: Option<(u64, Receiver<TexelRecord>)>,
+}
+
+/// Draws the panel.
+pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut RecordMemory) {
+    let Some(cursor) = model.cursor else {
+        return empty(ui, "No texel", "Point at the stage, a map or a photo; a click on the stage pins the texel");
+    };
+    ask(ui, model, &cursor, memory);
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        ui.horizontal(|ui| {
+            ui.label(RichText::new(if cursor.pinned { "Pinned texel" } else { "Texel under the cursor" }).strong());
+            if cursor.pinned && ui.button("Let go").clicked() {
+                model.cursor = None;
+            }
+        });
+        let [x, y, z] = cursor.position.to_array();
+        ui.label(
+            RichText::new(format!("position {x:.3} {y:.3} {z:.3}, u {:.4} v {:.4}", cursor.uv.x, cursor.uv.y)).weak(),
+        );
+        match &memory.record {
+            Some((_, record)) => body(ui, model, record),
+            None if !cursor.pinned => {
+                ui.label("Click the surface to see what every photo says of it");
+            }
+            None if model.project.as_ref().is_none_or(|project| project.maps.is_none()) => {
+                ui.label("There are no maps yet: start a fit");
+            }
+            None => {
+                ui.label("Asking the photos");
+            }
+        }
+    });
+}
+
+/// Asks for the record of a pinned texel, once.
+fn ask(ui: &Ui, model: &Model, cursor: &Cursor, memory: &mut RecordMemory) {
+    let Some(project) = &model.project else { return };
+    let (Some(scene), Some(surface), Some(maps)) = (&project.scene, &project.surface, &project.maps) else {
+        memory.record = None;
+        return;
+    };
+    if !cursor.pinned {
+        memory.record = None;
+        return;
+    }
+    let mut hasher = DefaultHasher::new();
+    let place = [cursor.uv.x.to_bits(), cursor.uv.y.to_bits()];
+    (place, Arc::as_ptr(maps) as usize, &model.edits.fit.exclude).hash(&mut hasher);
+    let key = hasher.finish();
+    if let Some((own, receiver)) = &memory.pending {
+        match receiver.try_recv() {
+            Ok(record) => {
+                memory.record = Some((*own, Box::new(record)));
+                memory.pending = None;
+            }
+            Err(TryRecvError::Empty) => return,
+            Err(TryRecvError::Disconnected) => {
+                // The thread is gone without a record: the same question would end the same way.
+                let own = *own;
+                memory.pending = None;
+                memory.record = memory.record.take().filter(|(known, _)| *known == own);
+                return;
+            }
+        }
+    }
+    if memory.record.as_ref().is_some_and(|(own, _)| *own == key) {
+        return;
+    }
+    let ray = crate::trace::Ray {
+        origin: cursor.position + cursor.normal * 1e-3 * model.eye.distance,
+        direction: -cursor.normal,
+        t_max: f32::INFINITY,
+    };
+    let Some(hit) = surface.closest(&ray) else { return };
+    let point = surface.point(&hit);
+    let Some(parameters) = model.run_parameters() else { return };
+    let names: Vec<&String> = scene.views.iter().map(|view| &view.name).collect();
+    let settings = RecordSettings {
+        picture: model.picture_settings(SAMPLES),
+        gains: model.gains(),
+        excluded: names.iter().map(|name| model.edits.fit.exclude.contains(name)).collect(),
+    };
+    let (scene, surface) = (Arc::clone(scene), Arc::clone(surface));
+    let (sender, receiver) = channel();
+    let context = ui.ctx().clone();
+    let spawned = std::thread::Builder::new().name("patina-record".into()).spawn(move || {
+        let _ = sender.send(texel_record(&scene, &surface, &parameters, &point, &settings));
+        context.request_repaint();
+    });
+    if spawned.is_ok() {
+        memory.pending = Some((key, receiver));
+    }
+}
+
+fn body(ui: &mut Ui, model: &mut Model, record: &TexelRecord) {
+    let (row, column) = record.texel;
+    ui.label(format!("Texel row {row}, column {column}"));
+    Grid::new("values").num_columns(2).spacing([12.0, 3.0]).show(ui, |ui| {
+        let mut line = |name: &str, value: String, help: &str| {
+            ui.label(name).on_hover_text(help);
+            ui.label(value);
+            ui.end_row();
+        };
+        line("Diffuse", rgb(record.diffuse), "Diffuse reflectance, linear");
+        line("Specular", rgb(record.specular), "Specular reflectance F0, linear");
+        line("Roughness", format!("{:.4}", record.roughness), "r, the square of the microfacet width");
+        line("Seen by", format!("{} photos", record.rows.len()), "Photos whose view of the texel nothing blocks");
+        line("Resolved to", format!("{:.2} texels a pixel", record.footprint_texels), "Above 1 no photo resolves single texels here");
+        line("Spread of views", format!("{:.0} degrees", record.view_spread_degrees), "Small: shine cannot be told from colour");
+        line("Nearest to highlight", format!("{:.0} degrees", record.highlight_degrees), "Angle between the normal and the nearest half vector of a view and the brightest light: small, and roughness can be known");
+        line("Clipped", format!("{:.0} %", 100.0 * record.clipped_share), "Share of these pixels that are clipped and no data");
+    });
+    heading(ui, "What each photo says");
+    if record.rows.is_empty() {
+        ui.label("No photo sees this place: its values come from its neighbours");
+        return;
+    }
+    let largest = record.rows.iter().map(|row| row.residual.length()).fold(1e-6f32, f32::max);
+    Grid::new("photos of the texel").num_columns(5).spacing([10.0, 3.0]).striped(true).show(ui, |ui| {
+        for (title, help) in [
+            ("Photo", "Click to choose it"),
+            ("Angle", "Between the normal and the view, in degrees"),
+            ("Photo", "Radiance in the photo"),
+            ("Fit", "Radiance of the fit, path traced"),
+            ("Pull", "Fit minus photo: what the photo would change"),
+        ] {
+            ui.label(RichText::new(title).weak().small()).on_hover_text(help);
+        }
+        ui.end_row();
+        for view in &record.rows {
+            let name = RichText::new(&view.name).small();
+            let name = if view.is_excluded || view.held_out { name.weak() } else { name };
+            let role = if view.is_excluded {
+                "left out"
+            } else if view.held_out {
+                "held out"
+            } else {
+                "fitted to"
+            };
+            if ui.link(name).on_hover_text(role).clicked()
+                && let Some(project) = &mut model.project
+            {
+                project.chosen_view = view.view;
+            }
+            ui.label(RichText::new(format!("{:.0}", view.angle_degrees)).small());
+            swatch(ui, model, view.photo);
+            swatch(ui, model, view.model);
+            pull(ui, view.residual, largest);
+            ui.end_row();
+        }
+    });
+}
+
+fn rgb(value: Vec3) -> String {
+    format!("{:.4} {:.4} {:.4}", value.x, value.y, value.z)
+}
+
+fn swatch(ui: &mut Ui, model: &Model, radiance: Vec3) {
+    let [r, g, b] = model.edits.display.bytes(radiance, 0, 100);
+    let (rect, response) = ui.allocate_exact_size(egui::vec2(46.0, 14.0), egui::Sense::hover());
+    ui.painter().rect_filled(rect, 2.0, Color32::from_rgb(r, g, b));
+    response.on_hover_text(rgb(radiance));
+}
+
+/// A bar to the left where the fit is darker than the photo, to the right where it is brighter.
+fn pull(ui: &mut Ui, residual: Vec3, largest: f32) {
+    let colours = theme::palette(ui.visuals());
+    let (rect, response) = ui.allocate_exact_size(egui::vec2(60.0, 14.0), egui::Sense::hover());
+    let mean = residual.element_sum() / 3.0;
+    let share = (mean / largest).clamp(-1.0, 1.0);
+    let centre = rect.center().x;
+    let end = centre + share * rect.width() / 2.0;
+    let bar = egui::Rect::from_x_y_ranges(centre.min(end)..=centre.max(end), rect.shrink(2.0).y_range());
+    ui.painter().rect_filled(bar, 0.0, if mean > 0.0 { colours.curves[1] } else { colours.curves[2] });
+    ui.painter().vline(centre, rect.y_range(), egui::Stroke::new(1.0, ui.visuals().weak_text_color()));
+    response.on_hover_text(rgb(residual));
+}

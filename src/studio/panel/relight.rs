@@ -1,0 +1,184 @@
+//! The shelf of lights: swap, turn, strengthen, two side by side.
+
+use super::{act_button, act_switch, heading};
+use crate::image::display::DisplaySettings;
+use crate::image::{Image, RgbImage};
+use crate::studio::act::Act;
+use crate::studio::model::Model;
+use crate::studio::model::lights::LightName;
+use crate::studio::stage::Layer;
+use crate::studio::theme::{self, SHELF_PICTURE};
+use egui::{
+    ColorImage, ComboBox, Context, Rect, RichText, ScrollArea, Sense, Slider, Stroke, StrokeKind, TextureHandle, Ui,
+    vec2,
+};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// What the panel keeps: textures of the small pictures.
+#[derive(Default)]
+pub struct RelightMemory {
+    textures: HashMap<LightName, (Arc<RgbImage>, TextureHandle)>,
+}
+
+/// Draws the panel.
+pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut RelightMemory) {
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        controls(ui, model);
+        heading(ui, "Shelf");
+        shelf(ui, model, memory);
+        ui.horizontal_wrapped(|ui| {
+            act_button(ui, model, Act::AddLight);
+            act_button(ui, model, Act::SavePicture);
+            act_button(ui, model, Act::SaveLightStrip);
+            act_button(ui, model, Act::SaveTurntable);
+        });
+        ui.label(
+            RichText::new("Right and left arrow go along the shelf; Shift and drag on the stage turns the light")
+                .weak(),
+        );
+    });
+}
+
+fn controls(ui: &mut Ui, model: &mut Model) {
+    egui::Grid::new("relight").num_columns(2).spacing([10.0, 5.0]).show(ui, |ui| {
+        let relight = &mut model.edits.relight;
+        let label = ui.label("Turn");
+        ui.add(Slider::new(&mut relight.turn_degrees, 0.0..=360.0).suffix("°").fixed_decimals(0))
+            .labelled_by(label.id)
+            .on_hover_text("About the up axis\nKeys: Shift and the left or right arrow");
+        ui.end_row();
+        let label = ui.label("Strength");
+        ui.add(Slider::new(&mut relight.strength_stops, -6.0..=6.0).suffix(" stops").fixed_decimals(1))
+            .labelled_by(label.id)
+            .on_hover_text("The light is scaled by two to this power");
+        ui.end_row();
+    });
+    ui.horizontal_wrapped(|ui| {
+        ui.checkbox(&mut model.edits.relight.matched, "Match brightness")
+            .on_hover_text("Other lights are scaled to the mean luminance of the fitted one");
+        let on = model.edits.relight.as_background;
+        act_switch(ui, model, Act::LightBackground, "Background", on);
+        act_button(ui, model, Act::FittedLight);
+    });
+    ui.horizontal_wrapped(|ui| {
+        let two = model.edits.relight.second.is_some();
+        act_switch(ui, model, Act::SecondLight, "Two lights", two);
+        if let Some(second) = model.edits.relight.second.clone() {
+            let mut chosen = second.clone();
+            ComboBox::from_id_salt("second light").selected_text(chosen.label()).show_ui(ui, |ui| {
+                for light in model.shelf.lights() {
+                    ui.selectable_value(&mut chosen, light.name.clone(), light.name.label());
+                }
+            });
+            if chosen != second {
+                model.edits.relight.second = Some(chosen);
+            }
+        }
+    });
+}
+
+fn shelf(ui: &mut Ui, model: &mut Model, memory: &mut RelightMemory) {
+    let lights = model.shelf.lights().to_vec();
+    memory.textures.retain(|name, _| lights.iter().any(|light| light.name == *name));
+    let colours = theme::palette(ui.visuals());
+    let mut removed = None;
+    ui.horizontal_wrapped(|ui| {
+        for light in &lights {
+            let texture = texture(ui.ctx(), memory, &light.name, &light.small);
+            let chosen = model.edits.relight.first == light.name;
+            let label = light.name.label();
+            ui.allocate_ui(SHELF_PICTURE + vec2(8.0, 26.0), |ui| {
+                ui.vertical(|ui| {
+                    let (rect, response) = ui.allocate_exact_size(SHELF_PICTURE, Sense::click());
+                    response.widget_info(|| egui::WidgetInfo::selected(egui::Role::RadioButton, true, chosen, &label));
+                    let whole = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
+                    ui.painter().image(texture, rect, whole, egui::Color32::WHITE);
+                    let stroke = if chosen {
+                        Stroke::new(3.0, colours.accent)
+                    } else if response.hovered() {
+                        Stroke::new(2.0, ui.visuals().text_color())
+                    } else {
+                        ui.visuals().widgets.noninteractive.bg_stroke
+                    };
+                    ui.painter().rect_stroke(rect, 2.0, stroke, StrokeKind::Outside);
+                    if response.clicked() {
+                        model.edits.relight.first = light.name.clone();
+                        model.edits.layer = Layer::Lit;
+                    }
+                    let response = response.on_hover_text(about(&light.name, &light.environment));
+                    if matches!(light.name, LightName::File(_)) {
+                        response.context_menu(|ui| {
+                            if ui.button("Take off the shelf").clicked() {
+                                removed = Some(light.name.clone());
+                                ui.close();
+                            }
+                        });
+                    }
+                    let short: String = label.chars().take(15).collect();
+                    ui.label(RichText::new(short).small());
+                });
+            });
+        }
+    });
+    if let Some(name) = removed {
+        if let LightName::File(path) = &name {
+            model.preferences.lights.retain(|other| other != path);
+        }
+        if model.edits.relight.first == name {
+            model.edits.relight.first = LightName::Fitted;
+        }
+        if model.edits.relight.second.as_ref() == Some(&name) {
+            model.edits.relight.second = None;
+        }
+        model.shelf.remove(&name);
+    }
+}
+
+fn about(name: &LightName, light: &crate::light::Environment) -> String {
+    let mean = light.mean_radiance();
+    let brightest = light.radiance.pixels().iter().map(|pixel| pixel.max_element()).fold(0.0f32, f32::max);
+    let place = match name {
+        LightName::File(path) => format!("{}\nRight click takes it off the shelf", path.display()),
+        LightName::Fitted => "The light that was fitted to the photos".into(),
+        LightName::Truth => "The light the photos were made in".into(),
+        LightName::Unseen => "A light of the truth that no photo shows".into(),
+        LightName::Sky(_) => "A built-in sky".into(),
+    };
+    format!(
+        "{place}\n{} x {} texels, mean radiance {:.3} {:.3} {:.3}, brightest {brightest:.1}",
+        light.width(),
+        light.height(),
+        mean.x,
+        mean.y,
+        mean.z
+    )
+}
+
+/// The texture of a small picture, brought to a visible range of its own.
+fn texture(context: &Context, memory: &mut RelightMemory, name: &LightName, small: &Arc<RgbImage>) -> egui::TextureId {
+    if let Some((own, texture)) = memory.textures.get(name)
+        && Arc::ptr_eq(own, small)
+    {
+        return texture.id();
+    }
+    let stops = crate::image::histogram::auto_exposure(small);
+    let display = DisplaySettings { exposure_stops: stops, ..DisplaySettings::default() };
+    let image = colour_image(small, &display);
+    let texture = context.load_texture(format!("light {}", name.label()), image, egui::TextureOptions::LINEAR);
+    let id = texture.id();
+    memory.textures.insert(name.clone(), (Arc::clone(small), texture));
+    id
+}
+
+/// A linear picture as egui shows it.
+pub fn colour_image(picture: &Image<glam::Vec3>, display: &DisplaySettings) -> ColorImage {
+    let (width, height) = (picture.width(), picture.height());
+    let mut bytes = Vec::with_capacity(3 * width * height);
+    for row in 0..height {
+        for column in 0..width {
+            bytes.extend(display.bytes(picture[(row, column)], row as u32, column as u32));
+        }
+    }
+    ColorImage::from_rgb([width, height], &bytes)
+}

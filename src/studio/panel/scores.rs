@@ -1,0 +1,123 @@
+//! Scores of a finished run: photos, and light and maps against a truth where one is known.
+
+use super::{act_button, empty, heading};
+use crate::insight::report::data::ReportData;
+use crate::insight::scores::AggregateScore;
+use crate::job::entanglement::Entanglement;
+use crate::studio::act::Act;
+use crate::studio::model::Model;
+use crate::studio::model::viewing::ENTANGLEMENT_TITLE;
+use egui::{Grid, RichText, ScrollArea, Ui};
+
+/// Draws the panel.
+pub fn show(ui: &mut Ui, model: &mut Model) {
+    let Some(report) = model.fit.report.clone() else {
+        return empty(ui, "No scores yet", "They are measured when a fit is done");
+    };
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        ui.horizontal(|ui| {
+            heading(ui, "Photos against the fit");
+            act_button(ui, model, Act::OpenReport);
+        });
+        Grid::new("scores").striped(true).num_columns(5).spacing([18.0, 4.0]).show(ui, |ui| {
+            header(ui, "Photos");
+            for aggregate in &report.aggregates {
+                row(ui, &aggregate.name, &aggregate.score);
+            }
+            if let Some(relit) = report.truth.as_ref().and_then(|truth| truth.relit.as_ref()) {
+                row(ui, "a light no photo shows", relit);
+            }
+        });
+        ui.label(RichText::new("In brackets: after the one best factor per channel, which no photo can tell").weak());
+        truth(ui, &report);
+        other_lights(ui, model);
+    });
+}
+
+/// Scores under lights the fit never saw: the check of the paper.
+fn other_lights(ui: &mut Ui, model: &mut Model) {
+    heading(ui, "Under lights it was not fitted to");
+    let table = model.project.as_ref().and_then(|project| project.entanglement.clone());
+    match table.as_deref() {
+        None => {
+            let busy = model.tasks.is_running(ENTANGLEMENT_TITLE);
+            let there = model.project.as_ref().is_some_and(|project| project.scene.is_some() && project.maps.is_some());
+            if ui.add_enabled(there && !busy, egui::Button::new("Compare under other lights")).clicked() {
+                model.measure_entanglement();
+            }
+        }
+        Some(Entanglement::Unknown(why)) => {
+            ui.label(*why);
+        }
+        Some(Entanglement::Known(rows)) => {
+            Grid::new("other lights").striped(true).num_columns(5).spacing([18.0, 4.0]).show(ui, |ui| {
+                header(ui, "Light");
+                for line in rows {
+                    row(ui, &line.light, &line.score);
+                }
+            });
+            ui.label(RichText::new("An error that grows under other lights is light that went into the maps").weak());
+        }
+    }
+}
+
+fn header(ui: &mut Ui, first: &str) {
+    for (title, help) in [
+        (first, "Which pictures"),
+        ("Number", "How many pictures"),
+        ("PSNR, dB", "10 log10 of 1 over the mean squared error of sRGB values"),
+        ("SSIM", "Structural similarity of sRGB values (Wang et al. 2004)"),
+        ("RMSE", "Root mean squared error of linear radiance"),
+    ] {
+        ui.label(RichText::new(title).weak()).on_hover_text(help);
+    }
+    ui.end_row();
+}
+
+fn row(ui: &mut Ui, name: &str, score: &AggregateScore) {
+    ui.label(name);
+    ui.label(score.views.to_string());
+    let pair = |raw: f64, aligned: f64, digits: usize| format!("{raw:.digits$} ({aligned:.digits$})");
+    ui.label(pair(score.raw.psnr_srgb_db, score.aligned.psnr_srgb_db, 2));
+    ui.label(pair(score.raw.ssim_srgb, score.aligned.ssim_srgb, 3));
+    ui.label(pair(score.raw.rmse_linear, score.aligned.rmse_linear, 4));
+    ui.end_row();
+}
+
+fn truth(ui: &mut Ui, report: &ReportData) {
+    heading(ui, "Did light and material come apart?");
+    let Some(truth) = &report.truth else {
+        ui.label(
+            "The truth is not known here. Compare by eye: in the panel Relight, a surface that keeps the shadows or \
+             highlights of the photos under another light has light baked into it.",
+        );
+        return;
+    };
+    Grid::new("truth").striped(true).num_columns(3).spacing([18.0, 4.0]).show(ui, |ui| {
+        for title in ["Against the truth", "As fitted", "Scale-aligned"] {
+            ui.label(RichText::new(title).weak());
+        }
+        ui.end_row();
+        let mut line = |name: &str, raw: f64, aligned: f64| {
+            ui.label(name);
+            ui.label(format!("{raw:.4}"));
+            ui.label(format!("{aligned:.4}"));
+            ui.end_row();
+        };
+        if let Some(maps) = &truth.maps {
+            line("Diffuse, RMSE", maps.diffuse.raw, maps.diffuse.aligned);
+            line("Specular, RMSE", maps.specular.raw, maps.specular.aligned);
+            line("Roughness, RMSE", maps.roughness.raw, maps.roughness.aligned);
+        }
+        if let Some(light) = &truth.environment {
+            line("Light, relative L2", light.relative_l2.raw, light.relative_l2.aligned);
+            line("Light, log RMSE", light.log_rmse.raw, light.log_rmse.aligned);
+        }
+        if let Some(relit) = &truth.relit {
+            line("Relit pictures, RMSE", relit.raw.rmse_linear, relit.aligned.rmse_linear);
+        }
+    });
+    if let Some(degrees) = truth.environment.as_ref().and_then(|light| light.brightest_angle_degrees) {
+        ui.label(format!("The brightest light is off by {degrees:.1} degrees"));
+    }
+}

@@ -1,0 +1,207 @@
+//! The path-traced preview: asked for when nothing moves, shown as long as it is of what is on the stage.
+
+use crate::image::{Image, RgbImage};
+use crate::job::preview::{Preview, PreviewRequest};
+use crate::material::MaterialMaps;
+use crate::render::Parameters;
+use crate::studio::model::lights::LightName;
+use crate::studio::model::{FitStatus, Model};
+use crate::studio::stage::{Layer, StageFrame};
+use egui::{Ui, Vec2};
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::sync::Arc;
+
+/// Paths a pixel at which the preview rests.
+const SAMPLES: usize = 128;
+/// Pixels of the preview, at most; more are drawn coarser.
+const MOST_PIXELS: f32 = 1.0e6;
+
+/// The preview of each side of the line between two lights.
+#[derive(Default)]
+pub struct Traced {
+    sides: [Option<Side>; 2],
+    joined: Option<(u64, Arc<RgbImage>)>,
+    failed: bool,
+}
+
+struct Side {
+    preview: Preview,
+    key: u64,
+    seen: u64,
+    picture: Option<(Arc<RgbImage>, usize)>,
+    failures: u64,
+}
+
+/// What the stage shows of it.
+#[derive(Default)]
+pub struct TracedPicture {
+    /// The picture, if there is one of exactly this view.
+    pub picture: Option<Arc<RgbImage>>,
+    /// What to say about it.
+    pub caption: String,
+}
+
+impl Traced {
+    /// Asks for what is needed and brings what is there.
+    pub fn update(
+        &mut self,
+        ui: &Ui,
+        model: &mut Model,
+        frame: &StageFrame,
+        size: Vec2,
+        settled: bool,
+    ) -> TracedPicture {
+        let wanted = model.switches.traced
+            && !self.failed
+            && model.edits.layer == Layer::Lit
+            && matches!(
+                model.fit.status,
+                FitStatus::Idle | FitStatus::Paused | FitStatus::Stopped | FitStatus::Finished
+            )
+            && size.min_elem() >= 16.0;
+        let surface = model.project.as_ref().and_then(|project| project.surface.clone());
+        let maps = model.project.as_ref().and_then(|project| project.maps.clone());
+        let (true, Some(surface), Some(maps)) = (wanted, surface, maps) else {
+            self.cancel();
+            return TracedPicture::default();
+        };
+        let pixels_per_point = ui.ctx().pixels_per_point();
+        let full = size * pixels_per_point;
+        let scale = (MOST_PIXELS / (full.x * full.y).max(1.0)).sqrt().min(1.0);
+        let (width, height) = ((full.x * scale) as usize, (full.y * scale) as usize);
+        let names = [Some(model.edits.relight.first.clone()), model.edits.relight.second.clone()];
+        for (side, name) in names.iter().enumerate() {
+            match name {
+                None => self.sides[side] = None,
+                Some(name) => {
+                    let key = key_of(model, frame, name, &maps, (width, height));
+                    let known = self.sides[side].as_ref().is_some_and(|own| own.key == key);
+                    if !known {
+                        if !settled {
+                            // What was asked for is no longer what is seen.
+                            self.cancel();
+                            return TracedPicture::default();
+                        }
+                        let Some(light) = model.traced_light(name) else { continue };
+                        let request = PreviewRequest {
+                            surface: Arc::clone(&surface),
+                            parameters: Arc::new(self.parameters(&maps, &light)),
+                            camera: frame.eye.as_camera(width, height),
+                            settings: model.picture_settings(1),
+                            samples_target: SAMPLES,
+                            coarse_first: true,
+                            key,
+                        };
+                        self.request(model, side, request);
+                    }
+                }
+            }
+        }
+        self.take_in(model);
+        self.shown(names[1].is_some().then_some(model.edits.relight.wipe))
+    }
+
+    fn parameters(&self, maps: &MaterialMaps, light: &crate::light::Environment) -> Parameters<f32> {
+        crate::job::pictures::parameters(maps, light)
+    }
+
+    fn request(&mut self, model: &mut Model, side: usize, request: PreviewRequest) {
+        let key = request.key;
+        if self.sides[side].is_none() {
+            let threads = std::thread::available_parallelism().map_or(1, |count| count.get());
+            match Preview::start(threads, Some(Arc::clone(&model.wake))) {
+                Ok(preview) => {
+                    self.sides[side] = Some(Side { preview, key, seen: 0, picture: None, failures: 0 });
+                }
+                Err(error) => {
+                    self.failed = true;
+                    return model.log.error(&error);
+                }
+            }
+        }
+        if let Some(own) = &mut self.sides[side] {
+            own.key = key;
+            own.picture = None;
+            own.preview.request(request);
+        }
+    }
+
+    fn take_in(&mut self, model: &mut Model) {
+        for own in self.sides.iter_mut().flatten() {
+            if let Some((number, picture)) = own.preview.pictures.newest()
+                && number > own.seen
+            {
+                own.seen = number;
+                if picture.key == own.key {
+                    own.picture = Some((Arc::new(picture.picture.clone()), picture.samples));
+                    self.joined = None;
+                }
+            }
+            if let Some((number, failure)) = own.preview.failures.newest()
+                && number > own.failures
+            {
+                own.failures = number;
+                self.failed = true;
+                model.log.error(&failure.error);
+            }
+        }
+    }
+
+    /// The picture of one side, or of both joined at the line.
+    fn shown(&mut self, wipe: Option<f32>) -> TracedPicture {
+        let side = |place: usize| self.sides[place].as_ref().and_then(|own| own.picture.clone());
+        let Some((first, samples)) = side(0) else { return TracedPicture { caption: "Tracing".into(), picture: None } };
+        let caption = |samples: usize| match samples {
+            0 => "Tracing".to_owned(),
+            SAMPLES => format!("Path traced, {SAMPLES} paths a pixel"),
+            _ => format!("Path traced, {samples} of {SAMPLES} paths a pixel"),
+        };
+        let Some(wipe) = wipe else { return TracedPicture { picture: Some(first), caption: caption(samples) } };
+        let Some((second, other_samples)) = side(1) else {
+            return TracedPicture { caption: caption(0), picture: None };
+        };
+        if (first.width(), first.height()) != (second.width(), second.height()) {
+            return TracedPicture::default();
+        }
+        let mut hasher = DefaultHasher::new();
+        (Arc::as_ptr(&first) as usize, Arc::as_ptr(&second) as usize, wipe.to_bits()).hash(&mut hasher);
+        let key = hasher.finish();
+        if self.joined.as_ref().is_none_or(|(own, _)| *own != key) {
+            let border = (wipe * first.width() as f32) as usize;
+            let joined = Image::from_fn(first.width(), first.height(), |row, column| {
+                if column < border { first[(row, column)] } else { second[(row, column)] }
+            });
+            self.joined = Some((key, Arc::new(joined)));
+        }
+        let picture = self.joined.as_ref().map(|(_, picture)| Arc::clone(picture));
+        TracedPicture { picture, caption: caption(samples.min(other_samples)) }
+    }
+
+    fn cancel(&mut self) {
+        for own in self.sides.iter_mut().flatten() {
+            own.preview.cancel();
+            own.key = 0;
+            own.picture = None;
+        }
+        self.joined = None;
+    }
+}
+
+/// A number that changes whenever the picture would.
+fn key_of(model: &Model, frame: &StageFrame, name: &LightName, maps: &Arc<MaterialMaps>, size: (usize, usize)) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    let camera = frame.eye.as_camera(size.0, size.1);
+    let mut numbers: Vec<f32> = vec![model.edits.relight.turn_degrees, model.edits.relight.strength_stops];
+    numbers.extend(camera.rotation_camera_from_world.to_cols_array());
+    numbers.extend(camera.translation_camera_from_world.to_array());
+    numbers.extend(camera.focal_pixels.to_array());
+    numbers.extend(camera.centre_pixels.to_array());
+    for number in numbers {
+        number.to_bits().hash(&mut hasher);
+    }
+    let light = model.shelf.find(name).map_or(0, |light| Arc::as_ptr(&light.environment) as usize);
+    let fitted = model.shelf.find(&LightName::Fitted).map_or(0, |light| Arc::as_ptr(&light.environment) as usize);
+    (name, light, fitted, Arc::as_ptr(maps) as usize, size).hash(&mut hasher);
+    (model.edits.relight.matched, model.edits.relight.as_background, model.edits.fit.bounces).hash(&mut hasher);
+    hasher.finish() | 1
+}

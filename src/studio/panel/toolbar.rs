@@ -1,0 +1,115 @@
+//! The row under the menus: run controls, layers, light and display, always at hand.
+
+use super::{act_button_named, act_switch};
+use crate::image::display::ToneCurve;
+use crate::studio::act::Act;
+use crate::studio::model::{FitStatus, Model};
+use crate::studio::stage::Layer;
+use crate::studio::theme;
+use egui::{Button, ComboBox, DragValue, Ui};
+
+/// Draws the row.
+pub fn show(ui: &mut Ui, model: &mut Model) {
+    egui::Panel::top("toolbar").show(ui, |ui| {
+        ui.add_space(2.0);
+        ui.horizontal_wrapped(|ui| {
+            run(ui, model);
+            ui.separator();
+            layers(ui, model);
+            ui.separator();
+            act_switch(ui, model, Act::Traced, "Traced", model.switches.traced);
+            act_switch(ui, model, Act::Frustums, "Cameras", model.switches.frustums);
+            act_switch(ui, model, Act::LookThrough, "Look through", model.switches.looking_through);
+            ui.separator();
+            display(ui, model);
+        });
+        ui.add_space(2.0);
+    });
+}
+
+fn run(ui: &mut Ui, model: &mut Model) {
+    match model.fit.status {
+        FitStatus::Running => {
+            act_button_named(ui, model, Act::PauseOrGoOn, "Pause");
+            act_button_named(ui, model, Act::Stop, "Stop");
+        }
+        FitStatus::Paused => {
+            act_button_named(ui, model, Act::PauseOrGoOn, "Go on");
+            act_button_named(ui, model, Act::StepOnce, "Step");
+            act_button_named(ui, model, Act::Stop, "Stop");
+        }
+        FitStatus::Pausing => {
+            act_button_named(ui, model, Act::PauseOrGoOn, "Go on");
+            act_button_named(ui, model, Act::Stop, "Stop");
+        }
+        FitStatus::Stopping | FitStatus::Finishing(_) => {
+            act_button_named(ui, model, Act::Stop, "Stop");
+        }
+        _ => start(ui, model),
+    }
+}
+
+/// The button that matters most stands out.
+fn start(ui: &mut Ui, model: &mut Model) {
+    let available = crate::studio::act::availability::availability(Act::Start, model);
+    let colours = theme::palette(ui.visuals());
+    let goes_on = super::fit::can_go_on(model);
+    let label = if goes_on { "Go on with the fit" } else { "Start fit" };
+    let button = match available {
+        Ok(()) => Button::new(egui::RichText::new(label).color(colours.on_accent)).fill(colours.accent),
+        Err(_) => Button::new(label),
+    };
+    let response = ui.add_enabled(available.is_ok(), button).on_hover_text(Act::Start.info().help);
+    let response = match available {
+        Ok(()) => response,
+        Err(why) => response.on_disabled_hover_text(format!("Not now: {why}")),
+    };
+    if response.clicked() {
+        model.act(Act::Start);
+    }
+}
+
+fn layers(ui: &mut Ui, model: &mut Model) {
+    for (act, layer) in [
+        (Act::LayerLit, Layer::Lit),
+        (Act::LayerDiffuse, Layer::Diffuse),
+        (Act::LayerSpecular, Layer::Specular),
+        (Act::LayerRoughness, Layer::Roughness),
+        (Act::LayerNormal, Layer::Normal),
+    ] {
+        act_switch(ui, model, act, act.name(), model.edits.layer == layer);
+    }
+    let further = [
+        (Act::LayerPhotoError, Layer::PhotoError),
+        (Act::LayerTimesSeen, Layer::TimesSeen),
+        (Act::LayerDisagreement, Layer::Disagreement),
+    ];
+    let chosen = further.iter().find(|(_, layer)| *layer == model.edits.layer);
+    let text = chosen.map_or("More", |(act, _)| act.name());
+    let mut menu = Button::new(text);
+    if chosen.is_some() {
+        menu = menu.selected(true);
+    }
+    egui::containers::menu::MenuButton::from_button(menu).ui(ui, |ui| {
+        for (act, layer) in further {
+            act_switch(ui, model, act, act.name(), model.edits.layer == layer);
+        }
+    });
+}
+
+fn display(ui: &mut Ui, model: &mut Model) {
+    let exposure = ui.label("Exposure");
+    let stops = &mut model.edits.display.exposure_stops;
+    ui.add(DragValue::new(stops).speed(0.05).range(-20.0..=20.0).max_decimals(2).suffix(" stops"))
+        .labelled_by(exposure.id)
+        .on_hover_text("Pictures are scaled by two to this power\nKeys: E and Shift+E");
+    let curve = &mut model.edits.display.curve;
+    let name = ToneCurve::NAMED.iter().find(|(own, _)| own == curve).map_or("", |(_, name)| name);
+    ComboBox::from_id_salt("tone curve").selected_text(name).width(80.0).show_ui(ui, |ui| {
+        for (own, name) in ToneCurve::NAMED {
+            ui.selectable_value(curve, own, name);
+        }
+    });
+    act_switch(ui, model, Act::FalseColour, "False colour", model.edits.display.false_colour);
+    act_switch(ui, model, Act::Stripes, "Clipping", model.edits.display.stripes);
+}

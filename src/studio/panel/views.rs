@@ -1,0 +1,220 @@
+//! The table of photos: error, exposure, clipping; sort, choose, leave out.
+
+use super::{act_button_named, empty};
+use crate::studio::act::Act;
+use crate::studio::model::Model;
+use crate::studio::theme;
+use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui, vec2};
+
+/// What the panel keeps.
+pub struct ViewsMemory {
+    sorted_by: Column,
+    descending: bool,
+    last_chosen: usize,
+}
+
+impl Default for ViewsMemory {
+    fn default() -> Self {
+        ViewsMemory { sorted_by: Column::Name, descending: false, last_chosen: usize::MAX }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Column {
+    Name,
+    Error,
+    Exposure,
+    Clipped,
+    Role,
+}
+
+impl Column {
+    const ALL: [(Column, &'static str, f32, &'static str); 5] = [
+        (Column::Name, "Photo", 92.0, "Name of the photo's file"),
+        (Column::Error, "RMSE", 56.0, "Root mean squared error of linear radiance, as last known"),
+        (Column::Exposure, "Stops", 46.0, "Exposure that was fitted for the photo, in stops"),
+        (Column::Clipped, "Clipped", 52.0, "Share of the surface's pixels that are clipped and hence no data"),
+        (Column::Role, "Role", 60.0, "Fitted to, held out to judge, or left out"),
+    ];
+}
+
+/// A row of the table.
+#[derive(Clone, Debug)]
+struct Row {
+    index: usize,
+    name: String,
+    error: Option<f32>,
+    stops: f32,
+    clipped: f32,
+    role: &'static str,
+}
+
+/// Draws the panel.
+pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ViewsMemory) {
+    let rows = rows(model);
+    if rows.is_empty() {
+        return empty(ui, "No photos", "Open a scene; a run whose scene moved away shows its maps only");
+    }
+    let rows = sorted(rows, memory);
+    controls(ui, model);
+    header(ui, memory);
+    let chosen = model.project.as_ref().map_or(0, |project| project.chosen_view);
+    let scroll = memory.last_chosen != chosen;
+    memory.last_chosen = chosen;
+    let worst = rows.iter().filter_map(|row| row.error).fold(0.0f32, f32::max);
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        for row in &rows {
+            line(ui, model, row, row.index == chosen, worst, scroll);
+        }
+    });
+}
+
+fn rows(model: &Model) -> Vec<Row> {
+    let Some(project) = &model.project else { return Vec::new() };
+    let Some(scene) = &project.scene else { return Vec::new() };
+    let gains = model.fit.snapshot.as_ref().map(|snapshot| snapshot.log_gains.clone()).unwrap_or_default();
+    let report = model.fit.report.as_ref();
+    let row = |(index, view): (usize, &crate::scene::View)| {
+        let reported = report.and_then(|report| report.views.iter().find(|line| line.name == view.name));
+        let stops = match gains.get(index) {
+            Some(gain) => gain / std::f32::consts::LN_2,
+            None => reported.map_or(0.0, |line| line.exposure_gain.log2() as f32),
+        };
+        let left_out = model.edits.fit.exclude.contains(&view.name);
+        Row {
+            index,
+            name: view.name.clone(),
+            error: project.view_errors.get(index).copied().flatten(),
+            stops: if stops.is_finite() { stops } else { 0.0 },
+            clipped: project.clipped_shares.get(index).copied().unwrap_or(0.0),
+            role: if left_out {
+                "left out"
+            } else if view.held_out {
+                "held out"
+            } else {
+                "fitted"
+            },
+        }
+    };
+    scene.views.iter().enumerate().map(row).collect()
+}
+
+fn sorted(mut rows: Vec<Row>, memory: &ViewsMemory) -> Vec<Row> {
+    let unknown_last = |error: Option<f32>| error.unwrap_or(if memory.descending { -1.0 } else { f32::MAX });
+    rows.sort_by(|a, b| match memory.sorted_by {
+        Column::Name => a.name.cmp(&b.name),
+        Column::Error => unknown_last(a.error).total_cmp(&unknown_last(b.error)),
+        Column::Exposure => a.stops.total_cmp(&b.stops),
+        Column::Clipped => a.clipped.total_cmp(&b.clipped),
+        Column::Role => a.role.cmp(b.role),
+    });
+    if memory.descending {
+        rows.reverse();
+    }
+    rows
+}
+
+fn controls(ui: &mut Ui, model: &mut Model) {
+    ui.horizontal_wrapped(|ui| {
+        act_button_named(ui, model, Act::PreviousView, "Previous");
+        act_button_named(ui, model, Act::NextView, "Next");
+        act_button_named(ui, model, Act::LookThrough, "Look through");
+        let name = model.project.as_ref().and_then(|project| project.chosen_name()).unwrap_or_default().to_owned();
+        let out = model.edits.fit.exclude.contains(&name);
+        act_button_named(ui, model, Act::LeaveOut, if out { "Take in again" } else { "Leave out" });
+    });
+    ui.add_space(4.0);
+}
+
+fn header(ui: &mut Ui, memory: &mut ViewsMemory) {
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        for (column, title, width, help) in Column::ALL {
+            let own = memory.sorted_by == column;
+            let text = match (own, memory.descending) {
+                (true, true) => format!("{title} -"),
+                (true, false) => format!("{title} +"),
+                _ => title.to_owned(),
+            };
+            let button = egui::Button::new(RichText::new(text).small()).frame(false).min_size(vec2(width, 18.0));
+            if ui.add(button).on_hover_text(format!("{help}\nClick sorts by it, again turns the order")).clicked() {
+                memory.descending =
+                    if own { !memory.descending } else { column == Column::Error || column == Column::Clipped };
+                memory.sorted_by = column;
+            }
+        }
+    });
+    ui.separator();
+}
+
+fn line(ui: &mut Ui, model: &mut Model, row: &Row, chosen: bool, worst: f32, scroll: bool) {
+    let colours = theme::palette(ui.visuals());
+    let width: f32 = Column::ALL.iter().map(|(_, _, width, _)| width + 4.0).sum();
+    let (rect, response) = ui.allocate_exact_size(vec2(width.max(ui.available_width()), 20.0), Sense::click());
+    response.widget_info(|| {
+        egui::WidgetInfo::selected(egui::Role::RadioButton, true, chosen, format!("photo {}", row.name))
+    });
+    if chosen {
+        ui.painter().rect_filled(rect, 3.0, ui.visuals().selection.bg_fill);
+    } else if response.hovered() {
+        ui.painter().rect_filled(rect, 3.0, ui.visuals().widgets.hovered.weak_bg_fill);
+    }
+    let mut inner = ui.new_child(egui::UiBuilder::new().max_rect(rect).layout(Layout::left_to_right(Align::Center)));
+    inner.spacing_mut().item_spacing.x = 4.0;
+    let dim = row.role == "left out";
+    let mut cell = |width: f32, text: String, colour: Option<egui::Color32>| {
+        let text = RichText::new(text).small();
+        let text = match colour {
+            Some(colour) => text.color(colour),
+            None if dim => text.weak(),
+            None => text,
+        };
+        inner.allocate_ui(vec2(width, 20.0), |ui| {
+            ui.set_min_width(width);
+            ui.add(egui::Label::new(text).truncate().selectable(false));
+        });
+    };
+    let [name, error, stops, clipped, role] = Column::ALL.map(|(_, _, width, _)| width);
+    cell(name, row.name.clone(), None);
+    let bad = row.error.is_some_and(|error| worst > 0.0 && error > 0.75 * worst && worst > 0.02);
+    let text = row.error.map_or_else(|| "-".into(), |error| format!("{error:.4}"));
+    cell(error, text, bad.then_some(colours.warning));
+    cell(stops, if row.stops == 0.0 { "0".into() } else { format!("{:+.2}", row.stops) }, None);
+    let much = row.clipped > 0.05;
+    cell(clipped, format!("{:.1} %", 100.0 * row.clipped), much.then_some(colours.warning));
+    cell(role, row.role.into(), None);
+    if chosen && scroll {
+        response.scroll_to_me(None);
+    }
+    if let Some(project) = model.project.as_mut().filter(|_| response.clicked()) {
+        project.chosen_view = row.index;
+    }
+    if response.double_clicked() && !model.switches.looking_through {
+        model.act(Act::LookThrough);
+    }
+    response.on_hover_text(format!("{}\nClick chooses it, double click looks through its camera", row.name));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn photos_without_a_known_error_come_last_in_both_orders() {
+        let row = |index: usize, error: Option<f32>| Row {
+            index,
+            name: index.to_string(),
+            error,
+            stops: 0.0,
+            clipped: 0.0,
+            role: "fitted",
+        };
+        let rows = vec![row(0, Some(0.1)), row(1, None), row(2, Some(0.3))];
+        let order = |descending| {
+            let memory = ViewsMemory { sorted_by: Column::Error, descending, last_chosen: 0 };
+            sorted(rows.clone(), &memory).iter().map(|row| row.index).collect::<Vec<_>>()
+        };
+        assert_eq!(order(false), [0, 2, 1]);
+        assert_eq!(order(true), [2, 0, 1]);
+    }
+}

@@ -1,0 +1,174 @@
+//! The first page: open, recents, the demo, and what a scene folder must hold.
+
+use crate::studio::act::Act;
+use crate::studio::model::opening::TITLE;
+use crate::studio::model::store::Recent;
+use crate::studio::model::{Model, PickFor};
+use crate::studio::theme;
+use egui::{
+    Align, Align2, Button, Color32, Context, Frame, Id, LayerId, Layout, Order, RichText, ScrollArea, TextStyle, Ui,
+    vec2,
+};
+
+/// What the page keeps.
+#[derive(Default)]
+pub struct WelcomeMemory {
+    path: String,
+}
+
+/// What a scene folder may be, with what it must hold.
+const KINDS: [(&str, &str); 4] = [
+    (
+        "A BlendedMVS scene",
+        "cams/ with 00000000_cam.txt …, blended_images/ with the photos, textured_mesh/ or mesh.obj; blended masks if there are any",
+    ),
+    ("An exchange folder", "scene.json with cameras, mesh.obj, views/ with EXR or PNG pictures"),
+    ("Your own photos", "scene.toml that names a mesh (OBJ or PLY), a list of photos and their calibrated cameras"),
+    ("A run of Patina", "what a fit left behind: maps, light, report, checkpoint; an unfinished one can go on"),
+];
+
+/// Draws the page.
+pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut super::Memory) {
+    let memory = &mut memory.welcome;
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        let width = ui.available_width().min(760.0);
+        let margin = ((ui.available_width() - width) / 2.0).max(0.0);
+        ui.add_space((ui.available_height() * 0.08).min(70.0));
+        ui.horizontal(|ui| {
+            ui.add_space(margin);
+            ui.allocate_ui_with_layout(vec2(width, 0.0), Layout::top_down(Align::Min), |ui| page(ui, model, memory));
+        });
+    });
+}
+
+fn page(ui: &mut Ui, model: &mut Model, memory: &mut WelcomeMemory) {
+    let colours = theme::palette(ui.visuals());
+    ui.label(RichText::new("Patina").size(40.0).color(colours.accent).strong());
+    ui.label(RichText::new("From photos of a place to materials one can relight").size(16.0));
+    ui.add_space(20.0);
+    interrupted(ui, model);
+    ui.horizontal(|ui| {
+        let demo = Button::new(RichText::new("Open the built-in demo").size(16.0).color(colours.on_accent))
+            .fill(colours.accent)
+            .min_size(vec2(230.0, 40.0));
+        if ui.add(demo).on_hover_text("A small scene whose materials are known; needs no data").clicked() {
+            model.act(Act::OpenDemo);
+        }
+        let open = Button::new(RichText::new("Open a folder…").size(16.0)).min_size(vec2(190.0, 40.0));
+        if ui.add(open).on_hover_text("A scene folder, or a run that a fit left behind").clicked() {
+            model.pick(PickFor::Open);
+        }
+        ui.label(RichText::new("or drop one here").weak());
+    });
+    ui.add_space(8.0);
+    ui.horizontal(|ui| {
+        let label = ui.label("Path");
+        let field = ui
+            .add(egui::TextEdit::singleline(&mut memory.path).desired_width(430.0).hint_text("/home/me/scenes/place"))
+            .labelled_by(label.id);
+        let entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+        let clicked = ui.add_enabled(!memory.path.trim().is_empty(), Button::new("Open path")).clicked();
+        if (entered || clicked) && !memory.path.trim().is_empty() {
+            model.open(memory.path.trim().into());
+        }
+    });
+    opening(ui, model);
+    ui.add_space(18.0);
+    recents(ui, model);
+    ui.add_space(12.0);
+    ui.label(RichText::new("What can be opened").strong());
+    egui::Grid::new("kinds").num_columns(2).spacing([16.0, 6.0]).show(ui, |ui| {
+        for (kind, holds) in KINDS {
+            ui.label(kind);
+            ui.add(egui::Label::new(RichText::new(holds).weak()).wrap());
+            ui.end_row();
+        }
+    });
+    findings(ui, model);
+}
+
+/// A run that was in progress when the program ended without a word.
+fn interrupted(ui: &mut Ui, model: &mut Model) {
+    let Some(run) = model.interrupted_run.clone() else { return };
+    let colours = theme::palette(ui.visuals());
+    Frame::group(ui.style()).stroke(egui::Stroke::new(1.0, colours.warning)).show(ui, |ui| {
+        ui.label(RichText::new("Patina ended while a fit was running").color(colours.warning).strong());
+        ui.label(format!("Its last checkpoint is whole: {}", run.display()));
+        ui.horizontal(|ui| {
+            if ui.button("Take it up again").clicked() {
+                model.interrupted_run = None;
+                model.open(run.clone());
+            }
+            if ui.button("Leave it").on_hover_text("The run stays on disk and can be opened later").clicked() {
+                model.interrupted_run = None;
+                model.preferences.remember(&run, true);
+            }
+        });
+    });
+    ui.add_space(12.0);
+}
+
+/// How far the scene is that is being opened.
+fn opening(ui: &mut Ui, model: &mut Model) {
+    let progress = model.tasks.progress();
+    let Some((_, what, share)) = progress.iter().find(|(title, ..)| title == TITLE) else { return };
+    ui.add_space(14.0);
+    Frame::group(ui.style()).inner_margin(12.0).show(ui, |ui| {
+        ui.label(RichText::new("Opening").strong());
+        ui.label(crate::studio::model::log::capitalised(what));
+        ui.add(egui::ProgressBar::new(*share).desired_width(420.0).show_percentage());
+    });
+}
+
+fn recents(ui: &mut Ui, model: &mut Model) {
+    ui.label(RichText::new("Opened before").strong());
+    if model.preferences.recents.is_empty() {
+        ui.label(RichText::new("Nothing yet").weak());
+        return;
+    }
+    let recents: Vec<Recent> = model.preferences.recents.clone();
+    for recent in recents {
+        let name = recent.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        let is_there = recent.path.exists();
+        ui.horizontal(|ui| {
+            let link = ui.add_enabled(is_there, Button::new(&name).frame(false));
+            let link = link.on_hover_text(recent.path.display().to_string());
+            if link.on_disabled_hover_text("It is no longer there").clicked() {
+                model.open(recent.path.clone());
+            }
+            ui.label(RichText::new(if recent.is_run { "run" } else { "scene" }).weak());
+            let folder = recent.path.parent().map_or_else(String::new, |folder| folder.display().to_string());
+            ui.label(RichText::new(folder).weak().small());
+            if !is_there && ui.small_button("Forget").clicked() {
+                model.preferences.recents.retain(|other| *other != recent);
+            }
+        });
+    }
+}
+
+/// What was noticed when a folder could not be opened.
+fn findings(ui: &mut Ui, model: &mut Model) {
+    let messages: Vec<_> = model.log.messages().iter().rev().take(8).cloned().collect();
+    if messages.iter().all(|message| message.severity == crate::Severity::Note) {
+        return;
+    }
+    ui.add_space(12.0);
+    ui.label(RichText::new("Noticed").strong());
+    for (index, message) in messages.iter().enumerate() {
+        ui.push_id(index, |ui| super::messages::line(ui, model, message));
+    }
+}
+
+/// A veil over the window while something is dragged over it.
+pub fn drop_hint(context: &Context) {
+    let hovers = context.input(|input| !input.raw.hovered_files.is_empty());
+    if !hovers {
+        return;
+    }
+    let painter = context.layer_painter(LayerId::new(Order::Foreground, Id::unique("drop hint")));
+    let area = context.content_rect();
+    painter.rect_filled(area, 0.0, Color32::from_black_alpha(170));
+    let text = "Drop a scene or run folder to open it, an HDR map to put it on the shelf";
+    let font = TextStyle::Heading.resolve(&context.global_style());
+    painter.text(area.center(), Align2::CENTER_CENTER, text, font, Color32::WHITE);
+}

@@ -1,0 +1,109 @@
+#!/usr/bin/env bash
+# Drives the real window under Xvfb as a person would, by keys, and takes a picture of every panel.
+#
+#   bash tests/studio_screenshots.sh OUT [SCENE] [SECONDS OF FIT]
+#
+# SCENE is a scene folder; without one, or when it is not there, the built-in demo. Needs the Debian packages
+# xvfb xdotool imagemagick mesa-vulkan-drivers libxcursor1 libxi6 libxkbcommon-x11-0 libx11-xcb1.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+out=$(realpath -m "${1:?folder for the pictures}"); scene=${2:-}; fit_seconds=${3:-45}
+program=${PATINA:-target/release/patina}
+mkdir -p "$out"
+work=$(mktemp -d)
+for tool in Xvfb xdotool import; do
+  command -v "$tool" >/dev/null || { echo "skipped: $tool is not installed"; exit 0; }
+done
+[ -x "$program" ] || cargo build --release
+
+display=:87
+Xvfb "$display" -screen 0 1600x1000x24 >/dev/null 2>&1 & server=$!
+export DISPLAY="$display"
+sleep 1
+cleanup() { kill "${studio:-$server}" "$server" 2>/dev/null || true; rm -rf "$work"; }
+trap cleanup EXIT
+
+# Where runs go and how large the window is, as a person would have chosen them before.
+printf '{"runs-folder": "%s/runs", "window-size": [1600, 1000], "theme": "%s"}' "$work" "${THEME:-dark}" >"$work/studio.json"
+opening=(--demo)
+if [ -n "$scene" ] && [ -d "$scene" ]; then opening=("$scene"); else echo 'the built-in demo is opened'; fi
+"$program" studio --settings-file "$work/studio.json" "${opening[@]}" >"$work/log" 2>&1 & studio=$!
+
+alive() { kill -0 "$studio" 2>/dev/null || { echo 'the window is gone:'; cat "$work/log"; exit 1; }; }
+picture() { alive; sleep "${2:-0.6}"; import -window root "$out/$1.png"; echo "$out/$1.png"; }
+keys() { alive; xdotool key --delay 60 "$@"; sleep 0.4; }
+# An act by its name, through the palette.
+act() { keys ctrl+k; xdotool type --delay 12 "$1"; sleep 0.3; keys Return; sleep 0.3; }
+title() { xdotool getwindowname "$(xdotool search --onlyvisible --class patina | head -1)" 2>/dev/null || true; }
+wait_for_title() { # pattern, seconds
+  for _ in $(seq "$(( $2 * 2 ))"); do
+    alive
+    case "$(title)" in *$1*) return 0 ;; esac
+    sleep 0.5
+  done
+  echo "the title never held '$1': $(title)"; exit 1
+}
+
+picture 01_welcome 2
+wait_for_title ' - Patina' 600
+picture 02_scene_is_read 3
+# The atlas is made beside the window; starting is refused until it is there.
+for _ in $(seq 600); do
+  act 'Start fit'
+  sleep 2
+  case "$(title)" in *fitting*) break ;; esac
+done
+wait_for_title 'fitting' 300
+sleep "$fit_seconds"
+picture 03_fitting
+act 'Diffuse'; picture 04_stage_diffuse
+act 'Roughness'; picture 05_stage_roughness
+act 'Lit'
+act 'Panel: light'; picture 06_light
+act 'Panel: photos'; picture 07_photos
+act 'Pause or go on'
+wait_for_title 'paused' 120
+picture 08_paused_and_traced 12
+act 'Next light'; picture 09_second_light 10
+act 'Next light'; picture 10_third_light 10
+act 'Next light'; picture 11_fourth_light 10
+act 'Two lights side by side'; picture 12_two_lights 16
+act 'Two lights side by side'
+act 'Fitted light'
+act "Look through the photo's camera"; picture 13_through_a_photo 10
+act 'Wipe photo against stage'; picture 14_photo_wiped 2
+act 'Wipe photo against stage'
+act 'Frame the scene'
+act 'Photos on the cameras'; picture 15_cameras 8
+act 'Panel: photo'; picture 16_photo 2
+act 'Panel: stage'
+act 'Measure photo error'
+sleep 2
+act 'Panel: maps'
+act 'Chart borders'; picture 17_maps
+act 'Chart borders'
+act 'Panel: relight'; picture 18_relight
+act 'Panel: texel'
+xdotool mousemove 800 420 click 1; sleep 6; picture 19_texel
+act 'Panel: messages'; picture 20_messages
+act 'Panel: curves'; picture 21_curves
+act 'False colour'; picture 22_false_colour 6
+act 'Reset display'
+keys ctrl+k; xdotool type 'light'; picture 23_palette; keys Escape
+keys F1; picture 24_help; keys Escape
+act 'Save picture'; picture 25_save; keys Escape
+for _ in $(seq 120); do act 'Error of the photos'; sleep 1; break; done
+picture 26_photo_error 30
+act 'Lit'
+act 'Next theme'; picture 27_theme
+act 'Next theme'; picture 28_theme
+act 'Next theme'; picture 29_theme
+act 'Pause or go on'; sleep 3
+act 'Stop fit'
+wait_for_title 'Stopped' 120
+picture 30_stopped
+act 'Quit'
+for _ in $(seq 60); do kill -0 "$studio" 2>/dev/null || break; sleep 0.5; done
+if kill -0 "$studio" 2>/dev/null; then echo 'the window did not close'; exit 1; fi
+studio=$server
+echo 'done'
