@@ -1,7 +1,8 @@
 //! From linear radiance to the colours of a screen: exposure, tone curve, false colour, clipping stripes.
 //!
 //! One definition for every picture that is shown or saved; the shader of the studio's stage repeats it, and a test
-//! compares the two.
+//! compares the two. [`DisplaySettings::colour`] says what a pixel looks like; [`PreparedDisplay`] gives the same bytes
+//! for millions of them, by table.
 
 use super::transfer::srgb_from_linear;
 use glam::Vec3;
@@ -27,7 +28,8 @@ impl ToneCurve {
 
     /// Encodes an exposed linear value to [0, 1].
     pub fn encode(self, value: f32) -> f32 {
-        let value = if value.is_finite() { value.max(0.0) } else { 0.0 };
+        // NaN becomes 0; what overflowed by its exposure stays bright.
+        let value = value.max(0.0);
         match self {
             ToneCurve::Srgb => srgb_from_linear(value.min(1.0)),
             ToneCurve::Filmic => {
@@ -94,23 +96,140 @@ impl DisplaySettings {
             return NOT_FINITE;
         }
         let exposed = radiance * self.exposure_stops.exp2();
+        self.marked(exposed, screen_row, screen_column).unwrap_or_else(|| {
+            Vec3::new(self.curve.encode(exposed.x), self.curve.encode(exposed.y), self.curve.encode(exposed.z))
+        })
+    }
+
+    /// The colour of an exposed value that is not shown by the tone curve: a stripe or a false colour.
+    #[inline]
+    fn marked(&self, exposed: Vec3, screen_row: u32, screen_column: u32) -> Option<Vec3> {
         if self.stripes && (screen_row + screen_column) / STRIPE_PIXELS % 2 == 0 {
             if exposed.max_element() > 1.0 {
-                return TOO_BRIGHT;
+                return Some(TOO_BRIGHT);
             }
             if exposed.max_element() <= 0.0 {
-                return TOO_DARK;
+                return Some(TOO_DARK);
             }
         }
-        if self.false_colour {
-            return scale_colour(crate::math::luminance(exposed));
-        }
-        Vec3::new(self.curve.encode(exposed.x), self.curve.encode(exposed.y), self.curve.encode(exposed.z))
+        self.false_colour.then(|| scale_colour(crate::math::luminance(exposed)))
     }
 
     /// [`DisplaySettings::colour`] in bytes.
     pub fn bytes(&self, radiance: Vec3, screen_row: u32, screen_column: u32) -> [u8; 3] {
-        (self.colour(radiance, screen_row, screen_column) * 255.0 + 0.5).to_array().map(|value| value as u8)
+        bytes_of_colour(self.colour(radiance, screen_row, screen_column))
+    }
+
+    /// The same display, ready for millions of pixels.
+    pub fn prepared(&self) -> PreparedDisplay {
+        PreparedDisplay {
+            settings: *self,
+            gain: self.exposure_stops.exp2(),
+            table: ByteTable::of(self.curve),
+            linear: ByteTable::of(ToneCurve::Srgb),
+        }
+    }
+}
+
+/// The bytes nearest to an sRGB colour in [0, 1].
+#[inline]
+pub fn bytes_of_colour(colour: Vec3) -> [u8; 3] {
+    (colour * 255.0 + 0.5).to_array().map(|value| value as u8)
+}
+
+/// [`DisplaySettings`] with its curve as a table: the bytes of [`DisplaySettings::bytes`] without a power per channel.
+#[derive(Clone, Copy, Debug)]
+pub struct PreparedDisplay {
+    settings: DisplaySettings,
+    gain: f32,
+    table: &'static ByteTable,
+    linear: &'static ByteTable,
+}
+
+impl PreparedDisplay {
+    /// The bytes of a linear value at a pixel of the screen, as [`DisplaySettings::bytes`].
+    #[inline]
+    pub fn bytes(&self, radiance: Vec3, screen_row: u32, screen_column: u32) -> [u8; 3] {
+        if !radiance.is_finite() {
+            return bytes_of_colour(NOT_FINITE);
+        }
+        let exposed = radiance * self.gain;
+        match self.settings.marked(exposed, screen_row, screen_column) {
+            Some(colour) => bytes_of_colour(colour),
+            None => exposed.to_array().map(|value| self.table.byte(value)),
+        }
+    }
+
+    /// The bytes of a difference of luminances: green where it is positive, red where it is negative, black at 0,
+    /// brightness by exposure and the sRGB curve.
+    #[inline]
+    pub fn signed_bytes(&self, difference: f32) -> [u8; 3] {
+        if difference.is_nan() {
+            return bytes_of_colour(NOT_FINITE);
+        }
+        let strength = self.linear.byte(difference.abs() * self.gain);
+        match difference > 0.0 {
+            true => [strength / 8, strength, strength / 3],
+            false => [strength, strength / 5, strength / 8],
+        }
+    }
+}
+
+/// Lowest value in the table; every curve shows it as black.
+const TABLE_LOW: f32 = 1.0 / 8192.0;
+/// From here on every curve is white.
+const TABLE_HIGH: f32 = 8.0;
+/// Bits of a mantissa that are dropped: 256 buckets a stop, of which each holds the threshold of one byte at most.
+const BUCKET_SHIFT: u32 = 15;
+
+/// From linear values to bytes: the values at which the byte steps up, and where to look among them.
+#[derive(Debug)]
+struct ByteTable {
+    /// The smallest value of each byte; that of byte 0 is unused, the last is infinite.
+    threshold: [f32; 257],
+    /// The byte at the lower edge of each bucket.
+    first: Vec<u8>,
+}
+
+impl ByteTable {
+    fn of(curve: ToneCurve) -> &'static ByteTable {
+        static TABLES: std::sync::LazyLock<[ByteTable; 3]> =
+            std::sync::LazyLock::new(|| ToneCurve::NAMED.map(|(curve, _)| ByteTable::new(curve)));
+        &TABLES[match curve {
+            ToneCurve::Srgb => 0,
+            ToneCurve::Filmic => 1,
+            ToneCurve::Linear => 2,
+        }]
+    }
+
+    fn new(curve: ToneCurve) -> Self {
+        let exact = |value: f32| (curve.encode(value) * 255.0 + 0.5) as u8;
+        let mut threshold = [f32::INFINITY; 257];
+        for byte in 1..=255u8 {
+            // Positive floats are ordered as their bits are.
+            let (mut below, mut above) = (0, TABLE_HIGH.to_bits());
+            while above - below > 1 {
+                let middle = below + (above - below) / 2;
+                if exact(f32::from_bits(middle)) >= byte { above = middle } else { below = middle }
+            }
+            threshold[byte as usize] = f32::from_bits(above);
+        }
+        let buckets = (TABLE_HIGH.to_bits() - TABLE_LOW.to_bits()) >> BUCKET_SHIFT;
+        let edge = |bucket: u32| f32::from_bits(TABLE_LOW.to_bits() + (bucket << BUCKET_SHIFT));
+        ByteTable { threshold, first: (0..buckets).map(|bucket| exact(edge(bucket))).collect() }
+    }
+
+    #[inline]
+    fn byte(&self, value: f32) -> u8 {
+        // NaN is not above anything either.
+        if !(value >= TABLE_LOW) {
+            return 0;
+        }
+        if value >= TABLE_HIGH {
+            return 255;
+        }
+        let first = self.first[((value.to_bits() - TABLE_LOW.to_bits()) >> BUCKET_SHIFT) as usize];
+        first + u8::from(value >= self.threshold[first as usize + 1])
     }
 }
 
@@ -152,6 +271,45 @@ mod tests {
         assert_eq!(stripes.colour(Vec3::ZERO, 0, 0), TOO_DARK);
         assert_ne!(stripes.colour(Vec3::ZERO, 0, STRIPE_PIXELS), TOO_DARK);
         assert_eq!(stripes.colour(Vec3::NAN, 0, 0), NOT_FINITE);
+    }
+
+    #[test]
+    fn the_table_gives_the_bytes_of_the_exact_curve() {
+        for (curve, name) in ToneCurve::NAMED {
+            for exposure_stops in [0.0, -3.0, 2.5] {
+                let display = DisplaySettings { exposure_stops, curve, ..Default::default() };
+                let prepared = display.prepared();
+                for step in 0..60_000u32 {
+                    let value = 2f32.powf(step as f32 / 2500.0 - 16.0);
+                    let exact = display.colour(Vec3::splat(value), 0, 0).x * 255.0;
+                    let [byte, ..] = prepared.bytes(Vec3::splat(value), 0, 0);
+                    assert!((f32::from(byte) - exact).abs() <= 0.5 + 1e-3, "{name} {value}: {byte} {exact}");
+                }
+                for hard in [0.0, -1.0, 1.0, 8.0, f32::MIN_POSITIVE, f32::MAX, f32::NAN, f32::INFINITY] {
+                    let rgb = Vec3::new(hard, 0.3, 0.1);
+                    assert_eq!(prepared.bytes(rgb, 0, 0), display.bytes(rgb, 0, 0), "{name} {hard}");
+                }
+            }
+        }
+        let marked = DisplaySettings { stripes: true, false_colour: true, ..Default::default() };
+        for (step, rgb) in [Vec3::ZERO, Vec3::splat(0.4), Vec3::splat(3.0), Vec3::NAN].into_iter().enumerate() {
+            for column in 0..9 {
+                let place = (step as u32, column);
+                assert_eq!(marked.prepared().bytes(rgb, place.0, place.1), marked.bytes(rgb, place.0, place.1));
+            }
+        }
+    }
+
+    #[test]
+    fn what_overflows_is_white_and_differences_have_a_sign() {
+        let bright = DisplaySettings { exposure_stops: 20.0, ..Default::default() };
+        assert_eq!(bright.bytes(Vec3::splat(1e38), 0, 0), [255; 3]);
+        let display = DisplaySettings::default().prepared();
+        let [red, green, _] = display.signed_bytes(0.5);
+        assert!(green > 100 && green > 2 * red);
+        let [red, green, _] = display.signed_bytes(-0.5);
+        assert!(red > 100 && red > 2 * green);
+        assert_eq!(display.signed_bytes(0.0), [0; 3]);
     }
 
     #[test]

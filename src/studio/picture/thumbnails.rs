@@ -1,0 +1,66 @@
+//! Small pictures as textures, by name.
+
+use crate::image::RgbImage;
+use crate::image::display::DisplaySettings;
+use eframe::egui::{Color32, ColorImage, Context, TextureHandle, TextureOptions};
+use std::collections::HashMap;
+
+/// Thumbnails by name: linear, and as textures for the display they were last asked for.
+///
+/// Make them by [`crate::image::area::thumbnail`], away from the thread of the window when there are many.
+#[derive(Default)]
+pub struct ThumbnailCache {
+    entries: HashMap<String, Entry>,
+}
+
+struct Entry {
+    linear: RgbImage,
+    texture: Option<(DisplaySettings, TextureHandle)>,
+}
+
+impl ThumbnailCache {
+    /// Puts a linear thumbnail in place of what the name had.
+    pub fn insert(&mut self, name: impl Into<String>, thumbnail: RgbImage) {
+        self.entries.insert(name.into(), Entry { linear: thumbnail, texture: None });
+    }
+
+    /// Whether there is a thumbnail of this name.
+    pub fn contains(&self, name: &str) -> bool {
+        self.entries.contains_key(name)
+    }
+
+    /// Forgets all thumbnails.
+    pub fn clear(&mut self) {
+        self.entries.clear();
+    }
+
+    /// The texture of a thumbnail; `None` when there is none of this name, or it has no pixels. It is coloured anew
+    /// only when the display changed.
+    pub fn texture(&mut self, context: &Context, name: &str, display: &DisplaySettings) -> Option<&TextureHandle> {
+        let Entry { linear, texture } = self.entries.get_mut(name)?;
+        if linear.pixels().is_empty() {
+            return None;
+        }
+        if texture.as_ref().is_none_or(|(known, _)| known != display) {
+            let prepared = display.prepared();
+            let colour = |(index, &pixel): (usize, &glam::Vec3)| {
+                let (row, column) = (index / linear.width(), index % linear.width());
+                if pixel.is_nan() {
+                    return Color32::from_gray(90);
+                }
+                let [red, green, blue] = prepared.bytes(pixel, row as u32, column as u32);
+                Color32::from_rgb(red, green, blue)
+            };
+            let pixels = linear.pixels().iter().enumerate().map(colour).collect();
+            let image = ColorImage::new([linear.width(), linear.height()], pixels);
+            match &mut *texture {
+                Some((known, handle)) => {
+                    handle.set(image, TextureOptions::LINEAR);
+                    *known = *display;
+                }
+                none => *none = Some((*display, context.load_texture(name, image, TextureOptions::LINEAR))),
+            }
+        }
+        texture.as_ref().map(|(_, handle)| handle)
+    }
+}
