@@ -82,11 +82,16 @@ impl Caller {
 /// A window of 400 x 300 points, filled by one picture.
 fn window(caller: Caller, pixels_per_point: f32) -> Harness<'static, Caller> {
     let show = |ui: &mut egui::Ui, caller: &mut Caller| {
-        egui::CentralPanel::no_frame().show(ui, |ui| Caller::ui(ui, caller));
+        // To the very border of the window, so that positions in tests are round numbers.
+        let whole = ui.ctx().content_rect();
+        let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(whole));
+        ui.set_clip_rect(whole);
+        Caller::ui(&mut ui, caller);
     };
     let mut harness = Harness::builder()
         .with_size(vec2(400.0, 300.0))
         .with_pixels_per_point(pixels_per_point)
+        .with_max_steps(40)
         .wgpu()
         .build_ui_state(show, caller);
     harness.run();
@@ -288,6 +293,7 @@ fn a_wipe_shows_both_pictures_and_its_divider_can_be_moved() {
         assert_near(pixel(&mut harness, pos2(110.0, 60.0), pixels_per_point), second);
         // The picture itself was not moved.
         assert_eq!(harness.state().view.width_on_screen, None);
+        hover(&mut harness, pos2(110.0, 60.0));
         let answer = harness.state().answer();
         assert_eq!(answer.other_value, Some(Value::Colour(Vec3::new(0.1, 0.2, 0.8))));
         keep(&mut harness, &format!("wipe_{pixels_per_point}"));
@@ -301,13 +307,13 @@ fn flip_and_difference_show_what_they_say() {
     let names = ["Photo".to_owned(), "Fit".to_owned()];
     caller.comparison = Some(Comparison { other, mode: Compare::Flip(true), names });
     let mut harness = window(caller, 1.0);
-    assert_near(pixel(&mut harness, pos2(60.0, 250.0), 1.0), [encoded(0.3); 3]);
+    assert_near(pixel(&mut harness, pos2(85.0, 275.0), 1.0), [encoded(0.3); 3]);
     assert!(words(&harness).iter().any(|word| word == "Fit"));
     harness.state_mut().comparison.as_mut().unwrap().mode = Compare::Difference { signed: true, gain_stops: 1.0 };
     harness.run();
-    let [red, green, _] = pixel(&mut harness, pos2(55.0, 250.0), 1.0);
+    let [red, green, _] = pixel(&mut harness, pos2(85.0, 275.0), 1.0);
     assert!(green > 150 && red < 50);
-    let [red, green, _] = pixel(&mut harness, pos2(355.0, 250.0), 1.0);
+    let [red, green, _] = pixel(&mut harness, pos2(385.0, 275.0), 1.0);
     assert!(red > 150 && green < 50);
     keep(&mut harness, "difference");
 }

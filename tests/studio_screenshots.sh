@@ -7,7 +7,8 @@
 # xvfb xdotool imagemagick mesa-vulkan-drivers libxcursor1 libxi6 libxkbcommon-x11-0 libx11-xcb1.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-out=$(realpath -m "${1:?folder for the pictures}"); scene=${2:-}; fit_seconds=${3:-45}
+out=$(realpath -m "${1:?folder for the pictures}")
+scene=${2:-}; fit_seconds=${3:-45}
 program=${PATINA:-target/release/patina}
 mkdir -p "$out"
 work=$(mktemp -d)

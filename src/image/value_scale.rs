@@ -70,7 +70,7 @@ impl ValueScale {
     /// Round numbers within the range with their words, at most `most` of them, in rising order.
     pub fn ticks(&self, most: usize) -> Vec<(f32, String)> {
         let (low, high) = (f64::from(self.low.min(self.high)), f64::from(self.low.max(self.high)));
-        if most == 0 || !low.is_finite() || !high.is_finite() {
+        if most == 0 || !self.low.is_finite() || !self.high.is_finite() {
             return Vec::new();
         }
         if low == high {

@@ -6,10 +6,10 @@ use eframe::egui::{Color32, ColorImage};
 use glam::Vec2;
 
 /// Pixels that lines may take in one painting, in all; what is beyond is left out.
-const MOST_PIXELS: usize = 3_000_000;
+const MOST_PIXELS: usize = 1_500_000;
 
 /// Draws the lines over the visible part of a frame, with smooth edges, so many pixels wide.
-pub(super) fn draw(image: &mut ColorImage, lines: &[Lines], frame: &Frame, width: u32) {
+pub(super) fn draw(image: &mut ColorImage, lines: &[Lines], frame: &Frame, width: f32) {
     let visible = frame.visible();
     let corner = Vec2::new(visible.left as f32, visible.top as f32);
     let size = Vec2::new(frame.picture.0 as f32, frame.picture.1 as f32) * frame.zoom;
@@ -18,6 +18,8 @@ pub(super) fn draw(image: &mut ColorImage, lines: &[Lines], frame: &Frame, width
     let most = Vec2::new(visible.width as f32, visible.height as f32);
     let mut left = MOST_PIXELS;
     for line in lines {
+        // Channels not multiplied by opacity.
+        let colour = line.colour.to_srgba_unmultiplied();
         for &(start, end) in line.segments.iter() {
             let point = |point: Vec2| line.space.part(point, frame.picture) * size + shift;
             let Some((start, end)) = clipped(point(start), point(end), most) else { continue };
@@ -26,7 +28,7 @@ pub(super) fn draw(image: &mut ColorImage, lines: &[Lines], frame: &Frame, width
                 return;
             }
             left -= pixels;
-            segment(image, start, end, line.colour, width);
+            segment(image, start, end, colour, width);
         }
     }
 }
@@ -53,36 +55,40 @@ fn clipped(start: Vec2, end: Vec2, most: Vec2) -> Option<(Vec2, Vec2)> {
     (enters <= leaves).then(|| (start + along * enters, start + along * leaves))
 }
 
-/// One pixel a step along the longer axis, shared between the two pixels nearest across it.
-fn segment(image: &mut ColorImage, start: Vec2, end: Vec2, colour: Color32, width: u32) {
+/// One step a pixel along the longer axis; across it each pixel gets the part of it that the line covers.
+fn segment(image: &mut ColorImage, start: Vec2, end: Vec2, colour: [u8; 4], width: f32) {
     let along = end - start;
     let steep = along.y.abs() > along.x.abs();
-    let steps = along.abs().max_element().ceil().max(1.0);
+    let longer = along.abs().max_element();
+    let steps = longer.ceil().max(1.0);
+    // A slanting line is cut slantwise.
+    let half = 0.5 * width * if longer > 0.0 { along.length() / longer } else { 1.0 };
     for step in 0..=steps as usize {
         let point = start + along * (step as f32 / steps);
         let (main, across) = if steep { (point.y, point.x) } else { (point.x, point.y) };
-        let across = across - (width as f32 - 1.0) / 2.0;
-        let base = across.floor();
-        let fraction = across - base;
-        for offset in 0..=width {
-            let share = match offset {
-                0 => 1.0 - fraction,
-                _ if offset == width => fraction,
-                _ => 1.0,
-            };
-            let (main, across) = (main.round() as i64, base as i64 + i64::from(offset));
-            let (x, y) = if steep { (across, main) } else { (main, across) };
+        let (low, high) = (across - half, across + half);
+        let main = nearest(main);
+        for pixel in nearest(low)..=nearest(high) {
+            let share = high.min(pixel as f32 + 0.5) - low.max(pixel as f32 - 0.5);
+            let (x, y) = if steep { (pixel, main) } else { (main, pixel) };
             blend(image, x, y, colour, share);
         }
     }
 }
 
-fn blend(image: &mut ColorImage, x: i64, y: i64, colour: Color32, share: f32) {
+/// The nearest whole number of one above -1000, without the call that rounding is on older processors.
+fn nearest(place: f32) -> i64 {
+    (place + 1000.5) as i64 - 1000
+}
+
+fn blend(image: &mut ColorImage, x: i64, y: i64, colour: [u8; 4], share: f32) {
     let [width, height] = image.size;
     if x >= 0 && y >= 0 && (x as usize) < width && (y as usize) < height && share > 0.0 {
         let pixel = &mut image.pixels[y as usize * width + x as usize];
-        let opacity = share * f32::from(colour.a()) / 255.0;
-        *pixel = pixel.lerp_to_gamma(colour.to_opaque(), opacity);
+        let part = (share.min(1.0) * f32::from(colour[3]) * (256.0 / 255.0)) as u32;
+        let mixed = |under: u8, over: u8| ((u32::from(under) * (256 - part) + u32::from(over) * part) >> 8) as u8;
+        *pixel =
+            Color32::from_rgb(mixed(pixel.r(), colour[0]), mixed(pixel.g(), colour[1]), mixed(pixel.b(), colour[2]));
     }
 }
 
@@ -96,7 +102,7 @@ mod tests {
     fn drawn(segments: Vec<(Vec2, Vec2)>, space: LineSpace) -> ColorImage {
         let frame = PictureView::default().frame((10, 10), (100, 100));
         let mut image = ColorImage::filled([100, 100], Color32::BLACK);
-        draw(&mut image, &[Lines { segments: Arc::new(segments), space, colour: Color32::WHITE }], &frame, 1);
+        draw(&mut image, &[Lines { segments: Arc::new(segments), space, colour: Color32::WHITE }], &frame, 1.5);
         image
     }
 

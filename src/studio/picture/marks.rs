@@ -10,7 +10,7 @@ use glam::Vec2;
 /// Points a texel must take for numbers on it.
 pub const POINTS_FOR_NUMBERS: f32 = 48.0;
 /// Points a texel must take for a grid.
-const POINTS_FOR_GRID: f32 = 10.0;
+const POINTS_FOR_GRID: f32 = 16.0;
 
 /// Where a frame lies on the screen.
 #[derive(Clone, Copy, Debug)]
@@ -154,7 +154,7 @@ pub(super) fn mark(painter: &Painter, on_screen: &OnScreen, mark: &Mark) {
     if !centre.x.is_finite() || !centre.y.is_finite() {
         return;
     }
-    for (width, colour) in [(3.5, Color32::from_black_alpha(170)), (1.5, mark.colour)] {
+    for (width, colour) in [(4.0, Color32::from_black_alpha(200)), (2.0, mark.colour)] {
         for direction in [vec2(1.0, 0.0), vec2(-1.0, 0.0), vec2(0.0, 1.0), vec2(0.0, -1.0)] {
             painter.line_segment([centre + 4.0 * direction, centre + 11.0 * direction], Stroke::new(width, colour));
         }

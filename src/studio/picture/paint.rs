@@ -27,7 +27,7 @@ pub struct Inks {
     pub mask: Color32,
     /// Distance of hatch lines in screen pixels, at least 4.
     pub period: u32,
-    /// Width of lines in screen pixels, at least 1.
+    /// Width of hatch lines in screen pixels, at least 1; lines over the picture are half as wide again.
     pub line: u32,
 }
 
@@ -94,20 +94,23 @@ impl Painting<'_> {
         let shade = Shade { display: display.prepared(), inks: self.inks, visible };
         let mask = self.mask.filter(|mask| !mask.pixels().is_empty()).map(|mask| Mask::new(mask, &self.frame));
         image.pixels.par_chunks_mut(visible.width).enumerate().for_each(|(y, pixels)| {
+            let first = first.row(y);
+            let second = second.as_ref().map(|second| second.row(y));
             for (x, pixel) in pixels.iter_mut().enumerate() {
-                let colour = match (&mode, &second) {
+                *pixel = match (&mode, &second) {
                     (Mode::Second, Some(second)) => shade.value(second, y, x),
                     (Mode::Wipe, Some(second)) if x >= split => shade.value(second, y, x),
                     (Mode::Difference { signed }, Some(second)) => shade.difference(&first, second, *signed, y, x),
                     _ => shade.value(&first, y, x),
                 };
-                *pixel = match &mask {
-                    Some(mask) if mask.at(y, x) => shade.masked(colour, y, x),
-                    _ => colour,
-                };
+            }
+            if let Some(mask) = &mask {
+                for (x, pixel) in pixels.iter_mut().enumerate().filter(|(x, _)| mask.at(y, *x)) {
+                    *pixel = shade.masked(*pixel, y, x);
+                }
             }
         });
-        lines::draw(&mut image, self.lines, &self.frame, self.inks.line);
+        lines::draw(&mut image, self.lines, &self.frame, 1.5 * self.inks.line as f32);
         image
     }
 }
@@ -166,12 +169,19 @@ impl<'a, T: Texel> Reading<'a, T> {
         }
     }
 
-    #[inline]
-    fn at(&self, y: usize, x: usize) -> T {
-        match (self.rows.get(y), self.columns.get(x)) {
-            (Some(row), Some(column)) => mean_under(row, column, |row, column| self.level[(row, column)]),
-            _ => T::UNSEEN,
+    /// The values under one row of screen pixels.
+    fn row(&self, y: usize) -> Vec<T> {
+        let Some(row) = self.rows.get(y) else { return Vec::new() };
+        if let [_] = row.weights[..] {
+            let width = self.level.width();
+            let texels = &self.level.pixels()[row.first * width..][..width];
+            let one_row = |column: &Footprint| match column.weights[..] {
+                [_] => texels[column.first],
+                _ => mean_under(row, column, |_, column| texels[column]),
+            };
+            return self.columns.iter().map(one_row).collect();
         }
+        self.columns.iter().map(|column| mean_under(row, column, |row, column| self.level[(row, column)])).collect()
     }
 }
 
@@ -195,12 +205,29 @@ impl<'a> Layer<'a> {
         }
     }
 
-    #[inline]
-    fn at(&self, y: usize, x: usize) -> Value {
+    fn row(&self, y: usize) -> Row<'a> {
         match self {
-            Layer::Colour(reading) => Value::Colour(reading.at(y, x)),
-            Layer::Numbers(reading, _) => Value::Number(reading.at(y, x)),
-            Layer::Empty => Value::Number(f32::NAN),
+            Layer::Colour(reading) => Row::Colour(reading.row(y)),
+            Layer::Numbers(reading, source) => Row::Numbers(reading.row(y), source),
+            Layer::Empty => Row::Empty,
+        }
+    }
+}
+
+/// The values under one row of screen pixels.
+enum Row<'a> {
+    Colour(Vec<Vec3>),
+    Numbers(Vec<f32>, &'a Source),
+    Empty,
+}
+
+impl Row<'_> {
+    #[inline]
+    fn at(&self, x: usize) -> Value {
+        match self {
+            Row::Colour(values) => Value::Colour(values.get(x).copied().unwrap_or(Vec3::NAN)),
+            Row::Numbers(values, _) => Value::Number(values.get(x).copied().unwrap_or(f32::NAN)),
+            Row::Empty => Value::Number(f32::NAN),
         }
     }
 }
@@ -218,12 +245,12 @@ impl Shade {
     }
 
     #[inline]
-    fn value(&self, layer: &Layer, y: usize, x: usize) -> Color32 {
-        let value = layer.at(y, x);
+    fn value(&self, values: &Row, y: usize, x: usize) -> Color32 {
+        let value = values.at(x);
         let (row, column) = self.on_panel(y, x);
-        let [red, green, blue] = match (value, layer) {
+        let [red, green, blue] = match (value, values) {
             (value, _) if value.is_unseen() => return self.unseen(row, column),
-            (Value::Number(number), Layer::Numbers(_, Source::Numbers { scale, palette, .. })) => {
+            (Value::Number(number), Row::Numbers(_, Source::Numbers { scale, palette, .. })) => {
                 bytes_of_colour(palette.colour(scale.place(number)))
             }
             (value, _) => self.display.bytes(value.rgb(), row, column),
@@ -232,8 +259,8 @@ impl Shade {
     }
 
     #[inline]
-    fn difference(&self, first: &Layer, second: &Layer, signed: bool, y: usize, x: usize) -> Color32 {
-        let difference = first.at(y, x).rgb() - second.at(y, x).rgb();
+    fn difference(&self, first: &Row, second: &Row, signed: bool, y: usize, x: usize) -> Color32 {
+        let difference = first.at(x).rgb() - second.at(x).rgb();
         let (row, column) = self.on_panel(y, x);
         if difference.is_nan() {
             return self.unseen(row, column);

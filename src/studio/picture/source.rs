@@ -115,7 +115,7 @@ pub fn describe(place: Place, value: Option<Value>, more: &[(&str, f32)]) -> Str
     // Writing to a string cannot fail.
     let _ = match value {
         None => Ok(()),
-        Some(value) if value.is_unseen() => write!(line, "  {:<48}", "no value"),
+        Some(value) if value.is_unseen() => write!(line, "  {:<50}", "no value"),
         Some(Value::Colour(rgb)) => {
             let [red, green, blue] = rgb.to_array().map(three_digits);
             let luminance = three_digits(luminance(rgb));
