@@ -45,6 +45,13 @@ wait_for_title() { # pattern, seconds
   echo "the title never held '$1': $(title)"; exit 1
 }
 
+# Without a window manager nobody gives the window the keys.
+for _ in $(seq 120); do
+  alive
+  window=$(xdotool search --onlyvisible --class patina | head -1) && [ -n "$window" ] && break
+  sleep 0.5
+done
+xdotool windowfocus "$window"
 picture 01_welcome 2
 wait_for_title ' - Patina' 600
 picture 02_scene_is_read 3

@@ -121,8 +121,12 @@ fn perform_on_view(act: Act, model: &mut Model) {
         Act::LayerRoughness => edits.layer = Layer::Roughness,
         Act::LayerNormal => edits.layer = Layer::Normal,
         Act::LayerTimesSeen => edits.layer = Layer::TimesSeen,
-        Act::LayerPhotoError | Act::LayerDisagreement => {
-            edits.layer = if act == Act::LayerPhotoError { Layer::PhotoError } else { Layer::Disagreement };
+        Act::LayerPhotoError | Act::LayerCoverage | Act::LayerDisagreement => {
+            edits.layer = match act {
+                Act::LayerPhotoError => Layer::PhotoError,
+                Act::LayerCoverage => Layer::Coverage,
+                _ => Layer::Disagreement,
+            };
             if model.project.as_ref().is_some_and(|project| project.photo_error.is_none()) {
                 model.measure_layers();
             }
@@ -160,6 +164,10 @@ fn perform_on_view(act: Act, model: &mut Model) {
         Act::TurnLightLeft | Act::TurnLightRight => {
             let turn = if act == Act::TurnLightLeft { TURN_DEGREES } else { -TURN_DEGREES };
             edits.relight.turn_degrees = (edits.relight.turn_degrees + turn).rem_euclid(360.0);
+        }
+        Act::LightStrip => {
+            model.show_strip();
+            model.activate = Some(Panel::Relight);
         }
         Act::LightBackground => edits.relight.as_background = !edits.relight.as_background,
         _ => debug_assert!(LIST.iter().any(|info| info.act == act), "{act:?} is not in the list"),

@@ -46,7 +46,7 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
             let there = model.fit.folder.as_ref().is_some_and(|folder| folder.report_html_path().is_file());
             need(there, "the report is written when a fit is done")
         }
-        Act::SavePicture | Act::SaveTurntable | Act::SaveLightStrip => need(
+        Act::SavePicture | Act::SaveTurntable | Act::SaveLightStrip | Act::LightStrip => need(
             has_maps && project.is_some_and(|project| project.surface.is_some()),
             "there are no maps yet: start a fit",
         ),
@@ -59,7 +59,7 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
         | Act::Frustums
         | Act::Thumbnails
         | Act::LeaveOut => need(has_views, "there are no photos"),
-        Act::ErrorOverlay | Act::LayerPhotoError | Act::LayerDisagreement | Act::SurfaceLayers => {
+        Act::ErrorOverlay | Act::LayerPhotoError | Act::LayerCoverage | Act::LayerDisagreement | Act::SurfaceLayers => {
             need(has_views, "there are no photos")?;
             need(has_maps, "there are no maps yet: start a fit")
         }

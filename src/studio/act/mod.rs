@@ -47,6 +47,7 @@ pub enum Act {
     LayerNormal,
     LayerPhotoError,
     LayerTimesSeen,
+    LayerCoverage,
     LayerDisagreement,
     ExposureUp,
     ExposureDown,
@@ -63,6 +64,7 @@ pub enum Act {
     FittedLight,
     AddLight,
     LightBackground,
+    LightStrip,
     SurfaceLayers,
     Palette,
     Help,
@@ -194,6 +196,7 @@ pub const LIST: &[ActInfo] = &[
     info(Act::LayerNormal, Group::View, "Normal", "Shows the direction of the surface.", key(Key::Num5)),
     info(Act::LayerPhotoError, Group::View, "Photo error", "Shows the root mean square error over the photos that see each texel.", key(Key::Num6)),
     info(Act::LayerTimesSeen, Group::View, "Times seen", "Shows how many photos see each texel.", key(Key::Num7)),
+    info(Act::LayerCoverage, Group::View, "Coverage", "Shows the share of the photos that see each texel.", key(Key::Num9)),
     info(Act::LayerDisagreement, Group::View, "Disagreement of the photos", "Shows where the gradients of different photos pull apart.", key(Key::Num8)),
     info(Act::SurfaceLayers, Group::View, "Measure photo error", "Renders every photo again and spreads its error over the surface.", None),
 
@@ -212,6 +215,7 @@ pub const LIST: &[ActInfo] = &[
     info(Act::TurnLightLeft, Group::Light, "Turn light left", "Turns the light by 15 degrees. Shift and drag on the stage turns it freely.", with(SHIFT, Key::ArrowLeft)),
     info(Act::TurnLightRight, Group::Light, "Turn light right", "Turns the light by 15 degrees the other way.", with(SHIFT, Key::ArrowRight)),
     info(Act::AddLight, Group::Light, "Add light…", "Puts an HDR map on the shelf.", with(CTRL, Key::L)),
+    info(Act::LightStrip, Group::Light, "Strip of lights", "Shows the stage's view, path traced, under every light of the shelf.", key(Key::Y)),
     info(Act::LightBackground, Group::Light, "Light as background", "Shows the light behind the surface.", key(Key::H)),
 
     info(Act::Palette, Group::Window, "All acts…", "Finds an act by its name.", with(CTRL, Key::K)),

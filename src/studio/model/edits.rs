@@ -12,6 +12,8 @@ pub enum PhotoLook {
     /// Not at all.
     #[default]
     Off,
+    /// Behind the surface, in place of the background.
+    Under,
     /// Over the stage with this opacity.
     Over(f32),
     /// Left of a line at this share of the width.

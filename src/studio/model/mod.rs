@@ -52,6 +52,8 @@ pub enum Done {
     Saved(Vec<PathBuf>),
     /// The error of the photos was spread over the surface.
     Layers(Box<crate::insight::surface_layers::SurfaceLayers>),
+    /// The stage's view under every light of the shelf.
+    Strip(Vec<(LightName, Arc<crate::image::RgbImage>)>),
     /// Pictures under other lights were compared with the truth.
     Entangled(Box<crate::job::entanglement::Entanglement>),
 }
@@ -304,6 +306,11 @@ impl Model {
                 });
             }
             Done::Layers(layers) => self.layers_were_measured(*layers),
+            Done::Strip(pictures) => {
+                if let Some(project) = &mut self.project {
+                    project.strip = pictures;
+                }
+            }
             Done::Entangled(table) => {
                 if let Some(project) = &mut self.project {
                     project.entanglement = Some(Arc::from(table));

@@ -13,7 +13,7 @@ use crate::job::demo;
 use crate::job::open::{self, OpenStage, OpenedRun, OpenedScene, PathKind};
 use crate::job::prepare::{Prepared, RunSettings, prepare_with};
 use crate::scene::demo::DemoSettings;
-use crate::scene::{Mesh, Scene};
+use crate::scene::{Mesh, ReadSettings, Scene};
 use crate::studio::stage::eye::OrbitEye;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -53,10 +53,15 @@ pub struct RunRead {
 impl Model {
     /// Opens a scene or run folder.
     pub fn open(&mut self, path: PathBuf) {
+        self.open_with(path, ReadSettings::default());
+    }
+
+    /// Opens a scene that is to be read in a certain way, or a run folder.
+    pub fn open_with(&mut self, path: PathBuf, read: ReadSettings) {
         self.close();
         self.log.dismiss();
         let path = std::path::absolute(&path).unwrap_or(path);
-        let settings = RunSettings { scene: path.clone(), ..RunSettings::default() };
+        let settings = RunSettings { scene: path.clone(), read, ..RunSettings::default() };
         self.tasks.spawn(TITLE, move |context| {
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
             context.tell("looking at the folder", 0.0);

@@ -1,5 +1,6 @@
 //! What is open: a scene, and the maps and light that belong to it.
 
+use super::lights::LightName;
 use crate::atlas::{AtlasQuality, chart_borders};
 use crate::error::Finding;
 use crate::image::{GreyImage, RgbImage};
@@ -67,12 +68,16 @@ pub struct Project {
     pub times_seen: Option<Arc<GreyImage>>,
     /// Root mean square error over the photos that see each texel.
     pub photo_error: Option<Arc<GreyImage>>,
+    /// Share of the photos that see each texel.
+    pub coverage: Option<Arc<GreyImage>>,
     /// Disagreement of the photos in [0, 1].
     pub disagreement: Option<Arc<GreyImage>>,
     /// Errors at the two ends of the colour scale.
     pub photo_error_range: [f32; 2],
     /// Disagreements at the two ends of the colour scale.
     pub disagreement_range: [f32; 2],
+    /// The stage's view under every light of the shelf, as last drawn.
+    pub strip: Vec<(LightName, Arc<RgbImage>)>,
     /// Errors under lights the fit never saw, once they are measured.
     pub entanglement: Option<Arc<Entanglement>>,
     /// Root mean square error of each view, where it is known.

@@ -16,6 +16,10 @@ use crate::studio::stage::eye::{Eye, OrbitEye};
 use std::path::PathBuf;
 use std::sync::Arc;
 
+/// Width and height of a picture of the strip of lights in pixels.
+const STRIP_SIZE: (usize, usize) = (240, 160);
+/// Paths a pixel of the strip.
+const STRIP_SAMPLES: usize = 24;
 /// Title of the task that compares pictures under other lights.
 pub const ENTANGLEMENT_TITLE: &str = "Comparing under other lights";
 /// Title of the task that measures the error of the photos.
@@ -182,6 +186,7 @@ impl Model {
         project.photo_error = Some(Arc::new(layers.photo_error));
         project.disagreement = Some(Arc::new(layers.disagreement));
         project.times_seen = Some(Arc::new(layers.times_seen));
+        project.coverage = Some(Arc::new(layers.coverage));
         for (own, measured) in project.view_errors.iter_mut().zip(&layers.views) {
             *own = Some(measured.rmse as f32).filter(|rmse| rmse.is_finite());
         }
@@ -263,6 +268,26 @@ impl Model {
                 }
             };
             Ok(Done::Saved(saved))
+        });
+    }
+
+    /// Path-traces the stage's view, small, under every light of the shelf.
+    pub fn show_strip(&mut self) {
+        let Some(project) = &self.project else { return };
+        let Some(surface) = project.surface.clone() else { return };
+        let Some(own) = self.traced_parameters(&LightName::Fitted) else { return };
+        let camera = self.eye_in_force().as_camera(STRIP_SIZE.0, STRIP_SIZE.1);
+        let settings = self.picture_settings(STRIP_SAMPLES);
+        let names: Vec<LightName> = self.shelf.lights().iter().map(|light| light.name.clone()).collect();
+        let lights: Vec<NamedLight> = names
+            .iter()
+            .filter_map(|name| Some(NamedLight { name: name.label(), environment: self.traced_light(name)? }))
+            .collect();
+        self.tasks.spawn("Drawing the strip", move |context| {
+            let tell = |share: f32| context.tell("rendering", share);
+            let pictures = gallery::relight_strip(&surface, &own, &camera, &lights, &settings, &context.stop, &tell)?;
+            let pictures = pictures.into_iter().map(|picture| Arc::new(picture.radiance));
+            Ok(Done::Strip(names.into_iter().zip(pictures).collect()))
         });
     }
 

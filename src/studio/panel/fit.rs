@@ -1,6 +1,6 @@
 //! The fit: what is open, presets, settings, where the run goes.
 
-use super::{act_button, act_button_named, form, heading};
+use super::{act_button, act_button_named, form, heading, reading};
 use crate::fit::{FitSettings, Preset};
 use crate::insight::report::number;
 use crate::studio::act::Act;
@@ -16,7 +16,7 @@ pub fn can_go_on(model: &Model) -> bool {
 }
 
 /// Draws the panel.
-pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut form::FormMemory) {
+pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut form::FormMemory, reading: &mut reading::ReadingMemory) {
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         facts(ui, model);
         controls(ui, model);
@@ -28,6 +28,8 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut form::FormMemory) {
             ui.label(RichText::new(error.to_string()).color(theme::palette(ui.visuals()).error));
         }
         run_folder(ui, model);
+        ui.add_space(6.0);
+        reading::show(ui, model, reading);
     });
 }
 

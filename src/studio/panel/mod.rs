@@ -13,6 +13,7 @@ pub mod maps;
 pub mod menu;
 pub mod messages;
 pub mod photo;
+pub mod reading;
 pub mod record;
 pub mod relight;
 pub mod scores;
@@ -46,6 +47,8 @@ pub struct Memory {
     pub stage: stage::StageMemory,
     /// The table of photos.
     pub views: views::ViewsMemory,
+    /// How the scene is read.
+    pub reading: reading::ReadingMemory,
     /// The texel's record.
     pub record: record::RecordMemory,
     /// The shelf.
@@ -62,7 +65,7 @@ pub fn show(panel: Panel, ui: &mut Ui, model: &mut Model, memory: &mut Memory) {
     egui::Frame::new().fill(ui.visuals().panel_fill).inner_margin(Margin::same(PANEL_MARGIN)).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         match panel {
-            Panel::Fit => fit::show(ui, model, &mut memory.form),
+            Panel::Fit => fit::show(ui, model, &mut memory.form, &mut memory.reading),
             Panel::Views => views::show(ui, model, &mut memory.views),
             Panel::Stage => {}
             Panel::Photo => photo::show(ui, model, &mut memory.photo),

@@ -19,6 +19,7 @@ use std::sync::Arc;
 #[derive(Default)]
 pub struct RelightMemory {
     textures: HashMap<LightName, (Arc<RgbImage>, TextureHandle)>,
+    strip: Vec<(Arc<RgbImage>, DisplaySettings, TextureHandle)>,
 }
 
 /// Draws the panel.
@@ -29,10 +30,12 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut RelightMemory) {
         shelf(ui, model, memory);
         ui.horizontal_wrapped(|ui| {
             act_button(ui, model, Act::AddLight);
+            act_button(ui, model, Act::LightStrip);
             act_button(ui, model, Act::SavePicture);
             act_button(ui, model, Act::SaveLightStrip);
             act_button(ui, model, Act::SaveTurntable);
         });
+        strip(ui, model, memory);
         ui.label(
             RichText::new("Right and left arrow go along the shelf; Shift and drag on the stage turns the light")
                 .weak(),
@@ -133,6 +136,45 @@ fn shelf(ui: &mut Ui, model: &mut Model, memory: &mut RelightMemory) {
         }
         model.shelf.remove(&name);
     }
+}
+
+/// The stage's view under every light; a click lights the stage so.
+fn strip(ui: &mut Ui, model: &mut Model, memory: &mut RelightMemory) {
+    let pictures = model.project.as_ref().map_or(Vec::new(), |project| project.strip.clone());
+    if pictures.is_empty() {
+        memory.strip.clear();
+        return;
+    }
+    heading(ui, "The same view under every light");
+    let display = model.edits.display;
+    let known = memory.strip.len() == pictures.len()
+        && memory
+            .strip
+            .iter()
+            .zip(&pictures)
+            .all(|((own, shown, _), (_, other))| Arc::ptr_eq(own, other) && *shown == display);
+    if !known {
+        let texture = |picture: &Arc<RgbImage>, name: &LightName| {
+            let image = colour_image(picture, &display);
+            ui.ctx().load_texture(format!("strip {}", name.label()), image, egui::TextureOptions::LINEAR)
+        };
+        memory.strip =
+            pictures.iter().map(|(name, picture)| (Arc::clone(picture), display, texture(picture, name))).collect();
+    }
+    ui.horizontal_wrapped(|ui| {
+        for ((name, _), (.., texture)) in pictures.iter().zip(&memory.strip) {
+            let size = vec2(150.0, 100.0);
+            let (rect, response) = ui.allocate_exact_size(size, Sense::click());
+            let label = format!("view under {}", name.label());
+            response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &label));
+            let whole = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
+            ui.painter().image(texture.id(), rect, whole, egui::Color32::WHITE);
+            if response.on_hover_text(name.label()).clicked() {
+                model.edits.relight.first = name.clone();
+                model.edits.layer = Layer::Lit;
+            }
+        }
+    });
 }
 
 fn about(name: &LightName, light: &crate::light::Environment) -> String {

@@ -3,6 +3,7 @@
 use super::{act_button_named, act_switch};
 use crate::image::display::ToneCurve;
 use crate::studio::act::Act;
+use crate::studio::model::edits::PhotoLook;
 use crate::studio::model::{FitStatus, Model};
 use crate::studio::stage::Layer;
 use crate::studio::theme;
@@ -20,6 +21,9 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
             act_switch(ui, model, Act::Traced, "Traced", model.switches.traced);
             act_switch(ui, model, Act::Frustums, "Cameras", model.switches.frustums);
             act_switch(ui, model, Act::LookThrough, "Look through", model.switches.looking_through);
+            if model.switches.looking_through {
+                photo(ui, model);
+            }
             ui.separator();
             display(ui, model);
         });
@@ -82,6 +86,7 @@ fn layers(ui: &mut Ui, model: &mut Model) {
     let further = [
         (Act::LayerPhotoError, Layer::PhotoError),
         (Act::LayerTimesSeen, Layer::TimesSeen),
+        (Act::LayerCoverage, Layer::Coverage),
         (Act::LayerDisagreement, Layer::Disagreement),
     ];
     let chosen = further.iter().find(|(_, layer)| *layer == model.edits.layer);
@@ -95,6 +100,33 @@ fn layers(ui: &mut Ui, model: &mut Model) {
             act_switch(ui, model, act, act.name(), model.edits.layer == layer);
         }
     });
+}
+
+/// How the photo lies against the stage while one looks through its camera.
+fn photo(ui: &mut Ui, model: &mut Model) {
+    let look = &mut model.edits.photo;
+    let name = match look {
+        PhotoLook::Off => "No photo",
+        PhotoLook::Under => "Photo behind",
+        PhotoLook::Over(_) => "Photo over",
+        PhotoLook::Wipe(_) => "Photo wiped",
+    };
+    ComboBox::from_id_salt("photo look").selected_text(name).width(96.0).show_ui(ui, |ui| {
+        ui.selectable_value(look, PhotoLook::Off, "No photo");
+        ui.selectable_value(look, PhotoLook::Under, "Photo behind").on_hover_text("In place of the background");
+        let over = matches!(look, PhotoLook::Over(_));
+        if ui.selectable_label(over, "Photo over").clicked() && !over {
+            *look = PhotoLook::Over(0.5);
+        }
+        let wiped = matches!(look, PhotoLook::Wipe(_));
+        if ui.selectable_label(wiped, "Photo wiped").clicked() && !wiped {
+            *look = PhotoLook::Wipe(0.5);
+        }
+    });
+    if let PhotoLook::Over(opacity) = look {
+        ui.add(DragValue::new(opacity).speed(0.01).range(0.0..=1.0).max_decimals(2))
+            .on_hover_text("Opacity of the photo");
+    }
 }
 
 fn display(ui: &mut Ui, model: &mut Model) {

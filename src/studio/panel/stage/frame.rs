@@ -55,6 +55,7 @@ impl FrameCache {
             _ if !through => PhotoMode::Off,
             _ if shift => PhotoMode::Over(1.0),
             PhotoLook::Off => PhotoMode::Off,
+            PhotoLook::Under => PhotoMode::Under,
             PhotoLook::Over(opacity) => PhotoMode::Over(opacity),
             PhotoLook::Wipe(share) => PhotoMode::Wipe(share),
         };
@@ -173,6 +174,7 @@ fn quantity(project: &Project, layer: Layer) -> Option<StageQuantity> {
         |texels: &Option<Arc<GreyImage>>, range: [f32; 2]| texels.clone().map(|texels| StageQuantity { texels, range });
     match layer {
         Layer::PhotoError => of(&project.photo_error, project.photo_error_range),
+        Layer::Coverage => of(&project.coverage, [0.0, 1.0]),
         Layer::TimesSeen => of(&project.times_seen, [0.0, project.view_count().max(1) as f32]),
         Layer::Disagreement => of(&project.disagreement, project.disagreement_range),
         _ => None,

@@ -1,0 +1,72 @@
+//! How the scene was read, and reading it again in another way.
+
+use crate::scene::settings::{BackgroundChoice, MaskUse, ReadSettings, Up};
+use crate::studio::model::Model;
+use egui::{CollapsingHeader, ComboBox, DragValue, Grid, RichText, Ui};
+use std::path::PathBuf;
+
+/// What the section keeps: choices that are not yet in force.
+#[derive(Default)]
+pub struct ReadingMemory {
+    chosen: Option<(PathBuf, ReadSettings)>,
+}
+
+/// Draws the section; nothing for a run or a scene made in code.
+pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ReadingMemory) {
+    let Some(project) = &model.project else { return };
+    let Some(path) = project.path.clone().filter(|_| !project.is_run) else { return };
+    let in_force = project.settings.read.clone();
+    if memory.chosen.as_ref().is_none_or(|(own, _)| *own != path) {
+        memory.chosen = Some((path.clone(), in_force.clone()));
+    }
+    let Some((_, chosen)) = &mut memory.chosen else { return };
+    CollapsingHeader::new("How the scene is read").show(ui, |ui| {
+        Grid::new("reading").num_columns(2).spacing([10.0, 4.0]).show(ui, |ui| {
+            let label = ui.label("Up axis").on_hover_text("The direction of the data set that points to the sky");
+            let ups = std::iter::once(Up::Auto).chain(Up::NAMED);
+            let response = ComboBox::from_id_salt("up").selected_text(chosen.up.to_string()).show_ui(ui, |ui| {
+                for up in ups {
+                    ui.selectable_value(&mut chosen.up, up, up.to_string());
+                }
+            });
+            response.response.labelled_by(label.id);
+            ui.end_row();
+            let label = ui
+                .label("Hold out every")
+                .on_hover_text("Every so many photos one is kept out of the fit, to judge it; 0 keeps none");
+            ui.add(DragValue::new(&mut chosen.hold_out_every).range(0..=100)).labelled_by(label.id);
+            ui.end_row();
+            let label =
+                ui.label("Shrink photos by").on_hover_text("Photos are averaged over squares of so many pixels");
+            ui.add(DragValue::new(&mut chosen.shrink).range(1..=16)).labelled_by(label.id);
+            ui.end_row();
+            let label = ui.label("Masks").on_hover_text("Whether masks beside the photos are used");
+            let mut used = chosen.masks == MaskUse::Use;
+            ui.checkbox(&mut used, "").labelled_by(label.id);
+            chosen.masks = if used { MaskUse::Use } else { MaskUse::Ignore };
+            ui.end_row();
+            let label = ui.label("Background").on_hover_text("What pixels show where no surface is");
+            let names = [
+                (BackgroundChoice::Auto, "Found out"),
+                (BackgroundChoice::Environment, "The light itself"),
+                (BackgroundChoice::Black, "Black"),
+            ];
+            let name = names.iter().find(|(own, _)| *own == chosen.background).map_or("", |(_, name)| name);
+            let response = ComboBox::from_id_salt("background of photos").selected_text(name).show_ui(ui, |ui| {
+                for (own, name) in names {
+                    ui.selectable_value(&mut chosen.background, own, name);
+                }
+            });
+            response.response.labelled_by(label.id);
+            ui.end_row();
+        });
+        let differs = *chosen != in_force;
+        let again = ui.add_enabled(differs, egui::Button::new("Read the scene again"));
+        if again.on_hover_text("A fit in progress is stopped; its checkpoint keeps what was done").clicked() {
+            let chosen = chosen.clone();
+            model.open_with(path, chosen);
+        } else if differs {
+            ui.label(RichText::new("Not in force yet").weak());
+        }
+    });
+}
