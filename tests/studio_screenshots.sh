@@ -34,7 +34,7 @@ alive() { kill -0 "$studio" 2>/dev/null || { echo 'the window is gone:'; cat "$w
 picture() { alive; sleep "${2:-0.6}"; import -window root "$out/$1.png"; echo "$out/$1.png"; }
 keys() { alive; xdotool key --delay 60 "$@"; sleep 0.4; }
 # An act by its name, through the palette.
-act() { keys ctrl+k; xdotool type --delay 12 "$1"; sleep 0.3; keys Return; sleep 0.3; }
+act() { keys ctrl+k; sleep 0.8; xdotool type --delay 30 "$1"; sleep 1.2; keys Return; sleep 0.6; }
 title() { xdotool getwindowname "$(xdotool search --onlyvisible --class patina | head -1)" 2>/dev/null || true; }
 wait_for_title() { # pattern, seconds
   for _ in $(seq "$(( $2 * 2 ))"); do

@@ -38,6 +38,11 @@ pub fn run(options: StudioOptions) -> Result<()> {
 }
 
 fn no_window(why: &str) -> Error {
+    // Some libraries put the file of their source before the reason.
+    let why = match why.rfind(".rs:") {
+        Some(place) => why[place..].split_once(": ").map_or(why, |(_, reason)| reason),
+        None => why,
+    };
     Error::new(ErrorKind::Unsupported, format!("the window cannot be opened: {why}")).remedy(format!(
         "without a window: `patina demo` or `patina fit SCENE -o RUN`; on Debian a window needs: {DEBIAN_PACKAGES}"
     ))

@@ -67,9 +67,11 @@ fn found(query: &str) -> Vec<&'static ActInfo> {
 fn palette(ui: &mut Ui, model: &mut Model, query: &mut String) -> bool {
     ui.set_width(480.0);
     let label = ui.label("Find an act");
-    let field = ui.add(TextEdit::singleline(query).desired_width(f32::INFINITY).hint_text("e.g. next light"));
+    // The field has the keys before it is drawn for the first time: a person types on while the palette opens.
+    let id = Id::unique("palette field");
+    ui.memory_mut(|memory| memory.request_focus(id));
+    let field = ui.add(TextEdit::singleline(query).id(id).desired_width(f32::INFINITY).hint_text("e.g. next light"));
     let field = field.labelled_by(label.id);
-    field.request_focus();
     let hits = found(query);
     let enter = ui.input(|input| input.key_pressed(Key::Enter));
     let mut chosen = None;
