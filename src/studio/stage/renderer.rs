@@ -1,0 +1,372 @@
+//! The part that changes: what is uploaded, the targets, and when the scene is drawn anew.
+//!
+//! A frame that differs from the last only in exposure, curve, photo or wipe of the photo is not drawn again, only
+//! shown: that is one triangle over the rectangle.
+
+use super::content::{StageFrame, StageLight};
+use super::light::{self, PreparedLight};
+use super::mesh::GpuMesh;
+use super::overlay::Overlay;
+use super::pipelines::{DEPTH_FORMAT, OVERLAY_FORMAT, Pipelines, RADIANCE_FORMAT, bind};
+use super::slot::{Slot, Speed};
+use super::texels::{CLAY, GpuTexture, MATT, Maker};
+use super::uniforms::{ScreenUniform, Sizes, ViewUniform};
+use crate::error::Finding;
+use crate::image::{GreyImage, Image, RgbImage};
+use crate::light::Environment;
+use crate::material::MaterialMaps;
+use crate::scene::Mesh;
+use eframe::{egui, wgpu};
+use glam::Vec3;
+use std::sync::Arc;
+
+/// Images of at most this many texels are uploaded within a frame, the rest on another thread.
+const TEXELS_AT_ONCE: usize = 256 * 256;
+
+/// What the stage did, for the app to show and for tests.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StageStatus {
+    /// How often the scene was drawn; frames that were only shown do not count.
+    pub scenes_drawn: u64,
+    /// How many frames were shown.
+    pub frames_shown: u64,
+    /// Something newer is being uploaded.
+    pub is_uploading: bool,
+    /// What the user should know of what is shown.
+    pub findings: Vec<Finding>,
+}
+
+type MapsKey = (Arc<MaterialMaps>, Option<Arc<Image<bool>>>);
+
+/// A light on the graphics adapter.
+struct GpuLight {
+    map: GpuTexture,
+    layers: GpuTexture,
+}
+
+impl GpuLight {
+    fn new(maker: &Maker, light: &PreparedLight) -> Self {
+        GpuLight {
+            map: maker.table("stage light", &light.mirror),
+            layers: maker.layers("stage blurred light", &light.layers),
+        }
+    }
+}
+
+/// What stands in for what is not there.
+struct Missing {
+    diffuse: GpuTexture,
+    specular: GpuTexture,
+    black: GpuTexture,
+    light: GpuLight,
+}
+
+/// The targets of a size.
+struct Targets {
+    size: [u32; 2],
+    radiance: wgpu::TextureView,
+    overlay: wgpu::TextureView,
+    depth: wgpu::TextureView,
+}
+
+/// Everything the stage keeps on the graphics adapter.
+pub(super) struct StageRenderer {
+    maker: Maker,
+    pipelines: Pipelines,
+    view_buffer: wgpu::Buffer,
+    screen_buffer: wgpu::Buffer,
+    missing: Missing,
+    reflectance: GpuTexture,
+    mesh: Slot<Arc<Mesh>, GpuMesh>,
+    maps: Slot<MapsKey, (GpuTexture, GpuTexture, Vec<Finding>)>,
+    quantity: Slot<Arc<GreyImage>, GpuTexture>,
+    lights: [Slot<Arc<Environment>, GpuLight>; 2],
+    photo: Slot<Arc<RgbImage>, GpuTexture>,
+    traced: Slot<Arc<RgbImage>, GpuTexture>,
+    overlay: Overlay,
+    targets: Option<Targets>,
+    drawn: Option<ViewUniform>,
+    screen_group: Option<wgpu::BindGroup>,
+    status: StageStatus,
+}
+
+impl StageRenderer {
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, screen_format: wgpu::TextureFormat) -> Self {
+        let maker = Maker { device: device.clone(), queue: queue.clone() };
+        let uniform = |label, size: usize| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: size as u64,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        };
+        let dark = Image::filled(1, 1, Vec3::ZERO);
+        let layers = vec![dark.clone(); 1 + light::WIDTHS];
+        let missing = Missing {
+            diffuse: maker.one("stage clay", CLAY),
+            specular: maker.one("stage matt", MATT),
+            black: maker.one("stage nothing", [0.0; 4]),
+            light: GpuLight::new(&maker, &PreparedLight { mirror: dark, layers }),
+        };
+        StageRenderer {
+            pipelines: Pipelines::new(device, screen_format),
+            view_buffer: uniform("stage view", size_of::<ViewUniform>()),
+            screen_buffer: uniform("stage screen", size_of::<ScreenUniform>()),
+            missing,
+            reflectance: maker.table("stage reflectance", light::reflectance_table()),
+            mesh: Slot::default(),
+            maps: Slot::default(),
+            quantity: Slot::default(),
+            lights: [Slot::default(), Slot::default()],
+            photo: Slot::default(),
+            traced: Slot::default(),
+            overlay: Overlay::default(),
+            targets: None,
+            drawn: None,
+            screen_group: None,
+            status: StageStatus::default(),
+            maker,
+        }
+    }
+
+    pub fn status(&self) -> &StageStatus {
+        &self.status
+    }
+
+    /// Brings everything up to the frame and records the drawing of the scene where it changed.
+    pub fn prepare(
+        &mut self,
+        frame: &StageFrame,
+        screen: [u32; 2],
+        pixels_per_point: f32,
+        context: &egui::Context,
+        encoder: &mut wgpu::CommandEncoder,
+    ) {
+        self.screen_group = None;
+        if screen.contains(&0) {
+            return;
+        }
+        let sizes = self.sizes(screen, frame.look.resolution_scale, pixels_per_point);
+        let mut changed = self.follow_content(frame, context);
+        let content = &frame.content;
+        changed |= self.overlay.follow(
+            &self.maker.device,
+            &self.maker.queue,
+            &self.pipelines,
+            (&content.cameras, content.frustum_depth, frame.eye.position_in_world(), frame.look.accent),
+        );
+        changed |= self.follow_size(sizes.target);
+        let bounds = self.mesh.shown().and_then(|mesh| mesh.bounds);
+        let view = ViewUniform::new(frame, &sizes, bounds);
+        if changed || self.drawn != Some(view) {
+            self.maker.queue.write_buffer(&self.view_buffer, 0, bytemuck::bytes_of(&view));
+            self.draw_scene(encoder);
+            self.drawn = Some(view);
+            self.status.scenes_drawn += 1;
+        }
+        let size = |slot: &Slot<_, GpuTexture>| slot.shown().map(|texture| texture.size);
+        let uniform = ScreenUniform::new(frame, &sizes, size(&self.photo), size(&self.traced));
+        self.maker.queue.write_buffer(&self.screen_buffer, 0, bytemuck::bytes_of(&uniform));
+        self.screen_group = self.bind_screen();
+        self.status.frames_shown += 1;
+    }
+
+    /// Shows the drawn scene in the pass of the window.
+    pub fn paint(&self, pass: &mut wgpu::RenderPass<'static>) {
+        if let Some(group) = &self.screen_group {
+            pass.set_pipeline(&self.pipelines.screen);
+            pass.set_bind_group(0, group, &[]);
+            pass.draw(0..3, 0..1);
+        }
+    }
+
+    fn sizes(&self, screen: [u32; 2], scale: f32, pixels_per_point: f32) -> Sizes {
+        let scale = if scale.is_finite() { scale.clamp(0.25, 2.0) } else { 1.0 };
+        let most = self.maker.device.limits().max_texture_dimension_2d;
+        let target = screen.map(|side| ((side as f32 * scale).round() as u32).clamp(1, most));
+        Sizes { screen, target, pixels_per_point }
+    }
+
+    /// Follows every handle of the content; whether the scene looks different.
+    fn follow_content(&mut self, frame: &StageFrame, context: &egui::Context) -> bool {
+        let content = &frame.content;
+        let speed = |texels: usize| {
+            if frame.wait_for_uploads || texels <= TEXELS_AT_ONCE { Speed::Now } else { Speed::Later(context) }
+        };
+        let pixels = |image: &RgbImage| image.pixels().len();
+
+        let maker = self.maker.clone();
+        let triangles = content.mesh.as_ref().map_or(0, |mesh| mesh.triangles.len());
+        let mut changed =
+            self.mesh.follow(content.mesh.clone(), speed(triangles), move |mesh| GpuMesh::new(&maker, mesh));
+
+        let maker = self.maker.clone();
+        let texels = content.maps.as_ref().map_or(0, |maps| pixels(&maps.diffuse));
+        let key = content.maps.clone().map(|maps| (maps, content.covered.clone()));
+        changed |=
+            self.maps.follow(key, speed(texels), move |(maps, covered)| maker.materials(maps, covered.as_deref()));
+
+        let maker = self.maker.clone();
+        // Uploaded only while it is looked at: nobody needs the four quantities of a fit at once.
+        let quantity =
+            content.quantity.as_ref().filter(|_| frame.look.layer.is_quantity()).map(|quantity| &quantity.texels);
+        let texels = quantity.map_or(0, |texels| texels.pixels().len());
+        changed |= self.quantity.follow(quantity.cloned(), speed(texels), move |texels| maker.quantity(texels));
+
+        for (slot, light) in self.lights.iter_mut().zip([&content.light, &content.other_light]) {
+            let maker = self.maker.clone();
+            let environment = light.as_ref().map(|light: &StageLight| light.environment.clone());
+            // Blurring costs the same for a small one.
+            changed |= slot.follow(environment, speed(usize::MAX), move |environment| {
+                GpuLight::new(&maker, &light::prepare(environment))
+            });
+        }
+        for (slot, picture, label) in [
+            (&mut self.photo, &content.photo, "stage photo"),
+            (&mut self.traced, &content.traced, "stage traced picture"),
+        ] {
+            let maker = self.maker.clone();
+            let texels = picture.as_deref().map_or(0, pixels);
+            // A new photo or traced picture changes how the scene is shown, not the scene.
+            slot.follow(picture.clone(), speed(texels), move |image| maker.picture(label, image));
+        }
+        self.status.is_uploading = self.mesh.is_pending()
+            || self.maps.is_pending()
+            || self.quantity.is_pending()
+            || self.lights.iter().any(Slot::is_pending)
+            || self.photo.is_pending()
+            || self.traced.is_pending();
+        if changed {
+            let of_mesh = self.mesh.shown().map(|mesh| &mesh.findings);
+            let of_maps = self.maps.shown().map(|(_, _, findings)| findings);
+            self.status.findings = of_mesh.into_iter().chain(of_maps).flatten().cloned().collect();
+        }
+        changed
+    }
+
+    /// Makes the targets anew for another size; whether it did.
+    fn follow_size(&mut self, size: [u32; 2]) -> bool {
+        if self.targets.as_ref().is_some_and(|targets| targets.size == size) {
+            return false;
+        }
+        let target = |label, format| {
+            let texture = self.maker.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            });
+            texture.create_view(&wgpu::TextureViewDescriptor::default())
+        };
+        self.targets = Some(Targets {
+            size,
+            radiance: target("stage radiance", RADIANCE_FORMAT),
+            overlay: target("stage overlay", OVERLAY_FORMAT),
+            depth: target("stage depth", DEPTH_FORMAT),
+        });
+        true
+    }
+
+    /// Records the scene and then the frustums over it.
+    fn draw_scene(&self, encoder: &mut wgpu::CommandEncoder) {
+        let Some(targets) = &self.targets else { return };
+        let (device, pipelines) = (&self.maker.device, &self.pipelines);
+        let view = bind(device, &pipelines.view_layout, &[self.view_buffer.as_entire_binding()]);
+        let maps = self.bind_maps();
+        let lights = self.bind_lights();
+        let depth = |load| {
+            Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &targets.depth,
+                depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
+                stencil_ops: None,
+            })
+        };
+        let colour = |view| {
+            Some(wgpu::RenderPassColorAttachment {
+                view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                    store: wgpu::StoreOp::Store,
+                },
+            })
+        };
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("stage scene"),
+            color_attachments: &[colour(&targets.radiance)],
+            depth_stencil_attachment: depth(wgpu::LoadOp::Clear(0.0)),
+            ..Default::default()
+        });
+        for (index, group) in [&view, &maps, &lights].into_iter().enumerate() {
+            pass.set_bind_group(index as u32, group, &[]);
+        }
+        pass.set_pipeline(&pipelines.behind);
+        pass.draw(0..3, 0..1);
+        if let Some((corners, indices, count)) = self.mesh.shown().and_then(|mesh| mesh.buffers.as_ref()) {
+            pass.set_pipeline(&pipelines.mesh);
+            pass.set_vertex_buffer(0, corners.slice(..));
+            pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed(0..*count, 0, 0..1);
+        }
+        drop(pass);
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("stage frustums"),
+            color_attachments: &[colour(&targets.overlay)],
+            depth_stencil_attachment: depth(wgpu::LoadOp::Load),
+            ..Default::default()
+        });
+        pass.set_bind_group(0, &view, &[]);
+        self.overlay.draw(&mut pass, pipelines);
+    }
+
+    fn bind_maps(&self) -> wgpu::BindGroup {
+        use wgpu::BindingResource::{Sampler, TextureView};
+        let (diffuse, specular) =
+            self.maps.shown().map_or((&self.missing.diffuse, &self.missing.specular), |maps| (&maps.0, &maps.1));
+        let quantity = self.quantity.shown().unwrap_or(&self.missing.black);
+        let resources = [
+            Sampler(&self.pipelines.map_sampler),
+            TextureView(&diffuse.view),
+            TextureView(&specular.view),
+            TextureView(&quantity.view),
+        ];
+        bind(&self.maker.device, &self.pipelines.map_layout, &resources)
+    }
+
+    fn bind_lights(&self) -> wgpu::BindGroup {
+        use wgpu::BindingResource::{Sampler, TextureView};
+        let [light, other] = self.lights.each_ref().map(|slot| slot.shown().unwrap_or(&self.missing.light));
+        let resources = [
+            Sampler(&self.pipelines.light_sampler),
+            TextureView(&light.map.view),
+            TextureView(&light.layers.view),
+            TextureView(&other.map.view),
+            TextureView(&other.layers.view),
+            TextureView(&self.reflectance.view),
+        ];
+        bind(&self.maker.device, &self.pipelines.light_layout, &resources)
+    }
+
+    fn bind_screen(&self) -> Option<wgpu::BindGroup> {
+        use wgpu::BindingResource::{Sampler, TextureView};
+        let targets = self.targets.as_ref()?;
+        let or_black =
+            |slot: &'_ Slot<Arc<RgbImage>, GpuTexture>| slot.shown().unwrap_or(&self.missing.black).view.clone();
+        let (photo, traced) = (or_black(&self.photo), or_black(&self.traced));
+        let resources = [
+            self.screen_buffer.as_entire_binding(),
+            Sampler(&self.pipelines.map_sampler),
+            TextureView(&targets.radiance),
+            TextureView(&targets.overlay),
+            TextureView(&photo),
+            TextureView(&traced),
+        ];
+        Some(bind(&self.maker.device, &self.pipelines.screen_layout, &resources))
+    }
+}

@@ -1,0 +1,157 @@
+//! Something on the graphics adapter that follows something behind an [`Arc`], made on another thread when it is large.
+
+use eframe::egui;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+
+/// Whether two handles are of the same thing; not whether the things are equal.
+pub(super) trait Same {
+    fn same(&self, other: &Self) -> bool;
+}
+
+impl<T> Same for Arc<T> {
+    fn same(&self, other: &Self) -> bool {
+        Arc::ptr_eq(self, other)
+    }
+}
+
+impl<T: Same> Same for Option<T> {
+    fn same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Some(one), Some(other)) => one.same(other),
+            (None, None) => true,
+            _ => false,
+        }
+    }
+}
+
+impl<T: Same, U: Same> Same for (T, U) {
+    fn same(&self, other: &Self) -> bool {
+        self.0.same(&other.0) && self.1.same(&other.1)
+    }
+}
+
+/// How the thing wanted is made.
+pub(super) enum Speed<'a> {
+    /// Now, within the frame.
+    Now,
+    /// On another thread, which wakes the window; the last one stays until then.
+    Later(&'a egui::Context),
+}
+
+/// What is shown of a handle `K`, and what is being made of a newer one.
+pub(super) struct Slot<K, G> {
+    shown: Option<(K, G)>,
+    pending: Option<(K, Receiver<G>)>,
+    /// A handle whose making broke: it is not tried again.
+    broken: Option<K>,
+}
+
+impl<K, G> Default for Slot<K, G> {
+    fn default() -> Self {
+        Slot { shown: None, pending: None, broken: None }
+    }
+}
+
+impl<K: Same + Clone + Send + 'static, G: Send + 'static> Slot<K, G> {
+    /// What there is to draw with.
+    pub fn shown(&self) -> Option<&G> {
+        self.shown.as_ref().map(|(_, made)| made)
+    }
+
+    /// Whether something newer is being made.
+    pub fn is_pending(&self) -> bool {
+        self.pending.is_some()
+    }
+
+    /// Follows the handle; whether what is shown is another than before.
+    pub fn follow(&mut self, wanted: Option<K>, speed: Speed<'_>, make: impl FnOnce(&K) -> G + Send + 'static) -> bool {
+        let Some(wanted) = wanted else {
+            self.pending = None;
+            return self.shown.take().is_some();
+        };
+        let mut changed = self.collect(matches!(speed, Speed::Now));
+        let known = |known: Option<&K>| known.is_some_and(|known| known.same(&wanted));
+        if known(self.shown.as_ref().map(|(key, _)| key)) || self.pending.is_some() || known(self.broken.as_ref()) {
+            return changed;
+        }
+        match speed {
+            Speed::Now => {
+                let made = make(&wanted);
+                self.shown = Some((wanted, made));
+                changed = true;
+            }
+            Speed::Later(context) => {
+                let (sender, receiver) = channel();
+                let (key, context) = (wanted.clone(), context.clone());
+                let work = move || {
+                    // The window may be gone meanwhile.
+                    let _ = sender.send(make(&key));
+                    context.request_repaint();
+                };
+                match std::thread::Builder::new().name("stage upload".into()).spawn(work) {
+                    Ok(_) => self.pending = Some((wanted, receiver)),
+                    Err(_) => self.broken = Some(wanted),
+                }
+            }
+        }
+        changed
+    }
+
+    /// Takes what has been made; whether there was something. Of several handles the newest is made once the last is done.
+    fn collect(&mut self, wait: bool) -> bool {
+        let Some((key, receiver)) = self.pending.take() else { return false };
+        let result = if wait { receiver.recv().map_err(|_| TryRecvError::Disconnected) } else { receiver.try_recv() };
+        match result {
+            Ok(made) => {
+                self.shown = Some((key, made));
+                true
+            }
+            Err(TryRecvError::Empty) => {
+                self.pending = Some((key, receiver));
+                false
+            }
+            Err(TryRecvError::Disconnected) => {
+                self.broken = Some(key);
+                false
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_same_handle_is_made_once_and_an_equal_one_anew() {
+        let mut slot = Slot::<Arc<u32>, u32>::default();
+        let (one, other) = (Arc::new(3), Arc::new(3));
+        assert!(slot.follow(Some(one.clone()), Speed::Now, |key| **key + 1));
+        assert!(!slot.follow(Some(one), Speed::Now, |_| panic!("made twice")));
+        assert!(slot.follow(Some(other), Speed::Now, |key| **key + 2));
+        assert_eq!(slot.shown(), Some(&5));
+        assert!(slot.follow(None, Speed::Now, |key| **key) && slot.shown().is_none());
+    }
+
+    #[test]
+    fn the_last_one_stays_until_the_next_is_ready_and_a_broken_one_is_not_tried_again() {
+        let context = egui::Context::default();
+        let mut slot = Slot::<Arc<u32>, u32>::default();
+        let (one, other, broken) = (Arc::new(1), Arc::new(2), Arc::new(3));
+        slot.follow(Some(one), Speed::Now, |key| **key);
+        let (go, wait) = channel::<()>();
+        assert!(!slot.follow(Some(other.clone()), Speed::Later(&context), move |key| {
+            wait.recv().unwrap();
+            **key
+        }));
+        assert!(slot.is_pending() && slot.shown() == Some(&1));
+        go.send(()).unwrap();
+        assert!(slot.follow(Some(other), Speed::Now, |_| panic!("already being made")));
+        assert_eq!(slot.shown(), Some(&2));
+        slot.follow(Some(broken.clone()), Speed::Later(&context), |_| panic!("breaks on purpose"));
+        slot.follow(Some(broken.clone()), Speed::Now, |_| panic!("tried again"));
+        assert!(!slot.is_pending() && slot.shown() == Some(&2));
+        slot.follow(Some(broken), Speed::Now, |_| panic!("tried again"));
+    }
+}
