@@ -59,11 +59,19 @@ pub fn window(size: Vec2, frame: StageFrame) -> Harness<'static, Shown> {
 
 /// The bytes on the screen after a change of the frame.
 pub fn pixels(harness: &mut Harness<'_, Shown>, change: impl FnOnce(&mut StageFrame)) -> Image<[u8; 3]> {
+    try_pixels(harness, change).unwrap()
+}
+
+/// [`pixels`], or what the adapter said.
+pub fn try_pixels(
+    harness: &mut Harness<'_, Shown>,
+    change: impl FnOnce(&mut StageFrame),
+) -> Result<Image<[u8; 3]>, String> {
     change(&mut harness.state_mut().frame);
     harness.step();
-    let picture = harness.render().unwrap();
+    let picture = harness.render()?;
     let (width, height) = (picture.width() as usize, picture.height() as usize);
-    Image::from_pixels(width, height, picture.pixels().map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect())
+    Ok(Image::from_pixels(width, height, picture.pixels().map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect()))
 }
 
 /// Fails with the place where two colours differ by more than `tolerance` bytes.
@@ -89,9 +97,9 @@ pub fn sphere(columns: usize, rows: usize) -> Mesh {
     for row in 0..rows as u32 {
         for column in 0..columns as u32 {
             let corner = row * line + column;
-            // The azimuth runs clockwise seen from above: from outside, columns go to the right.
-            mesh.triangles.push([corner, corner + line, corner + 1]);
-            mesh.triangles.push([corner + 1, corner + line, corner + line + 1]);
+            // From outside, rows go down and columns to the left.
+            mesh.triangles.push([corner, corner + 1, corner + line]);
+            mesh.triangles.push([corner + 1, corner + line + 1, corner + line]);
         }
     }
     mesh

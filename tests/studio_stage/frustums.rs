@@ -101,7 +101,7 @@ fn thumbnails_stand_upright_on_the_image_plane() {
         let point = on_plane.origin + on_plane.direction / on_plane.direction.dot(Vec3::NEG_Z);
         let (on_screen, _) = eye.project(point, SIZE).unwrap();
         let found = picture[(on_screen.y as usize, on_screen.x as usize)];
-        assert_colour(found, display.bytes(photo[of_photo], 0, 0), 2, &format!("{place}"));
+        assert_colour(found, display.bytes(photo[of_photo], 0, 0), 8, &format!("{place}"));
     }
 }
 

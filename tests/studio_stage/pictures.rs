@@ -78,7 +78,9 @@ fn pictures_of_the_demo_scene() {
     let parameters = patina::job::pictures::parameters(&truth.maps, &truth.environment);
     let surface = Surface::new(demo.scene.mesh.clone()).unwrap();
     let stop = AtomicBool::new(false);
-    let photo = |camera| Arc::new(render(&surface, camera, &parameters, 0, &settings(16), &stop).radiance);
+    let photo = |camera: &patina::scene::Camera| {
+        Arc::new(render(&surface, camera, &parameters, 0, &settings(16), &stop).radiance)
+    };
     let mut cameras: Vec<StageCamera> =
         demo.scene.views.iter().map(|view| StageCamera::new(view.camera, view.name.clone())).collect();
     for (index, camera) in cameras.iter_mut().enumerate() {
@@ -104,7 +106,6 @@ fn pictures_of_the_demo_scene() {
     };
     let mut orbit = OrbitEye { pitch_radians: 0.35, ..OrbitEye::default() };
     orbit.fit(bounds.unwrap(), 1.6);
-    orbit.zoom(0.75, None);
     let mut frame = StageFrame { eye: Eye::Orbit(orbit), content, ..StageFrame::default() };
     frame.look.display.curve = ToneCurve::Filmic;
     let mut window = window(Vec2::new(960.0, 600.0), frame);
@@ -157,7 +158,7 @@ fn pictures_of_the_demo_scene() {
             name,
             &pixels(&mut window, |frame| {
                 (frame.eye, frame.look.photo_mode) = (Eye::Photo(camera), mode);
-                frame.content.photo = Some(photo(&camera.shrunk(1)));
+                frame.content.photo = Some(photo(&camera));
             }),
         );
     }

@@ -207,10 +207,13 @@ fn hands_move_the_eye() {
     let turned = orbit(&window);
     assert!(turned.yaw_radians != before.yaw_radians && turned.pitch_radians > before.pitch_radians, "{turned:?}");
     assert_eq!((turned.distance, turned.target), (before.distance, before.target));
+    window.hover_at(egui::pos2(70.0, 45.0));
+    window.step();
     window.event(egui::Event::MouseWheel {
         unit: egui::MouseWheelUnit::Point,
         delta: egui::vec2(0.0, 60.0),
         phase: egui::TouchPhase::Move,
+        source: egui::MouseWheelSource::Wheel,
         modifiers: egui::Modifiers::NONE,
     });
     window.run_steps(10);

@@ -16,7 +16,7 @@ use std::sync::Arc;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Layer {
-    /// The materials under the light, without shadows and interreflection.
+    /// The materials under the light, without shadows and interreflection; backs of triangles are lit like fronts.
     #[default]
     Lit,
     /// The diffuse map.

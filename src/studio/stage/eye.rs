@@ -81,11 +81,20 @@ impl OrbitEye {
 
     /// Keeps the direction and moves so that a box (lower and upper corner) fills a view of this width over height.
     pub fn fit(&mut self, (low, high): (Vec3, Vec3), aspect: f32) {
-        let radius = (0.5 * (high - low).length()).max(1e-6);
+        self.settle();
         let half_height = (0.5 * self.vertical_field_of_view_radians).tan();
         let half_width = half_height * if aspect.is_finite() { aspect.max(0.1) } else { 1.0 };
+        let [right, down, forward] = self.axes();
+        let half = 0.5 * (high - low);
+        // A corner is inside when its distance from the axis is within the view at its depth.
+        let needed = (0..8).map(|corner| {
+            let sign = |axis: u32| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 };
+            let offset = half * Vec3::new(sign(0), sign(1), sign(2));
+            let beside = (offset.dot(right).abs() / half_width).max(offset.dot(down).abs() / half_height);
+            beside - offset.dot(forward)
+        });
         self.target = 0.5 * (low + high);
-        self.distance = 1.02 * radius / half_height.min(half_width).atan().sin();
+        self.distance = 1.05 * needed.fold(1e-6, f32::max);
         self.settle();
     }
 
@@ -119,6 +128,12 @@ impl OrbitEye {
         let forward = -Vec3::new(cos_pitch * sin_yaw, sin_pitch, cos_pitch * cos_yaw);
         let right = Vec3::new(cos_yaw, 0.0, -sin_yaw);
         [right, forward.cross(right), forward]
+    }
+
+    /// The eye with every number in its range: the fields are public.
+    fn settled(mut self) -> Self {
+        self.settle();
+        self
     }
 
     /// Brings every number back into its range, whatever was done to it.
@@ -166,6 +181,7 @@ impl Eye {
         let size = rect_size.max(Vec2::ONE);
         match self {
             Eye::Orbit(orbit) => {
+                let orbit = orbit.settled();
                 let [right, down, forward] = orbit.axes();
                 let rotation = Mat3::from_cols(right, down, forward).transpose();
                 let focal = 0.5 * size.y / (0.5 * orbit.vertical_field_of_view_radians).tan();
@@ -247,7 +263,7 @@ impl Eye {
     /// Where the eye is, in the world.
     pub fn position_in_world(&self) -> Vec3 {
         match self {
-            Eye::Orbit(orbit) => orbit.position_in_world(),
+            Eye::Orbit(orbit) => orbit.settled().position_in_world(),
             Eye::Photo(camera) => camera.position_in_world(),
         }
     }

@@ -60,7 +60,7 @@ pub fn frustum_depth(cameras: &[StageCamera], bounds: Option<(Vec3, Vec3)>) -> f
         .collect();
     nearest.sort_by(f32::total_cmp);
     let spacing = nearest.get(nearest.len() / 2).copied().unwrap_or(0.1 * scene);
-    (0.45 * spacing).clamp(0.015 * scene, 0.09 * scene)
+    (0.55 * spacing).clamp(0.015 * scene, 0.12 * scene)
 }
 
 /// Apex and the corners of the image plane (upper left, upper right, lower right, lower left) in the world.
@@ -89,7 +89,7 @@ pub(super) fn lines(cameras: &[StageCamera], depth: f32, eye_in_world: Vec3, acc
     for camera in cameras.iter().filter(|camera| !is_too_near(&camera.camera, depth, eye_in_world)) {
         let (apex, plane) = corners(&camera.camera, depth);
         let (width, dash) = (
-            if camera.selected { 2.6 } else { 1.3 },
+            if camera.selected { 2.8 } else { 1.4 },
             if camera.held_out || camera.excluded { DASH_PIXELS } else { 0.0 },
         );
         let rgb = camera.error_0_1.map_or(UNKNOWN, scale_colour);

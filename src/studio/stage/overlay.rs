@@ -12,6 +12,8 @@ use std::sync::Arc;
 
 /// Side of a thumbnail's tile in texels. Photos are squeezed into it and stretched again by their frustum.
 const TILE: u32 = 64;
+/// Levels of a tile, each half the last: frustums are mostly small on the screen.
+const LEVELS: u32 = 4;
 
 /// What the lines and corners were made from.
 type Key = (Arc<Vec<StageCamera>>, f32, Vec3, Color32);
@@ -91,18 +93,29 @@ impl Overlay {
                 continue;
             }
             *tile = Some(photo.clone());
-            let (x, y) = (index as u32 % side * TILE, index as u32 / side * TILE);
-            queue.write_texture(
-                wgpu::TexelCopyTextureInfo {
-                    texture: &atlas.texture,
-                    mip_level: 0,
-                    origin: wgpu::Origin3d { x, y, z: 0 },
-                    aspect: wgpu::TextureAspect::All,
-                },
-                &tile_bytes(photo),
-                wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * TILE), rows_per_image: Some(TILE) },
-                wgpu::Extent3d { width: TILE, height: TILE, depth_or_array_layers: 1 },
-            );
+            let photo = squeezed(photo);
+            for level in 0..LEVELS {
+                let length = TILE >> level;
+                queue.write_texture(
+                    wgpu::TexelCopyTextureInfo {
+                        texture: &atlas.texture,
+                        mip_level: level,
+                        origin: wgpu::Origin3d {
+                            x: index as u32 % side * length,
+                            y: index as u32 / side * length,
+                            z: 0,
+                        },
+                        aspect: wgpu::TextureAspect::All,
+                    },
+                    &bytes(&resize::shrink(&photo, 1 << level)),
+                    wgpu::TexelCopyBufferLayout {
+                        offset: 0,
+                        bytes_per_row: Some(4 * length),
+                        rows_per_image: Some(length),
+                    },
+                    wgpu::Extent3d { width: length, height: length, depth_or_array_layers: 1 },
+                );
+            }
         }
     }
 
@@ -127,7 +140,7 @@ impl Atlas {
         let texture = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("stage thumbnails"),
             size: wgpu::Extent3d { width: side * TILE, height: side * TILE, depth_or_array_layers: 1 },
-            mip_level_count: 1,
+            mip_level_count: LEVELS,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
             format: wgpu::TextureFormat::Rgba8Unorm,
@@ -163,18 +176,19 @@ fn buffer<T: bytemuck::NoUninit>(
     Some((buffer, values.len() as u32))
 }
 
-/// A photo squeezed into a tile: means of blocks first, so that nothing is skipped, then linear; sRGB bytes.
-fn tile_bytes(photo: &RgbImage) -> Vec<u8> {
+/// A photo squeezed into a tile: means of blocks first, so that nothing is skipped, then linear.
+fn squeezed(photo: &RgbImage) -> RgbImage {
     let side = TILE as usize;
     let factor = (photo.width().min(photo.height()) / side).max(1);
-    let small = resize::enlarge(&resize::shrink(photo, factor), side, side);
+    resize::enlarge(&resize::shrink(photo, factor), side, side)
+}
+
+/// sRGB bytes with an opacity of 1.
+fn bytes(picture: &RgbImage) -> Vec<u8> {
     let display = DisplaySettings::default();
-    small
-        .pixels()
-        .iter()
-        .flat_map(|&rgb| {
-            let [r, g, b] = display.bytes(rgb, 0, 0);
-            [r, g, b, 255]
-        })
-        .collect()
+    let texel = |rgb: &Vec3| {
+        let [r, g, b] = display.bytes(*rgb, 0, 0);
+        [r, g, b, 255]
+    };
+    picture.pixels().iter().flat_map(texel).collect()
 }

@@ -77,8 +77,10 @@ impl ViewUniform {
         let [lowest, highest] = content.quantity.as_ref().map_or([0.0, 1.0], |quantity| quantity.range);
         let per_unit = 1.0 / (highest - lowest);
         let wipe = light_wipe(frame).map_or(f32::MAX, |place| place * target.x);
+        let clip_from_world = frame.eye.clip_from_world(target, near);
         ViewUniform {
-            clip_from_world: frame.eye.clip_from_world(target, near),
+            // A photo's camera that is no camera shows nothing, rather than what an adapter makes of NaN.
+            clip_from_world: if clip_from_world.is_finite() { clip_from_world } else { Mat4::ZERO },
             world_from_camera: Mat4::from_cols(
                 world_from_camera.x_axis.extend(0.0),
                 world_from_camera.y_axis.extend(0.0),

@@ -39,7 +39,7 @@ fn corner_of_line(
     let is_end = select(0.0, 1.0, index == 1u || index == 2u || index == 4u);
     let side = select(-1.0, 1.0, index >= 2u && index != 3u);
     let half_width = 0.5 * start_and_width.w * view.size.z;
-    let reach = half_width + 1.0;
+    let reach = half_width + 2.0;
     let overhang = mix(-half_width, half_width, is_end) * 0.7;
     let place = mix(from_place, to_place, is_end) + along * overhang + across * side * reach;
     // A trifle nearer, so that lines on a surface are not eaten by it. Divided here: nothing is bent by perspective later.
@@ -51,14 +51,20 @@ fn corner_of_line(
 
 @fragment
 fn colour_of_line(corner: LineCorner) -> @location(0) vec4<f32> {
-    var opacity = corner.colour.a * clamp(corner.place.z + 0.5 - abs(corner.place.x), 0.0, 1.0);
+    let away = abs(corner.place.x) - corner.place.z;
+    let line = clamp(0.5 - away, 0.0, 1.0);
+    // A faint border, light about dark lines and dark about light ones: seen on any background.
+    let is_dark = dot(corner.colour.rgb, vec3(0.2126, 0.7152, 0.0722)) < 0.35;
+    let border = (1.0 - line) * clamp(1.5 - away, 0.0, 1.0) * 0.35;
+    var opacity = corner.colour.a;
     let dash = corner.place.w;
     if dash > 0.0 {
         // Smooth over a pixel at both ends of a dash.
         let within = (corner.place.y % (2.0 * dash) + 2.0 * dash) % (2.0 * dash);
         opacity *= clamp(min(within, dash - within) + 0.5, 0.0, 1.0);
     }
-    return vec4(corner.colour.rgb, 1.0) * opacity;
+    let colour = corner.colour.rgb * line + vec3(select(0.0, 1.0, is_dark)) * border;
+    return vec4(colour, line + border) * opacity;
 }
 
 @group(1) @binding(0) var picture_sampler: sampler;
