@@ -109,6 +109,17 @@ fn two_lights_stand_side_by_side() {
 }
 
 #[test]
+fn the_strip_shows_the_view_under_every_light_and_a_click_takes_one() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.click("Strip of lights");
+    studio.wait("the strip", |model| model.project.as_ref().is_some_and(|own| !own.strip.is_empty()));
+    assert_eq!(studio.model().project.as_ref().unwrap().strip.len(), studio.model().shelf.lights().len());
+    studio.control("view under Overcast sky").click_accesskit();
+    studio.frames(2);
+    assert_eq!(studio.model().edits.relight.first, sky("overcast"));
+}
+
+#[test]
 fn a_light_comes_by_path_or_by_drop_lights_the_stage_and_goes_again() {
     let mut studio = TestStudio::with_finished_run();
     let folder = tempfile::tempdir().unwrap();

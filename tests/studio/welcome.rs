@@ -70,3 +70,20 @@ fn a_long_opening_can_be_cancelled() {
     assert!(!studio.model().tasks.is_busy() && studio.model().project.is_none());
     studio.control("Open the built-in demo");
 }
+
+#[test]
+fn a_scene_is_read_again_in_another_way() {
+    let mut studio = TestStudio::with_small_scene();
+    studio.click("How the scene is read");
+    studio.frames(4);
+    assert!(studio.is_grey("Read the scene again"), "nothing differs");
+    studio.control("Shrink photos by").set_value_accesskit(2.0);
+    studio.frames(2);
+    assert!(studio.says("Not in force yet"));
+    studio.control("Read the scene again").click_accesskit();
+    studio.frames(1);
+    studio.wait("the scene", |model| model.project.is_some());
+    let project = studio.model().project.as_ref().unwrap();
+    assert_eq!(project.settings.read.shrink, 2);
+    assert_eq!(project.scene.as_ref().unwrap().views[0].camera.width, 24);
+}

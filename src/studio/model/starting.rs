@@ -56,11 +56,11 @@ impl Model {
         settings.fit = self.edits.fit.clone();
         let path = store::new_run_folder(&self.runs_folder(), &project.title);
         let (findings, timings, quality) = (project.findings.clone(), project.timings.clone(), project.quality.clone());
-        let options = self.job_options();
         // The atlas keeps its charts apart at the size it was made for; other map sizes need another atlas.
         let same_atlas = project.settings.fit.map_size == settings.fit.map_size || project.is_run;
         self.fit.losses.clear();
         self.fit.report = None;
+        let options = self.job_options();
         self.tasks.spawn(TITLE, move |context| {
             let folder = RunFolder::create(&path)?;
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
