@@ -2,5 +2,13 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod faults;
+mod fit;
+mod manners;
+mod memory;
+mod panels;
+mod pictures;
+mod relight;
+mod saving;
 mod support;
 mod welcome;

@@ -1,38 +1,82 @@
-//! A studio in a harness, and a small scene on disk for it to open.
+//! A studio in a harness, what a hand does to it, and a small scene on disk for it to open.
 
-use egui_kittest::Harness;
+use eframe::App;
+use egui_kittest::kittest::{By, NodeT, Queryable};
+use egui_kittest::{Harness, HarnessBuilder, Node};
 use patina::export::exchange::{self, ExchangeOptions};
 use patina::scene::demo::DemoSettings;
+use patina::studio::act::Act;
+use patina::studio::layout::Panel;
+use patina::studio::model::{FitStatus, Model};
 use patina::studio::{Studio, StudioOptions};
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
+pub use eframe::egui::accesskit::Role;
+pub use eframe::egui::{Key, Modifiers};
+
 /// What waits longer than this is taken to hang.
 const PATIENCE: Duration = Duration::from_secs(240);
+/// Steps of a fit that only a stop ends.
+pub const ENDLESS: usize = 100_000;
+
+/// A folder that goes with the process' build folder rather than with the system's.
+fn lasting_folder() -> TempDir {
+    tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap()
+}
+
+/// Writes a small exchange folder with photos and a truth.
+pub fn write_small_scene(folder: &Path) {
+    let small = DemoSettings { views: 6, held_out: 2, width: 48, height: 36, map_size: 64, seed: 1 };
+    let stop = AtomicBool::new(false);
+    let scene = patina::job::demo::scene(&small, &mut Vec::new(), &stop, &|_| {}).unwrap();
+    let truth = scene.truth.clone().unwrap();
+    let options = ExchangeOptions { with_photos: true, ..ExchangeOptions::default() };
+    exchange::write(&scene, &truth, &options, folder).unwrap();
+}
 
 /// A small exchange folder with photos and a truth, made once.
 pub fn small_scene() -> &'static Path {
     static SCENE: OnceLock<TempDir> = OnceLock::new();
     let folder = SCENE.get_or_init(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let small = DemoSettings { views: 6, held_out: 2, width: 48, height: 36, map_size: 64, seed: 1 };
-        let stop = AtomicBool::new(false);
-        let scene = patina::job::demo::scene(&small, &mut Vec::new(), &stop, &|_| {}).unwrap();
-        let truth = scene.truth.clone().unwrap();
-        let options = ExchangeOptions { with_photos: true, ..ExchangeOptions::default() };
-        exchange::write(&scene, &truth, &options, folder.path()).unwrap();
+        let folder = lasting_folder();
+        write_small_scene(folder.path());
         folder
     });
     folder.path()
 }
 
+/// A finished run of the small scene, made once; tests only read it.
+pub fn finished_run() -> &'static Path {
+    static RUN: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
+    let (_, path) = RUN.get_or_init(|| {
+        let folder = lasting_folder();
+        let mut studio = TestStudio::with_small_scene();
+        studio.model().preferences.runs_folder = folder.path().into();
+        studio.act(Act::Start);
+        studio.wait("the end of the fit", |model| model.fit.status == FitStatus::Finished);
+        let path = studio.run_folder();
+        (folder, path)
+    });
+    path
+}
+
 /// A studio with settings and runs in a folder of its own, which lives as long as it does.
 pub struct TestStudio {
     pub harness: Harness<'static, Studio>,
-    pub folder: TempDir,
+    pub folder: Arc<TempDir>,
+}
+
+impl Drop for TestStudio {
+    fn drop(&mut self) {
+        // As a killed program, it writes no settings; but its threads must not write into a folder that is gone.
+        let model = &mut self.harness.state_mut().model;
+        model.tasks.stop_all();
+        model.fit.stop_and_wait();
+    }
 }
 
 impl TestStudio {
@@ -43,17 +87,20 @@ impl TestStudio {
 
     /// A studio that opens a path at once.
     pub fn opening(path: Option<PathBuf>) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        TestStudio::in_folder(folder, path)
+        TestStudio::in_folder(Arc::new(tempfile::tempdir().unwrap()), path)
     }
 
     /// A studio that remembers what is in a folder.
-    pub fn in_folder(folder: TempDir, path: Option<PathBuf>) -> Self {
+    pub fn in_folder(folder: Arc<TempDir>, path: Option<PathBuf>) -> Self {
+        TestStudio::built(Harness::builder().with_size([1440.0, 900.0]), folder, path)
+    }
+
+    /// A studio in a window of its own kind.
+    pub fn built(builder: HarnessBuilder<Studio>, folder: Arc<TempDir>, path: Option<PathBuf>) -> Self {
         let settings_file = Some(folder.path().join("studio.json"));
         let options = StudioOptions { path, demo: false, settings_file };
         let runs = folder.path().join("runs");
-        let mut harness = Harness::builder()
-            .with_size([1440.0, 900.0])
+        let mut harness = builder
             .with_wait_for_pending_images(false)
             .build_eframe(move |creation| Studio::new(creation, &options));
         harness.state_mut().model.preferences.runs_folder = runs;
@@ -64,38 +111,225 @@ impl TestStudio {
 
     /// A studio with the small scene open and its atlas made, and settings of a fit of some seconds.
     pub fn with_small_scene() -> Self {
-        let mut studio = TestStudio::opening(Some(small_scene().into()));
-        studio.wait("the atlas", |studio| studio.model.project.as_ref().is_some_and(|own| own.surface.is_some()));
-        let fit = &mut studio.harness.state_mut().model.edits.fit;
-        (fit.map_size, fit.levels, fit.steps_diffuse, fit.steps_all) = (64, 2, 6, 6);
-        (fit.samples, fit.pixels_per_step, fit.views_per_step) = (2, 0, 2);
-        studio.step();
+        TestStudio::with_scene(small_scene())
+    }
+
+    /// The same with another folder of the small scene.
+    pub fn with_scene(scene: &Path) -> Self {
+        let mut studio = TestStudio::opening(Some(scene.into()));
+        studio.prepare_fit();
         studio
     }
 
-    /// One frame.
-    pub fn step(&mut self) {
-        self.harness.step();
+    /// Waits for the atlas and chooses settings of a fit of some seconds.
+    pub fn prepare_fit(&mut self) {
+        self.wait("the atlas", |model| model.project.as_ref().is_some_and(|own| own.surface.is_some()));
+        let model = self.model();
+        let fit = &mut model.edits.fit;
+        (fit.map_size, fit.levels, fit.steps_diffuse, fit.steps_all) = (64, 2, 6, 6);
+        (fit.samples, fit.pixels_per_step, fit.views_per_step, fit.environment_height) = (2, 0, 2, 8);
+        let edits = model.edits.clone();
+        model.history.restart(&edits);
+        self.frames(2);
+    }
+
+    /// A studio with a fit that goes on until it is stopped, some steps after its start.
+    pub fn with_running_fit() -> Self {
+        let mut studio = TestStudio::with_small_scene();
+        studio.start_endless_fit();
+        studio
+    }
+
+    /// Starts a fit that goes on until it is stopped, and waits for its first steps.
+    pub fn start_endless_fit(&mut self) {
+        self.model().edits.fit.steps_diffuse = ENDLESS;
+        self.frames(1);
+        self.click("Start the fit");
+        self.wait_for_step(3);
+    }
+
+    /// A studio with the finished run open.
+    pub fn with_finished_run() -> Self {
+        let mut studio = TestStudio::opening(Some(finished_run().into()));
+        studio.wait("the run", |model| model.project.is_some());
+        studio.frames(2);
+        studio
+    }
+
+    /// What the window knows.
+    pub fn model(&mut self) -> &mut Model {
+        &mut self.harness.state_mut().model
+    }
+
+    /// The folder of the run that is open.
+    pub fn run_folder(&self) -> PathBuf {
+        self.harness.state().model.fit.folder.as_ref().unwrap().path().into()
+    }
+
+    /// The settings of that run as they are on disk.
+    pub fn settings_on_disk(&self) -> String {
+        std::fs::read_to_string(self.run_folder().join("settings.toml")).unwrap_or_default()
+    }
+
+    /// Steps done.
+    pub fn steps_done(&self) -> usize {
+        self.harness.state().model.fit.losses.last().map_or(0, |row| row.step)
+    }
+
+    /// Frames.
+    pub fn frames(&mut self, count: usize) {
+        for _ in 0..count {
+            self.harness.step();
+        }
+    }
+
+    /// Queues an act and lets it be done.
+    pub fn act(&mut self, act: Act) {
+        self.model().act(act);
+        self.frames(2);
+    }
+
+    /// Brings a panel to the front by its tab.
+    pub fn show(&mut self, panel: Panel) {
+        self.harness.state_mut().layout.activate(panel);
+        self.frames(2);
+    }
+
+    /// The one control with this label: not a text, not a title.
+    pub fn control(&self, label: &str) -> Node<'_> {
+        let all = self.controls(label);
+        assert_eq!(all.len(), 1, "{} controls are called {label:?}: {all:#?}; {}", all.len(), self.log());
+        all[0]
+    }
+
+    /// All controls with this label.
+    pub fn controls(&self, label: &str) -> Vec<Node<'_>> {
+        let is_control = |node: &Node<'_>| !matches!(node.accesskit_node().role(), Role::Label | Role::GenericContainer);
+        // The label's lifetime is that of the query, not of the tree.
+        let wanted = label.to_owned();
+        let by = By::new().predicate(move |node| node.label().is_some_and(|own| own == wanted));
+        self.harness.query_all(by).filter(is_control).collect()
+    }
+
+    /// Whether any widget, text included, says this somewhere.
+    pub fn says(&self, text: &str) -> bool {
+        let wanted = text.to_owned();
+        let by = By::new().predicate(move |node| {
+            let is_text = node.role() == Role::Label;
+            let own = if is_text { node.value() } else { node.label() };
+            own.is_some_and(|own| own.contains(&wanted))
+        });
+        self.harness.query_all(by).next().is_some()
+    }
+
+    /// Clicks the one control with this label.
+    #[track_caller]
+    pub fn click(&mut self, label: &str) {
+        let node = self.control(label);
+        assert!(!node.accesskit_node().is_disabled(), "{label:?} is grey; {}", self.log());
+        node.click();
+        self.frames(2);
+    }
+
+    /// Clicks the one control of this kind with this label.
+    #[track_caller]
+    pub fn click_role(&mut self, role: Role, label: &str) {
+        let nodes: Vec<_> =
+            self.controls(label).into_iter().filter(|node| node.accesskit_node().role() == role).collect();
+        assert_eq!(nodes.len(), 1, "{nodes:#?}");
+        nodes[0].click();
+        self.frames(2);
+    }
+
+    /// Clicks the uppermost control with this label, where a menu and a tab are called alike.
+    #[track_caller]
+    pub fn click_first(&mut self, label: &str) {
+        let nodes = self.controls(label);
+        assert!(!nodes.is_empty(), "no control is called {label:?}; {}", self.log());
+        let top = nodes.iter().min_by(|a, b| a.rect().top().total_cmp(&b.rect().top())).copied().unwrap();
+        top.click();
+        self.frames(2);
+    }
+
+    /// Whether the one control with this label is grey.
+    pub fn is_grey(&self, label: &str) -> bool {
+        self.control(label).accesskit_node().is_disabled()
+    }
+
+    /// The number in a field.
+    pub fn number(&self, label: &str) -> f64 {
+        self.control(label).accesskit_node().numeric_value().unwrap()
+    }
+
+    /// Clicks a field of a number, types another and leaves it by Enter.
+    #[track_caller]
+    pub fn type_number(&mut self, label: &str, number: &str) {
+        self.click(label);
+        self.type_text(number);
+        self.press(Modifiers::NONE, Key::Enter);
+    }
+
+    /// Replaces the text of a field.
+    #[track_caller]
+    pub fn replace_text(&mut self, label: &str, text: &str) {
+        self.control(label).focus();
+        self.frames(2);
+        self.press(Modifiers::COMMAND, Key::A);
+        self.type_text(text);
+    }
+
+    /// Types into whatever has the focus.
+    pub fn type_text(&mut self, text: &str) {
+        self.harness.event(eframe::egui::Event::Text(text.to_owned()));
+        self.frames(2);
+    }
+
+    /// Presses a key and lets it go.
+    pub fn press(&mut self, modifiers: Modifiers, key: Key) {
+        self.harness.key_press_modifiers(modifiers, key);
+        self.frames(2);
     }
 
     /// Frames until something is so.
-    pub fn wait(&mut self, what: &str, is_so: impl Fn(&Studio) -> bool) {
+    #[track_caller]
+    pub fn wait(&mut self, what: &str, is_so: impl Fn(&Model) -> bool) {
         let began = Instant::now();
         loop {
             self.harness.step();
-            if is_so(self.harness.state()) {
+            let model = &self.harness.state().model;
+            if is_so(model) {
+                // What the panels show follows what the model knows.
+                self.frames(2);
                 return;
             }
-            let model = &self.harness.state().model;
-            let log: Vec<String> = model.log.messages().iter().map(|message| message.sentence()).collect();
-            assert!(began.elapsed() < PATIENCE, "{what} did not come; status {:?}, log {log:#?}", model.fit.status);
-            std::thread::sleep(Duration::from_millis(10));
+            let failed = matches!(model.fit.status, FitStatus::Failed(_));
+            let patience = if failed { Duration::from_secs(5) } else { PATIENCE };
+            assert!(began.elapsed() < patience, "{what} did not come; {:?}, {}", model.fit.status, self.log());
+            std::thread::sleep(Duration::from_millis(5));
         }
+    }
+
+    /// Frames until a fit has done so many steps.
+    #[track_caller]
+    pub fn wait_for_step(&mut self, step: usize) {
+        self.wait(&format!("step {step}"), |model| model.fit.losses.last().is_some_and(|row| row.step >= step));
+    }
+
+    /// Frames until the log says something.
+    #[track_caller]
+    pub fn wait_for_word(&mut self, word: &str) {
+        self.wait(word, |model| model.log.messages().iter().any(|message| message.sentence().contains(word)));
     }
 
     /// Everything that was noticed, as one text.
     pub fn log(&self) -> String {
         let lines = self.harness.state().model.log.messages().iter();
         lines.map(|message| format!("{} {}\n", message.sentence(), message.remedy)).collect()
+    }
+
+    /// Closes the window as a person does, so that settings are written; returns what is left on disk.
+    pub fn close(mut self) -> Arc<TempDir> {
+        self.harness.state_mut().on_exit();
+        Arc::clone(&self.folder)
     }
 }

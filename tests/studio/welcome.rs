@@ -1,35 +1,89 @@
-//! The first page.
+//! The first page: opening, recents, and what cannot be opened.
 
-use super::support::{TestStudio, small_scene};
-use egui_kittest::kittest::Queryable;
+use super::support::{Key, Modifiers, TestStudio, finished_run, small_scene};
+use patina::studio::model::FitStatus;
 
 #[test]
 fn a_typed_path_opens_a_scene_and_the_next_start_remembers_it() {
     let mut studio = TestStudio::new();
-    studio.step();
-    studio.harness.get_by_label("Path").type_text(&small_scene().display().to_string());
-    studio.step();
-    studio.harness.get_by_label("Open path").click();
-    studio.wait("the scene", |studio| studio.model.project.is_some());
-    studio.wait("the atlas", |studio| studio.model.project.as_ref().is_some_and(|own| own.surface.is_some()));
-    studio.harness.get_by_label("Start the fit");
-    studio.harness.state_mut().model.write_preferences();
+    studio.frames(1);
+    assert!(studio.says("Nothing yet") && studio.says("A BlendedMVS scene"));
+    studio.replace_text("Path", &small_scene().display().to_string());
+    studio.click("Open path");
+    studio.wait("the atlas", |model| model.project.as_ref().is_some_and(|own| own.surface.is_some()));
+    studio.control("Start the fit");
+    assert!(studio.says("6 photos, 2 held out to judge"));
 
-    let again = TestStudio::in_folder(studio.folder, None);
+    let folder = studio.close();
+    let mut again = TestStudio::in_folder(folder, None);
+    again.frames(1);
     let name = small_scene().file_name().unwrap().to_string_lossy().into_owned();
-    again.harness.get_by_label(&name);
+    again.click(&name);
+    again.wait("the scene", |model| model.project.is_some());
 }
 
 #[test]
-fn a_folder_that_holds_no_scene_is_told_with_a_remedy_and_can_be_dismissed() {
+fn a_finished_run_opens_with_its_maps_curves_and_scores() {
+    let studio = TestStudio::with_finished_run();
+    let model = &studio.harness.state().model;
+    assert_eq!(model.fit.status, FitStatus::Finished);
+    assert!(model.project.as_ref().is_some_and(|project| project.maps.is_some() && project.is_run));
+    assert!(model.fit.report.is_some() && !model.fit.losses.is_empty());
+    studio.control("Fit again");
+}
+
+#[test]
+fn folders_that_hold_no_scene_and_paths_that_lead_nowhere_are_told_with_a_remedy() {
     let empty = tempfile::tempdir().unwrap();
-    let mut studio = TestStudio::opening(Some(empty.path().into()));
-    studio.wait("the error", |studio| studio.model.log.banner().is_some());
-    studio.step();
-    assert!(studio.harness.query_by_label_contains("What helps").is_some(), "{}", studio.log());
-    studio.harness.get_by_label("Dismiss").click();
-    studio.step();
-    studio.step();
-    assert!(studio.harness.query_by_label("Dismiss").is_none());
-    assert!(studio.harness.state().model.project.is_none());
+    for path in [empty.path().to_path_buf(), empty.path().join("nowhere"), finished_run().join("mesh.obj")] {
+        let mut studio = TestStudio::opening(Some(path.clone()));
+        studio.wait("the error", |model| model.log.banner().is_some());
+        assert!(studio.says("What helps"), "{}", studio.log());
+        studio.click("Dismiss");
+        assert!(studio.controls("Dismiss").is_empty());
+        assert!(studio.harness.state().model.project.is_none(), "{}", path.display());
+        // The page still works.
+        studio.replace_text("Path", &small_scene().display().to_string());
+        studio.press(Modifiers::NONE, Key::Enter);
+        studio.wait("the scene", |model| model.project.is_some());
+    }
+}
+
+#[test]
+fn a_recent_folder_that_is_gone_is_grey_and_can_be_forgotten() {
+    let gone = tempfile::tempdir().unwrap().path().join("scene-of-old");
+    let mut studio = TestStudio::new();
+    studio.model().preferences.remember(&gone, false);
+    studio.frames(1);
+    assert!(studio.is_grey("scene-of-old"));
+    studio.click("Forget");
+    assert!(studio.controls("scene-of-old").is_empty() && studio.says("Nothing yet"));
+}
+
+#[test]
+fn a_long_opening_can_be_cancelled() {
+    let mut studio = TestStudio::new();
+    studio.frames(1);
+    studio.click("Open the built-in demo");
+    studio.click("Cancel");
+    assert!(studio.log().contains("Stopped: Opening"), "{}", studio.log());
+    assert!(!studio.model().tasks.is_busy() && studio.model().project.is_none());
+    studio.control("Open the built-in demo");
+}
+
+#[test]
+fn a_scene_is_read_again_in_another_way() {
+    let mut studio = TestStudio::with_small_scene();
+    studio.click("How the scene is read");
+    studio.frames(4);
+    assert!(studio.is_grey("Read the scene again"), "nothing differs");
+    studio.control("Shrink photos by").set_value_accesskit(2.0);
+    studio.frames(2);
+    assert!(studio.says("Not in force yet"));
+    studio.control("Read the scene again").click_accesskit();
+    studio.frames(1);
+    studio.wait("the scene", |model| model.project.is_some());
+    let project = studio.model().project.as_ref().unwrap();
+    assert_eq!(project.settings.read.shrink, 2);
+    assert_eq!(project.scene.as_ref().unwrap().views[0].camera.width, 24);
 }

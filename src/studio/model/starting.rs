@@ -28,10 +28,9 @@ impl Started {
         fitter: Fitter,
         settings: RunSettings,
         folder: RunFolder,
-        wake: super::tasks::Wake,
+        options: JobOptions,
     ) -> Result<Self> {
         let (fit, surface) = (settings.fit.clone(), Arc::clone(&prepared.surface));
-        let options = JobOptions { wake: Some(wake), ..JobOptions::default() };
         let job = job::start_with(prepared, fitter, settings, folder.clone(), options)?;
         Ok(Started { job, folder, settings: fit, surface })
     }
@@ -57,11 +56,11 @@ impl Model {
         settings.fit = self.edits.fit.clone();
         let path = store::new_run_folder(&self.runs_folder(), &project.title);
         let (findings, timings, quality) = (project.findings.clone(), project.timings.clone(), project.quality.clone());
-        let wake = Arc::clone(&self.wake);
         // The atlas keeps its charts apart at the size it was made for; other map sizes need another atlas.
         let same_atlas = project.settings.fit.map_size == settings.fit.map_size || project.is_run;
         self.fit.losses.clear();
         self.fit.report = None;
+        let options = self.job_options();
         self.tasks.spawn(TITLE, move |context| {
             let folder = RunFolder::create(&path)?;
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
@@ -70,13 +69,18 @@ impl Model {
                 false => prepare_with(scene, findings, &settings, timings, &context.stop, &tell)?,
             };
             let (prepared, fitter, settings) = open::begin(prepared, settings, &context.stop, &tell)?;
-            let started = Started::new(prepared, fitter, settings, folder, wake)?;
+            let started = Started::new(prepared, fitter, settings, folder, options)?;
             Ok(Done::FitStarted(Box::new(started)))
         });
     }
 
+    /// What the next job is given.
+    fn job_options(&mut self) -> JobOptions {
+        JobOptions { wake: Some(Arc::clone(&self.wake)), before_step: self.before_step.take() }
+    }
+
     fn go_on_with(&mut self, folder: RunFolder) {
-        let wake = Arc::clone(&self.wake);
+        let options = self.job_options();
         let wanted = self.edits.fit.clone();
         self.tasks.spawn(TITLE, move |context| {
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
@@ -86,7 +90,7 @@ impl Model {
                 fitter.change(wanted.clone())?;
                 settings.fit = wanted;
             }
-            let started = Started::new(prepared, fitter, settings, folder, wake)?;
+            let started = Started::new(prepared, fitter, settings, folder, options)?;
             Ok(Done::FitStarted(Box::new(started)))
         });
     }

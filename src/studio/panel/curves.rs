@@ -48,12 +48,13 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut CurvesMemory) {
         ui.checkbox(&mut memory.logarithmic, "Log axis");
         ui.separator();
         let chosen = memory.stage.clone().unwrap_or_else(|| "All stages".into());
-        ComboBox::from_id_salt("stage of curves").selected_text(chosen).show_ui(ui, |ui| {
+        let list = ComboBox::from_id_salt("stage of curves").selected_text(chosen).show_ui(ui, |ui| {
             ui.selectable_value(&mut memory.stage, None, "All stages");
             for stage in &stages {
                 ui.selectable_value(&mut memory.stage, Some(stage.clone()), stage);
             }
         });
+        list.response.accessible_name("Stage of the fit").on_hover_text("The stage whose curve is shown");
         figures(ui, rows);
     });
     let key = (rows.len(), memory.over_seconds, memory.logarithmic, memory.stage.clone());

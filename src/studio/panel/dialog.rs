@@ -185,9 +185,10 @@ fn save(ui: &mut Ui, model: &mut Model, request: &mut SaveRequest) -> bool {
         ui.label("Size in pixels");
         ui.horizontal(|ui| {
             let side = |value| DragValue::new(value).range(16..=8192).speed(4.0);
-            ui.add(side(&mut request.width)).on_hover_text("Width");
-            ui.label("x");
-            ui.add(side(&mut request.height)).on_hover_text("Height");
+            let label = ui.label("Width");
+            ui.add(side(&mut request.width)).labelled_by(label.id);
+            let label = ui.label("Height");
+            ui.add(side(&mut request.height)).labelled_by(label.id);
         });
         ui.end_row();
         let label = ui.label("Paths a pixel");

@@ -69,11 +69,13 @@ fn controls(ui: &mut Ui, model: &mut Model) {
         act_switch(ui, model, Act::SecondLight, "Two lights", two);
         if let Some(second) = model.edits.relight.second.clone() {
             let mut chosen = second.clone();
-            ComboBox::from_id_salt("second light").selected_text(chosen.label()).show_ui(ui, |ui| {
+            let label = ui.label("Second light");
+            let list = ComboBox::from_id_salt("second light").selected_text(chosen.label()).show_ui(ui, |ui| {
                 for light in model.shelf.lights() {
                     ui.selectable_value(&mut chosen, light.name.clone(), light.name.label());
                 }
             });
+            list.response.labelled_by(label.id);
             if chosen != second {
                 model.edits.relight.second = Some(chosen);
             }

@@ -137,11 +137,12 @@ fn display(ui: &mut Ui, model: &mut Model) {
         .on_hover_text("Pictures are scaled by two to this power\nKeys: E and Shift+E");
     let curve = &mut model.edits.display.curve;
     let name = ToneCurve::NAMED.iter().find(|(own, _)| own == curve).map_or("", |(_, name)| name);
-    ComboBox::from_id_salt("tone curve").selected_text(name).width(80.0).show_ui(ui, |ui| {
+    let list = ComboBox::from_id_salt("tone curve").selected_text(name).width(80.0).show_ui(ui, |ui| {
         for (own, name) in ToneCurve::NAMED {
             ui.selectable_value(curve, own, name);
         }
     });
+    list.response.accessible_name("Tone curve").on_hover_text("How radiance becomes brightness\nKey: K");
     act_switch(ui, model, Act::FalseColour, "False colour", model.edits.display.false_colour);
     act_switch(ui, model, Act::Stripes, "Clipping", model.edits.display.stripes);
 }

@@ -1,0 +1,234 @@
+//! The manners of a good tool: undo, the palette, every act everywhere, themes, help, zoom, the stage alone.
+
+use super::support::{Key, Modifiers, TestStudio};
+use patina::studio::act::availability::availability;
+use patina::studio::act::{Act, LIST};
+use patina::studio::layout::Panel;
+use patina::studio::model::lights::LightName;
+use patina::studio::model::store::ThemeChoice;
+use patina::studio::model::{Dialog, FitStatus};
+
+/// Frames until a change counts as one step of undo.
+const SETTLED: usize = 6;
+
+#[test]
+fn undo_and_redo_by_key_and_by_menu_show_in_the_fields() {
+    let mut studio = TestStudio::with_small_scene();
+    studio.frames(SETTLED);
+    studio.type_number("Samples", "8");
+    studio.frames(SETTLED);
+    studio.control("Strength").set_value_accesskit(1.5);
+    studio.frames(SETTLED);
+    studio.press(Modifiers::COMMAND, Key::Z);
+    assert_eq!((studio.number("Strength"), studio.number("Samples")), (0.0, 8.0));
+    studio.press(Modifiers::COMMAND, Key::Z);
+    assert_eq!(studio.number("Samples"), 2.0);
+    studio.click("Edit");
+    studio.click_first("Redo");
+    assert_eq!((studio.number("Strength"), studio.number("Samples")), (0.0, 8.0));
+    studio.press(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z);
+    assert_eq!(studio.number("Strength"), 1.5);
+    studio.press(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z);
+    assert!(studio.log().contains("Redo: nothing was taken back"), "{}", studio.log());
+}
+
+#[test]
+fn undo_within_a_text_belongs_to_the_text() {
+    let mut studio = TestStudio::with_small_scene();
+    studio.type_number("Samples", "8");
+    studio.frames(SETTLED);
+    studio.click("All settings");
+    studio.replace_text("Find a setting", "rate");
+    studio.press(Modifiers::COMMAND, Key::Z);
+    assert_eq!(studio.number("Samples"), 8.0);
+    // Nor does a letter that is typed do an act.
+    studio.press(Modifiers::NONE, Key::X);
+    assert!(studio.model().edits.fit.exclude.is_empty());
+}
+
+#[test]
+fn the_palette_finds_every_act_by_its_name() {
+    let mut studio = TestStudio::with_finished_run();
+    for info in LIST.iter().filter(|info| info.act != Act::Palette) {
+        studio.model().dialog = Dialog::Palette(info.name.into());
+        studio.frames(2);
+        let buttons = studio.controls(info.name);
+        let found = buttons.iter().any(|node| node.rect().width() > 400.0);
+        assert!(found, "{}: {buttons:?}", info.name);
+    }
+}
+
+#[test]
+fn the_palette_is_opened_typed_in_and_obeyed_by_keys() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.press(Modifiers::COMMAND, Key::K);
+    studio.type_text("next li");
+    studio.press(Modifiers::NONE, Key::Enter);
+    assert_eq!(studio.model().dialog, Dialog::None);
+    assert_ne!(studio.model().edits.relight.first, LightName::Fitted);
+    studio.press(Modifiers::COMMAND, Key::K);
+    studio.type_text("layer that is not there");
+    assert!(studio.says("No act is called so"));
+    studio.press(Modifiers::NONE, Key::Enter);
+    studio.press(Modifiers::NONE, Key::Escape);
+    assert_eq!(studio.model().dialog, Dialog::None);
+    // By arrows: the second of those found.
+    studio.press(Modifiers::COMMAND, Key::K);
+    studio.type_text("turn light");
+    studio.press(Modifiers::NONE, Key::ArrowDown);
+    studio.press(Modifiers::NONE, Key::Enter);
+    assert_eq!(studio.model().edits.relight.turn_degrees, 345.0, "Turn light right is the second");
+}
+
+/// Acts that leave the window, or what is open.
+const LEAVING: [Act; 3] = [Act::Quit, Act::OpenDemo, Act::CloseProject];
+
+/// Does every act once and holds that one that cannot be done says why.
+fn do_every_act(studio: &mut TestStudio) {
+    for info in LIST.iter().filter(|info| !LEAVING.contains(&info.act)) {
+        studio.model().log.clear();
+        let refused = availability(info.act, studio.model()).err();
+        studio.act(info.act);
+        if let Some(why) = refused {
+            let words = format!("{}: {why}", info.act.bare_name());
+            assert!(studio.log().contains(&words), "{words} is not in {}", studio.log());
+        }
+        studio.model().dialog = Dialog::None;
+        studio.frames(1);
+    }
+}
+
+#[test]
+fn every_act_can_be_asked_for_on_the_first_page() {
+    let mut studio = TestStudio::new();
+    do_every_act(&mut studio);
+    studio.act(Act::CloseProject);
+    assert!(studio.log().contains("open a scene first"), "{}", studio.log());
+    studio.control("Open the built-in demo");
+}
+
+#[test]
+fn every_act_can_be_asked_for_on_a_scene_and_while_a_fit_starts_and_stops() {
+    let mut studio = TestStudio::with_small_scene();
+    do_every_act(&mut studio);
+    studio.wait("rest", |model| !model.fit.status.is_live() && !model.tasks.is_busy());
+    studio.act(Act::CloseProject);
+    assert!(studio.model().project.is_none());
+}
+
+#[test]
+fn every_act_can_be_asked_for_on_a_run_and_while_a_fit_runs() {
+    let mut studio = TestStudio::with_finished_run();
+    do_every_act(&mut studio);
+    studio.wait("rest", |model| !model.fit.status.is_live() && !model.tasks.is_busy());
+    studio.act(Act::CloseProject);
+    let mut studio = TestStudio::with_running_fit();
+    do_every_act(&mut studio);
+    studio.act(Act::CloseProject);
+    assert_eq!((studio.model().project.is_none(), &studio.model().fit.status), (true, &FitStatus::Idle));
+    studio.control("Open the built-in demo");
+}
+
+#[test]
+fn every_menu_opens_and_holds_its_acts() {
+    let mut studio = TestStudio::with_finished_run();
+    for (group, title) in patina::studio::act::Group::ALL {
+        studio.click_first(title);
+        for info in LIST.iter().filter(|info| info.group == group) {
+            assert!(!studio.controls(info.name).is_empty(), "{title}: {}", info.name);
+        }
+        studio.press(Modifiers::NONE, Key::Escape);
+    }
+}
+
+#[test]
+fn each_theme_draws_every_panel() {
+    let mut studio = TestStudio::with_finished_run();
+    let mut grounds = Vec::new();
+    for _ in ThemeChoice::NAMED {
+        studio.press(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::T);
+        for (panel, title, _) in Panel::ALL {
+            studio.show(panel);
+            assert!(!studio.controls(title).is_empty(), "{title}");
+        }
+        let visuals = studio.harness.ctx.global_style().visuals.clone();
+        grounds.push((studio.model().preferences.theme, visuals.panel_fill, visuals.text_color()));
+    }
+    assert_eq!(studio.model().preferences.theme, ThemeChoice::System, "around");
+    let of = |theme| grounds.iter().find(|(own, ..)| *own == theme).map(|(_, ground, text)| (*ground, *text)).unwrap();
+    let (dark, light, strong) = (of(ThemeChoice::Dark), of(ThemeChoice::Light), of(ThemeChoice::HighContrast));
+    assert!(dark.0.r() < 64 && light.0.r() > 200 && strong.0.r() == 0 && strong.1.r() == 255, "{grounds:?}");
+}
+
+#[test]
+fn help_lists_every_act_and_closes() {
+    let mut studio = TestStudio::new();
+    studio.frames(1);
+    studio.press(Modifiers::NONE, Key::F1);
+    for info in LIST {
+        assert!(studio.says(info.name) && studio.says(info.help), "{}", info.name);
+    }
+    studio.click("Close");
+    assert_eq!(studio.model().dialog, Dialog::None);
+    studio.press(Modifiers::NONE, Key::Questionmark);
+    assert_eq!(studio.model().dialog, Dialog::Help);
+}
+
+#[test]
+fn the_interface_grows_one_step_a_press() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.press(Modifiers::COMMAND, Key::Plus);
+    assert!((studio.harness.ctx.zoom_factor() - 1.1).abs() < 1e-4, "{}", studio.harness.ctx.zoom_factor());
+    for _ in 0..30 {
+        studio.press(Modifiers::COMMAND, Key::Minus);
+    }
+    assert!(studio.harness.ctx.zoom_factor() >= 0.6);
+    studio.control("Fit again");
+    studio.press(Modifiers::COMMAND, Key::Num0);
+    assert_eq!(studio.harness.ctx.zoom_factor(), 1.0);
+}
+
+#[test]
+fn the_stage_stands_alone_and_everything_comes_back() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.press(Modifiers::SHIFT, Key::Tab);
+    assert!(studio.controls("Fit again").is_empty() && studio.controls("Edit").is_empty());
+    studio.press(Modifiers::SHIFT, Key::Tab);
+    studio.control("Fit again");
+    // A panel that is asked for shows, even from the stage alone.
+    studio.press(Modifiers::SHIFT, Key::Tab);
+    studio.press(Modifiers::COMMAND, Key::Num2);
+    studio.control("Leave out");
+}
+
+#[test]
+fn the_layout_is_put_back() {
+    let mut studio = TestStudio::with_finished_run();
+    let first = studio.harness.state().layout.visible();
+    for panel in [Panel::Views, Panel::Photo, Panel::Light, Panel::Record, Panel::Scores] {
+        studio.show(panel);
+    }
+    assert_ne!(studio.harness.state().layout.visible(), first);
+    studio.act(Act::ResetLayout);
+    assert_eq!(studio.harness.state().layout.visible(), first);
+}
+
+#[test]
+fn display_keys_change_what_they_say() {
+    let mut studio = TestStudio::with_finished_run();
+    let before = studio.model().edits.display;
+    studio.press(Modifiers::NONE, Key::E);
+    assert_eq!(studio.number("Exposure"), f64::from(before.exposure_stops) + 0.25);
+    studio.press(Modifiers::SHIFT, Key::E);
+    studio.press(Modifiers::SHIFT, Key::E);
+    assert_eq!(studio.number("Exposure"), f64::from(before.exposure_stops) - 0.25);
+    studio.press(Modifiers::NONE, Key::K);
+    studio.press(Modifiers::NONE, Key::L);
+    studio.press(Modifiers::NONE, Key::Z);
+    let display = studio.model().edits.display;
+    assert!(display.curve != before.curve && display.false_colour && display.stripes);
+    studio.press(Modifiers::NONE, Key::R);
+    assert_eq!(studio.model().edits.display, patina::image::display::DisplaySettings::default());
+    studio.press(Modifiers::NONE, Key::N);
+    assert!(studio.model().edits.display.exposure_stops.is_finite());
+}

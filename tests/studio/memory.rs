@@ -1,0 +1,79 @@
+//! What is remembered from one start to the next.
+
+use super::support::{Key, Modifiers, TestStudio, finished_run};
+use patina::studio::layout::Panel;
+use patina::studio::model::store::ThemeChoice;
+use std::sync::Arc;
+
+#[test]
+fn theme_size_layout_display_and_recents_survive_a_restart() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.model().preferences.theme = ThemeChoice::Light;
+    studio.press(Modifiers::COMMAND, Key::Plus);
+    studio.press(Modifiers::COMMAND, Key::Plus);
+    studio.show(Panel::Scores);
+    studio.press(Modifiers::NONE, Key::E);
+    studio.press(Modifiers::NONE, Key::E);
+    let folder = studio.close();
+
+    let mut again = TestStudio::in_folder(folder, Some(finished_run().into()));
+    again.wait("the run", |model| model.project.is_some());
+    assert_eq!(again.model().preferences.theme, ThemeChoice::Light);
+    assert!(again.harness.ctx.global_style().visuals.panel_fill.r() > 200, "the theme is in force");
+    assert!((again.harness.ctx.zoom_factor() - 1.2).abs() < 1e-4, "{}", again.harness.ctx.zoom_factor());
+    assert!(again.harness.state().layout.visible().contains(&Panel::Scores));
+    assert_eq!(again.model().edits.display.exposure_stops, 0.5);
+    assert_eq!(again.model().preferences.recents[0].path, finished_run());
+}
+
+#[test]
+fn damaged_settings_are_set_aside_and_told() {
+    let folder = Arc::new(tempfile::tempdir().unwrap());
+    patina::files::write_bytes(&folder.path().join("studio.json"), b"{ \"theme\": ").unwrap();
+    let mut studio = TestStudio::in_folder(Arc::clone(&folder), None);
+    studio.frames(1);
+    assert!(studio.says("settings are damaged") && studio.says("What helps"), "{}", studio.log());
+    studio.click("Dismiss");
+    studio.control("Open the built-in demo");
+    assert!(folder.path().join("studio.damaged.json").is_file());
+    studio.close();
+    let again = TestStudio::in_folder(folder, None);
+    assert!(again.log().is_empty(), "{}", again.log());
+}
+
+#[test]
+fn settings_that_cannot_be_written_are_told_once_and_stop_nothing() {
+    let folder = Arc::new(tempfile::tempdir().unwrap());
+    // A folder stands where the file should be.
+    std::fs::create_dir(folder.path().join("studio.json")).unwrap();
+    let mut studio = TestStudio::in_folder(folder, Some(finished_run().into()));
+    studio.wait("the run", |model| model.project.is_some());
+    studio.model().write_preferences();
+    studio.model().write_preferences();
+    studio.frames(2);
+    assert_eq!(studio.log().matches("could not be remembered").count(), 1, "{}", studio.log());
+    studio.control("Fit again");
+}
+
+#[test]
+fn a_remembered_light_that_vanished_is_told_and_the_others_are_there() {
+    let folder = Arc::new(tempfile::tempdir().unwrap());
+    let gone = folder.path().join("gone.hdr");
+    let text = format!("{{ \"lights\": [{:?}] }}", gone.display().to_string());
+    patina::files::write_bytes(&folder.path().join("studio.json"), text.as_bytes()).unwrap();
+    let mut studio = TestStudio::in_folder(folder, None);
+    studio.wait("the error", |model| model.log.banner().is_some());
+    assert!(studio.says("gone.hdr") && studio.says("What helps"), "{}", studio.log());
+    assert_eq!(studio.model().shelf.lights().len(), 3);
+}
+
+#[test]
+fn a_layout_of_another_version_is_replaced_by_the_first_one() {
+    let folder = Arc::new(tempfile::tempdir().unwrap());
+    let text = b"{ \"layout\": \"{\\\"root\\\": 3}\", \"zoom\": 90.0, \"theme\": \"dark\" }";
+    patina::files::write_bytes(&folder.path().join("studio.json"), text).unwrap();
+    let mut studio = TestStudio::in_folder(folder, Some(finished_run().into()));
+    studio.wait("the run", |model| model.project.is_some());
+    assert_eq!(studio.harness.ctx.zoom_factor(), 1.0);
+    assert!(studio.harness.state().layout.visible().contains(&Panel::Stage));
+}

@@ -1,0 +1,265 @@
+//! Each panel, empty and filled.
+
+use super::support::{Key, Modifiers, Role, TestStudio};
+use eframe::egui::{Event, PointerButton, Pos2};
+use egui_kittest::kittest::NodeT;
+use patina::error::{Finding, Place, Severity};
+use patina::studio::act::Act;
+use patina::studio::layout::Panel;
+use patina::studio::model::log::Message;
+
+#[test]
+fn a_panel_that_has_nothing_to_show_says_what_would_fill_it() {
+    let mut studio = TestStudio::with_small_scene();
+    for (panel, what) in [
+        (Panel::Maps, "No maps yet"),
+        (Panel::Light, "No light yet"),
+        (Panel::Record, "No texel"),
+        (Panel::Curves, "No curve yet"),
+        (Panel::Scores, "No scores yet"),
+        // Without an adapter there is nothing to draw with.
+        (Panel::Stage, "Nothing can draw in 3-D here"),
+    ] {
+        studio.show(panel);
+        assert!(studio.says(what), "{what}");
+    }
+    studio.model().log.clear();
+    studio.show(Panel::Messages);
+    assert!(studio.says("Nothing was noticed"));
+}
+
+#[test]
+fn every_control_of_every_panel_has_a_name() {
+    let mut studio = TestStudio::new();
+    studio.frames(2);
+    studio.harness.check_accessibility();
+    let mut studio = TestStudio::with_finished_run();
+    studio.act(Act::SecondLight);
+    for (panel, title, _) in Panel::ALL {
+        studio.show(panel);
+        let unnamed = studio.harness.unnamed_widgets();
+        assert!(unnamed.is_empty(), "{title}: {unnamed:#?}");
+    }
+}
+
+#[test]
+fn maps_are_switched_by_their_buttons() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.show(Panel::Maps);
+    assert!(studio.is_grey("Error") && studio.is_grey("Disagreement"), "not measured yet");
+    let size = studio.control("Map").value().unwrap();
+    assert!(size.contains("64 x 64"), "{size}");
+    // The toolbar has buttons of the same names: those of the panel lie below it.
+    for name in ["Specular", "Roughness", "Diffuse"] {
+        let mine = studio.controls(name).into_iter().find(|node| node.rect().left() > 900.0 && node.rect().top() > 60.0);
+        mine.unwrap().click();
+        studio.frames(2);
+        studio.control("Map");
+    }
+    studio.click("Seen");
+    assert!(studio.control("Seen").accesskit_node().toggled().is_some());
+    studio.click("Borders");
+    assert!(studio.model().switches.chart_borders);
+    studio.press(Modifiers::NONE, Key::B);
+    assert!(!studio.model().switches.chart_borders);
+    studio.click("Whole");
+
+    studio.act(Act::SurfaceLayers);
+    studio.wait_for_word("is spread over the surface");
+    studio.click("Error");
+    studio.click("Disagreement");
+    assert!(!studio.is_grey("Error"));
+}
+
+#[test]
+fn the_fitted_light_stands_against_the_true_one() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.show(Panel::Light);
+    assert!(studio.says("16 x 8 texels, mean radiance"));
+    for picture in ["Environment", "Mirror ball", "Matte ball"] {
+        studio.control(picture);
+    }
+    studio.click("Against the truth");
+    studio.control("Environment divider");
+}
+
+#[test]
+fn a_photo_is_compared_with_its_render() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.show(Panel::Photo);
+    studio.control("Photo alone");
+    studio.click("Wipe");
+    let mut waited = 0;
+    while studio.controls("Photo divider").is_empty() {
+        studio.frames(1);
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        waited += 1;
+        assert!(waited < 5000, "the render did not come; {}", studio.log());
+    }
+    let before = studio.number("Photo divider");
+    studio.control("Photo divider").focus();
+    studio.frames(2);
+    studio.press(Modifiers::NONE, Key::ArrowRight);
+    assert!(studio.number("Photo divider") > before, "the line is moved by keys too");
+    for way in ["Difference", "Photo alone"] {
+        studio.click(way);
+        assert!(studio.controls("Photo divider").is_empty());
+    }
+    studio.click("Left-out pixels");
+    let chosen = studio.model().project.as_ref().unwrap().chosen_view;
+    studio.controls("Next").last().unwrap().click();
+    studio.frames(2);
+    assert_eq!(studio.model().project.as_ref().unwrap().chosen_view, chosen + 1);
+    studio.press(Modifiers::NONE, Key::OpenBracket);
+    assert_eq!(studio.model().project.as_ref().unwrap().chosen_view, chosen);
+}
+
+/// Names of the photos from top to bottom.
+fn order(studio: &TestStudio) -> Vec<String> {
+    let is_row = |node: &egui_kittest::Node<'_>| node.accesskit_node().role() == Role::RadioButton;
+    let names = (0..6).flat_map(|index| {
+        let name = studio.harness.state().model.project.as_ref().unwrap().scene.as_ref().unwrap().views[index].name.clone();
+        let rows = studio.controls(&format!("photo {name}"));
+        rows.into_iter().filter(is_row).map(move |node| (node.rect().top(), name.clone())).collect::<Vec<_>>()
+    });
+    let mut names: Vec<(f32, String)> = names.collect();
+    names.sort_by(|a, b| a.0.total_cmp(&b.0));
+    names.into_iter().map(|(_, name)| name).collect()
+}
+
+#[test]
+fn the_table_of_photos_sorts_chooses_and_looks_through() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.show(Panel::Views);
+    let by_name = order(&studio);
+    assert_eq!(by_name.len(), 6);
+    assert!(by_name.windows(2).all(|pair| pair[0] < pair[1]), "{by_name:?}");
+    studio.click("Photo +");
+    let mut backwards = by_name.clone();
+    backwards.reverse();
+    assert_eq!(order(&studio), backwards);
+    studio.click("RMSE");
+    let error = |studio: &TestStudio, name: &str| {
+        let project = studio.harness.state().model.project.as_ref().unwrap();
+        let index = project.scene.as_ref().unwrap().views.iter().position(|view| view.name == name).unwrap();
+        project.view_errors[index].unwrap()
+    };
+    let errors: Vec<f32> = order(&studio).iter().map(|name| error(&studio, name)).collect();
+    assert!(errors.windows(2).all(|pair| pair[0] >= pair[1]), "worst first: {errors:?}");
+    assert!(studio.says("held out") && studio.says("fitted"));
+
+    let last = format!("photo {}", by_name[5]);
+    studio.click(&last);
+    let project = studio.model().project.as_ref().unwrap();
+    assert_eq!(project.chosen_name(), Some(by_name[5].as_str()));
+    let centre = studio.control(&last).rect().center();
+    double_click(&mut studio, centre);
+    assert!(studio.model().switches.looking_through);
+    studio.press(Modifiers::NONE, Key::C);
+    assert!(!studio.model().switches.looking_through);
+}
+
+/// Two clicks within one frame, quicker than the harness' clock.
+fn double_click(studio: &mut TestStudio, at: Pos2) {
+    studio.frames(4);
+    let button = |pressed| Event::PointerButton { pos: at, button: PointerButton::Primary, pressed, modifiers: Modifiers::NONE };
+    let events = [Event::PointerMoved(at), button(true), button(false), button(true), button(false)];
+    studio.harness.input_mut().events.extend(events);
+    studio.frames(3);
+}
+
+#[test]
+fn a_texel_that_is_pinned_on_a_map_tells_what_every_photo_says() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.show(Panel::Maps);
+    studio.show(Panel::Record);
+    // Some texel of the map belongs to a chart that photos see.
+    let map = studio.control("Map").rect();
+    let mut found = false;
+    for place in 1..40 {
+        let at = map.lerp_inside(eframe::egui::vec2(0.3 + 0.01 * place as f32, 0.25 + 0.012 * place as f32));
+        for pressed in [true, false] {
+            studio.harness.event(Event::PointerMoved(at));
+            let button = PointerButton::Primary;
+            studio.harness.event(Event::PointerButton { pos: at, button, pressed, modifiers: Modifiers::NONE });
+        }
+        studio.frames(3);
+        if studio.says("Pinned texel") {
+            found = true;
+            break;
+        }
+    }
+    assert!(found, "no texel could be pinned");
+    let mut waited = 0;
+    while !studio.says("What each photo says") {
+        studio.frames(1);
+        std::thread::sleep(std::time::Duration::from_millis(10));
+        waited += 1;
+        assert!(waited < 5000, "no record came; {}", studio.log());
+    }
+    for words in ["Texel row", "Roughness", "Seen by", "Spread of views", "Nearest to highlight"] {
+        assert!(studio.says(words), "{words}");
+    }
+    studio.click("Let go");
+    assert!(studio.says("No texel") || studio.says("Texel under the cursor"));
+}
+
+#[test]
+fn a_finding_with_a_place_is_a_link_that_goes_there() {
+    let mut studio = TestStudio::with_small_scene();
+    let name = studio.model().project.as_ref().unwrap().scene.as_ref().unwrap().views[3].name.clone();
+    let finding = |place: Place, words: &str| Message::from(&Finding::new(Severity::Warning, "test", words).at(place));
+    let log = &mut studio.model().log;
+    log.clear();
+    log.add(finding(Place::View(name.clone()), "this photo is dark"));
+    log.add(finding(Place::Setting("rate-light".into()), "this rate is high"));
+    studio.frames(1);
+    assert!(studio.says("2 to look at"));
+    studio.click("2 to look at");
+    assert!(!studio.says("to look at"), "looked at");
+    assert!(studio.says("This photo is dark"));
+    let link = Place::View(name.clone()).to_string();
+    studio.click(&link);
+    assert_eq!(studio.model().project.as_ref().unwrap().chosen_view, 3);
+    assert!(studio.harness.state().layout.visible().contains(&Panel::Photo));
+    let link = Place::Setting("rate-light".into()).to_string();
+    studio.click(&link);
+    assert!(studio.harness.state().layout.visible().contains(&Panel::Fit));
+    assert!(!studio.controls("Rate light").is_empty(), "the form opens at the setting");
+}
+
+#[test]
+fn curves_are_drawn_over_steps_and_seconds_whole_and_by_stage() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.show(Panel::Curves);
+    for control in ["Over seconds", "Log axis", "Over steps", "Log axis"] {
+        studio.click(control);
+    }
+    let stage = studio.model().fit.losses[0].stage.clone();
+    studio.click("Stage of the fit");
+    studio.click(&stage);
+    assert_eq!(studio.control("Stage of the fit").value().as_deref(), Some(stage.as_str()));
+    assert!(studio.says("Held-out RMSE"));
+}
+
+#[test]
+fn scores_under_other_lights_are_measured_when_asked_for() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.show(Panel::Scores);
+    studio.click("Compare under other lights");
+    studio.wait("the comparison", |model| model.project.as_ref().is_some_and(|own| own.entanglement.is_some()));
+    assert!(studio.says("light that went into the maps"), "{}", studio.log());
+    assert!(studio.controls("Compare under other lights").is_empty());
+}
+
+#[test]
+fn the_photo_lies_over_the_stage_and_against_it() {
+    use patina::studio::model::edits::PhotoLook;
+    let mut studio = TestStudio::with_finished_run();
+    studio.press(Modifiers::NONE, Key::G);
+    assert_eq!((studio.model().edits.photo, studio.model().switches.looking_through), (PhotoLook::Over(1.0), true));
+    studio.press(Modifiers::NONE, Key::W);
+    assert_eq!(studio.model().edits.photo, PhotoLook::Wipe(0.5));
+    studio.press(Modifiers::NONE, Key::C);
+    assert_eq!((studio.model().edits.photo, studio.model().switches.looking_through), (PhotoLook::Off, false));
+}

@@ -1,0 +1,215 @@
+//! The window as it is seen, drawn by whatever adapter there is. Properties of pixels are held, not the pixels: every
+//! adapter rounds in its own way.
+
+use super::support::{Key, Modifiers, Role, TestStudio, finished_run};
+use eframe::egui::{Event, PointerButton, Pos2, Rect};
+use eframe::wgpu;
+use egui_kittest::Harness;
+use image::RgbaImage;
+use patina::studio::layout::Panel;
+use patina::studio::model::LightName;
+use patina::studio::model::store::ThemeChoice;
+use std::future::Future;
+use std::path::PathBuf;
+use std::pin::pin;
+use std::sync::Arc;
+use std::task::{Context, Poll, Waker};
+
+/// Whether there is anything to draw with, a software adapter included; says so when there is not.
+fn has_adapter() -> bool {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+    let mut search = pin!(instance.enumerate_adapters(wgpu::Backends::all()));
+    let found = loop {
+        if let Poll::Ready(adapters) = search.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
+            break !adapters.is_empty();
+        }
+    };
+    if !found {
+        println!("skipped: no graphics adapter");
+    }
+    found
+}
+
+/// A window that is drawn, with the finished run open.
+fn drawn(size: [f32; 2], pixels_per_point: f32) -> TestStudio {
+    let builder = Harness::builder()
+        .with_size(size)
+        .with_pixels_per_point(pixels_per_point)
+        .with_render_cursor(false)
+        .wgpu();
+    let folder = Arc::new(tempfile::tempdir().unwrap());
+    let mut studio = TestStudio::built(builder, folder, Some(finished_run().into()));
+    studio.wait("the run", |model| model.project.is_some());
+    studio.frames(3);
+    studio
+}
+
+/// The whole window. Where `PATINA_WINDOW_PICTURES` names a folder, the picture is kept there, to be looked at.
+fn picture(studio: &mut TestStudio, name: &str) -> RgbaImage {
+    // What was uploaded for one frame is on the screen in the next.
+    for _ in 0..3 {
+        studio.frames(1);
+        studio.harness.render().unwrap();
+    }
+    let picture = studio.harness.render().unwrap();
+    if let Some(folder) = std::env::var_os("PATINA_WINDOW_PICTURES") {
+        picture.save(PathBuf::from(folder).join(format!("window_{name}.png"))).unwrap();
+    }
+    picture
+}
+
+fn stage_rect(studio: &TestStudio) -> Rect {
+    studio.control("Stage").rect()
+}
+
+/// Pixels of a part of the window.
+fn part(picture: &RgbaImage, rect: Rect, pixels_per_point: f32) -> Vec<[u8; 3]> {
+    let side = |value: f32| (value * pixels_per_point) as u32;
+    let (left, right) = (side(rect.left()), side(rect.right()).min(picture.width()));
+    let (top, bottom) = (side(rect.top()), side(rect.bottom()).min(picture.height()));
+    let pixels = (top..bottom).flat_map(|row| (left..right).map(move |column| (column, row)));
+    pixels.map(|(column, row)| picture.get_pixel(column, row)).map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect()
+}
+
+/// Share of pixels that differ by more than rounding.
+fn share_changed(before: &[[u8; 3]], after: &[[u8; 3]]) -> f64 {
+    assert_eq!(before.len(), after.len());
+    let differ = |(a, b): &(&[u8; 3], &[u8; 3])| (0..3).any(|channel| a[channel].abs_diff(b[channel]) > 6);
+    before.iter().zip(after).filter(differ).count() as f64 / before.len() as f64
+}
+
+#[test]
+fn the_stage_shows_the_mesh_and_changes_with_layer_and_light() {
+    if !has_adapter() {
+        return;
+    }
+    let mut studio = drawn([1440.0, 900.0], 1.0);
+    let rect = stage_rect(&studio);
+    let seen = |studio: &mut TestStudio, name: &str| part(&picture(studio, name), rect, 1.0);
+    let lit = seen(&mut studio, "fitted");
+    let colours: std::collections::HashSet<_> = lit.iter().collect();
+    assert!(colours.len() > 500, "only {} colours on the stage", colours.len());
+    assert!(share_changed(&lit, &seen(&mut studio, "fitted")) < 0.002, "nothing changed, nothing moves");
+
+    studio.press(Modifiers::NONE, Key::Num2);
+    let diffuse = seen(&mut studio, "diffuse");
+    assert!(share_changed(&lit, &diffuse) > 0.3, "{}", share_changed(&lit, &diffuse));
+    studio.press(Modifiers::NONE, Key::Num5);
+    assert!(share_changed(&diffuse, &seen(&mut studio, "normal")) > 0.1);
+
+    studio.click_role(Role::RadioButton, "Evening sky");
+    let evening = seen(&mut studio, "evening");
+    assert!(share_changed(&lit, &evening) > 0.3);
+    studio.press(Modifiers::SHIFT, Key::ArrowLeft);
+    assert!(share_changed(&evening, &seen(&mut studio, "evening_turned")) > 0.1);
+    studio.press(Modifiers::NONE, Key::Home);
+    assert!(share_changed(&lit, &seen(&mut studio, "fitted_again")) < 0.01, "the fitted light is as before");
+    studio.press(Modifiers::NONE, Key::M);
+    let two = seen(&mut studio, "two_lights");
+    let changed = share_changed(&lit, &two);
+    assert!(changed > 0.1 && changed < 0.9, "one half is as before: {changed}");
+}
+
+/// Moves the mouse with the button down, in steps.
+fn drag(studio: &mut TestStudio, from: Pos2, to: Pos2, modifiers: Modifiers) {
+    let button = |pos, pressed| Event::PointerButton { pos, button: PointerButton::Primary, pressed, modifiers };
+    studio.harness.event_modifiers(Event::PointerMoved(from), modifiers);
+    studio.harness.event_modifiers(button(from, true), modifiers);
+    for step in 1..=5 {
+        let at = from.lerp(to, step as f32 / 5.0);
+        studio.harness.event_modifiers(Event::PointerMoved(at), modifiers);
+    }
+    studio.harness.event_modifiers(button(to, false), modifiers);
+    studio.frames(3);
+}
+
+#[test]
+fn a_drag_orbits_with_shift_it_turns_the_light_and_a_click_pins_a_texel() {
+    if !has_adapter() {
+        return;
+    }
+    let mut studio = drawn([1440.0, 900.0], 1.0);
+    let rect = stage_rect(&studio);
+    let (eye, from) = (studio.model().eye, rect.center());
+    let to = from + eframe::egui::vec2(60.0, 0.0);
+    drag(&mut studio, from, to, Modifiers::SHIFT);
+    let turned = studio.model().edits.relight.turn_degrees;
+    assert!((turned - 24.0).abs() < 3.0, "60 points turn by 24 degrees, not {turned}");
+    assert_eq!(studio.model().eye, eye, "the eye stays");
+    drag(&mut studio, from, to, Modifiers::NONE);
+    assert_ne!(studio.model().eye, eye);
+    assert_eq!(studio.model().edits.relight.turn_degrees, turned, "the light stays");
+    studio.press(Modifiers::NONE, Key::F);
+
+    // The line between two lights is dragged by its grip.
+    studio.press(Modifiers::NONE, Key::M);
+    drag(&mut studio, rect.center(), rect.center() - eframe::egui::vec2(0.25 * rect.width(), 0.0), Modifiers::NONE);
+    let wipe = studio.model().edits.relight.wipe;
+    assert!((wipe - 0.25).abs() < 0.03, "{wipe}");
+    studio.press(Modifiers::NONE, Key::M);
+
+    studio.press(Modifiers::NONE, Key::V);
+    for pressed in [true, false] {
+        studio.harness.event(Event::PointerMoved(from));
+        let button = PointerButton::Primary;
+        studio.harness.event(Event::PointerButton { pos: from, button, pressed, modifiers: Modifiers::NONE });
+    }
+    studio.frames(3);
+    assert!(studio.model().cursor.is_some_and(|cursor| cursor.pinned), "the middle of the scene is surface");
+    assert!(studio.says("Pinned texel"), "its record comes to the front");
+}
+
+#[test]
+fn the_traced_preview_takes_the_place_of_the_quick_look_and_shadows_appear() {
+    if !has_adapter() {
+        return;
+    }
+    let mut studio = drawn([1024.0, 640.0], 1.0);
+    studio.click_role(Role::RadioButton, "Noon sky");
+    let rect = stage_rect(&studio);
+    let quick = part(&picture(&mut studio, "quick"), rect, 1.0);
+    studio.press(Modifiers::NONE, Key::T);
+    let mut changed = 0.0;
+    for _ in 0..600 {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        studio.frames(1);
+        if studio.harness.state().model.switches.traced {
+            changed = share_changed(&quick, &part(&picture(&mut studio, "traced"), rect, 1.0));
+        }
+        if changed > 0.2 {
+            break;
+        }
+    }
+    assert!(changed > 0.2, "{changed}; {}", studio.log());
+}
+
+#[test]
+fn the_window_is_drawn_in_every_theme_and_size() {
+    if !has_adapter() {
+        return;
+    }
+    for (size, pixels_per_point, name) in
+        [([1440.0, 900.0], 1.0, "1440"), ([1024.0, 640.0], 1.0, "1024"), ([1024.0, 640.0], 2.0, "1024_twice")]
+    {
+        let mut studio = drawn(size, pixels_per_point);
+        for (theme, word) in
+            [(ThemeChoice::Dark, "dark"), (ThemeChoice::Light, "light"), (ThemeChoice::HighContrast, "strong")]
+        {
+            studio.model().preferences.theme = theme;
+            let picture = picture(&mut studio, &format!("{name}_{word}"));
+            assert_eq!(picture.width(), (size[0] * pixels_per_point) as u32);
+            let window = Rect::from_min_size(Pos2::ZERO, size.into());
+            let colours: std::collections::HashSet<_> = part(&picture, window, pixels_per_point).into_iter().collect();
+            assert!(colours.len() > 1000, "{name} {word}: {} colours", colours.len());
+        }
+        for (panel, title, _) in Panel::ALL {
+            studio.show(panel);
+            if std::env::var_os("PATINA_WINDOW_PICTURES").is_some() {
+                picture(&mut studio, &format!("{name}_panel_{}", title.to_lowercase()));
+            }
+            let rect = studio.controls(title).last().unwrap().rect();
+            assert!(rect.right() <= size[0] && rect.bottom() <= size[1], "{title} at {rect:?}");
+        }
+        assert_eq!(studio.model().edits.relight.first, LightName::Fitted);
+    }
+}

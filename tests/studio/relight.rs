@@ -1,0 +1,172 @@
+//! The shelf of lights: swap, turn, strengthen, two side by side, lights of one's own.
+
+use super::support::{Key, Modifiers, Role, TestStudio};
+use eframe::egui;
+use glam::Vec3;
+use patina::image::{RgbImage, file};
+use patina::studio::model::LightName;
+use patina::studio::stage::Layer;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A file that is dropped on the window.
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        std::fs::read(&self.0).map_err(|error| error.to_string())
+    }
+}
+
+fn drop_on_window(studio: &mut TestStudio, path: &Path) {
+    studio.harness.input_mut().dropped_files.push(Arc::new(Dropped(path.into())));
+    studio.frames(1);
+}
+
+/// A light from the left that no sky resembles.
+fn write_light(folder: &Path, name: &str) -> PathBuf {
+    let path = folder.join(name);
+    let light = RgbImage::from_fn(32, 16, |_, column| if column < 8 { Vec3::new(8.0, 1.0, 0.5) } else { Vec3::ZERO });
+    match name.ends_with("exr") {
+        true => file::write_exr_rgb(&path, &light).unwrap(),
+        false => file::write_hdr(&path, &light).unwrap(),
+    }
+    path
+}
+
+fn sky(name: &str) -> LightName {
+    LightName::Sky(name.into())
+}
+
+#[test]
+fn lights_are_swapped_by_click_and_by_arrow_and_the_fitted_one_comes_back() {
+    let mut studio = TestStudio::with_finished_run();
+    assert_eq!(studio.model().edits.relight.first, LightName::Fitted);
+    studio.model().edits.layer = Layer::Diffuse;
+    studio.click_role(Role::RadioButton, "Noon sky");
+    assert_eq!((&studio.model().edits.relight.first, studio.model().edits.layer), (&sky("noon"), Layer::Lit));
+    studio.press(Modifiers::NONE, Key::ArrowRight);
+    assert_eq!(studio.model().edits.relight.first, sky("evening"));
+    studio.press(Modifiers::NONE, Key::ArrowLeft);
+    studio.press(Modifiers::NONE, Key::ArrowLeft);
+    assert_ne!(studio.model().edits.relight.first, sky("noon"), "the shelf goes on before the skies");
+    studio.press(Modifiers::NONE, Key::Home);
+    assert_eq!(studio.model().edits.relight.first, LightName::Fitted);
+    studio.click_role(Role::RadioButton, "Overcast sky");
+    studio.press(Modifiers::NONE, Key::ArrowRight);
+    assert_eq!(studio.model().edits.relight.first, LightName::Fitted, "the shelf goes around");
+}
+
+#[test]
+fn the_light_turns_by_key_and_slider_and_is_made_stronger() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.press(Modifiers::SHIFT, Key::ArrowLeft);
+    assert_eq!(studio.number("Turn"), 15.0);
+    studio.press(Modifiers::SHIFT, Key::ArrowRight);
+    studio.press(Modifiers::SHIFT, Key::ArrowRight);
+    assert_eq!(studio.number("Turn"), 345.0, "around, not below zero");
+    studio.control("Turn").set_value_accesskit(90.0);
+    studio.control("Strength").set_value_accesskit(2.0);
+    studio.frames(2);
+    assert_eq!((studio.number("Turn"), studio.number("Strength")), (90.0, 2.0));
+    let stage_light = studio.model().stage_light(&LightName::Fitted).unwrap();
+    let traced = studio.model().traced_light(&LightName::Fitted).unwrap();
+    let ratio = traced.mean_radiance() / stage_light.mean_radiance();
+    assert!((ratio - Vec3::splat(4.0)).abs().max_element() < 0.1, "two stops are four times: {ratio}");
+}
+
+#[test]
+fn brightness_is_matched_unless_it_is_not_wished() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.click_role(Role::RadioButton, "Noon sky");
+    let luminance = |studio: &mut TestStudio, name: &LightName| {
+        patina::math::luminance(studio.model().stage_light(name).unwrap().mean_radiance())
+    };
+    let fitted = luminance(&mut studio, &LightName::Fitted);
+    assert!((luminance(&mut studio, &sky("noon")) / fitted - 1.0).abs() < 1e-2);
+    studio.click("Match brightness");
+    let own = patina::math::luminance(studio.model().shelf.find(&sky("noon")).unwrap().environment.mean_radiance());
+    assert_eq!(luminance(&mut studio, &sky("noon")), own);
+}
+
+#[test]
+fn two_lights_stand_side_by_side() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.click("Two lights");
+    let second = studio.model().edits.relight.second.clone().unwrap();
+    assert_ne!(second, LightName::Fitted);
+    studio.click("Second light");
+    studio.click_role(Role::Button, "Overcast sky");
+    assert_eq!(studio.model().edits.relight.second, Some(sky("overcast")));
+    studio.press(Modifiers::NONE, Key::M);
+    assert_eq!(studio.model().edits.relight.second, None);
+    assert!(studio.controls("Second light").is_empty());
+}
+
+#[test]
+fn the_strip_shows_the_view_under_every_light_and_a_click_takes_one() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.click("Strip of lights");
+    studio.wait("the strip", |model| model.project.as_ref().is_some_and(|own| !own.strip.is_empty()));
+    assert_eq!(studio.model().project.as_ref().unwrap().strip.len(), studio.model().shelf.lights().len());
+    studio.control("view under Overcast sky").click_accesskit();
+    studio.frames(2);
+    assert_eq!(studio.model().edits.relight.first, sky("overcast"));
+}
+
+#[test]
+fn a_light_comes_by_path_or_by_drop_lights_the_stage_and_goes_again() {
+    let mut studio = TestStudio::with_finished_run();
+    let folder = tempfile::tempdir().unwrap();
+    let by_path = write_light(folder.path(), "left.hdr");
+    studio.press(Modifiers::COMMAND, Key::L);
+    assert!(studio.says("Add an HDR map to the shelf"));
+    studio.type_text(&by_path.display().to_string());
+    studio.click("Open this");
+    studio.wait_for_word("Left is on the shelf");
+    studio.click_role(Role::RadioButton, "left");
+    assert_eq!(studio.model().edits.relight.first, LightName::File(by_path.clone()));
+
+    let dropped = write_light(folder.path(), "other.exr");
+    drop_on_window(&mut studio, &dropped);
+    studio.wait_for_word("Other is on the shelf");
+    assert_eq!(studio.model().preferences.lights, [by_path.clone(), dropped]);
+
+    studio.controls("left")[0].click_button(egui::PointerButton::Secondary);
+    studio.frames(3);
+    studio.click("Take off the shelf");
+    assert!(studio.controls("left").is_empty());
+    assert_eq!(studio.model().edits.relight.first, LightName::Fitted, "what lit the stage is gone");
+    assert_eq!(studio.model().preferences.lights.len(), 1);
+}
+
+#[test]
+fn a_file_that_is_no_light_is_told_with_a_remedy() {
+    let mut studio = TestStudio::with_finished_run();
+    let folder = tempfile::tempdir().unwrap();
+    let bad = folder.path().join("bad.hdr");
+    patina::files::write_bytes(&bad, b"not a picture").unwrap();
+    drop_on_window(&mut studio, &bad);
+    studio.wait("the error", |model| model.log.banner().is_some());
+    assert!(studio.says("What helps") && studio.says("bad.hdr"), "{}", studio.log());
+    studio.click("Dismiss");
+    let count = studio.model().shelf.lights().len();
+    drop_on_window(&mut studio, &folder.path().join("nowhere.exr"));
+    studio.wait("the error", |model| model.log.banner().is_some());
+    assert_eq!(studio.model().shelf.lights().len(), count);
+    assert!(studio.model().preferences.lights.is_empty(), "what could not be read is not remembered");
+}
+
+#[test]
+fn a_run_that_is_dropped_is_opened() {
+    let mut studio = TestStudio::new();
+    studio.frames(1);
+    drop_on_window(&mut studio, super::support::finished_run());
+    studio.wait("the run", |model| model.project.is_some());
+    studio.control("Fit again");
+}
