@@ -205,7 +205,7 @@ pub struct StageLook {
     /// Colour of what is selected.
     pub accent: Color32,
     /// Pixels drawn per pixel of the screen, along a side: 0.5 while something moves on a slow adapter, 2 for smooth
-    /// edges on a quick one. In [0.25, 2].
+    /// edges on a quick one. In [0.25, 2]. Below 1, a mesh of very many triangles is drawn with fewer.
     pub resolution_scale: f32,
 }
 

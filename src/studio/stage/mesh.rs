@@ -1,5 +1,6 @@
 //! A mesh on the graphics adapter.
 
+use super::coarse;
 use super::pipelines::MeshCorner;
 use super::texels::Maker;
 use crate::error::{Finding, Severity};
@@ -9,10 +10,18 @@ use glam::Vec3;
 use rayon::prelude::*;
 use std::borrow::Cow;
 
+/// A mesh of more triangles has a coarse twin.
+const MANY_TRIANGLES: usize = 60_000;
+
+/// Indices and their number.
+pub(super) type Indices = (wgpu::Buffer, u32);
+
 /// Corners and indices, or why there are none.
 pub(super) struct GpuMesh {
-    /// Corners, indices and their number.
-    pub buffers: Option<(wgpu::Buffer, wgpu::Buffer, u32)>,
+    /// Corners, and the indices of all triangles.
+    pub buffers: Option<(wgpu::Buffer, Indices)>,
+    /// Indices of fewer triangles, for a mesh of many.
+    pub coarse: Option<Indices>,
     /// Lower and upper corner in the world.
     pub bounds: Option<(Vec3, Vec3)>,
     /// What the user should know.
@@ -24,6 +33,7 @@ impl GpuMesh {
     pub fn new(maker: &Maker, mesh: &Mesh) -> Self {
         let refused = |code, message: String, remedy: &str| GpuMesh {
             buffers: None,
+            coarse: None,
             bounds: None,
             findings: vec![Finding::new(Severity::Warning, code, message).remedy(remedy)],
         };
@@ -31,7 +41,7 @@ impl GpuMesh {
             return refused("stage-mesh-invalid", error.to_string(), error.remedy_text());
         }
         if mesh.triangles.is_empty() {
-            return GpuMesh { buffers: None, bounds: None, findings: Vec::new() };
+            return GpuMesh { buffers: None, coarse: None, bounds: None, findings: Vec::new() };
         }
         let largest = maker.device.limits().max_buffer_size;
         let bytes = (mesh.positions.len() * size_of::<MeshCorner>()).max(mesh.triangles.len() * 12) as u64;
@@ -69,10 +79,17 @@ impl GpuMesh {
             buffer
         };
         let vertices = upload("stage corners", bytemuck::cast_slice(&corners), wgpu::BufferUsages::VERTEX);
-        let indices = upload("stage indices", bytemuck::cast_slice(&mesh.triangles), wgpu::BufferUsages::INDEX);
+        let indices = |triangles: &[[u32; 3]]| {
+            let buffer = upload("stage indices", bytemuck::cast_slice(triangles), wgpu::BufferUsages::INDEX);
+            (buffer, 3 * triangles.len() as u32)
+        };
+        let bounds = mesh.bounds();
+        let few =
+            bounds.filter(|_| mesh.triangles.len() > MANY_TRIANGLES).map(|bounds| coarse::triangles(&mesh, bounds));
         GpuMesh {
-            buffers: Some((vertices, indices, 3 * mesh.triangles.len() as u32)),
-            bounds: mesh.bounds(),
+            buffers: Some((vertices, indices(&mesh.triangles))),
+            coarse: few.filter(|few| !few.is_empty()).map(|few| indices(&few)),
+            bounds,
             findings: Vec::new(),
         }
     }

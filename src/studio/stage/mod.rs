@@ -11,6 +11,7 @@
 //! | [`frustum`] | cameras as pyramids, and picking them |
 //! | `light` | a light blurred for quick shading, and what that leaves out |
 //! | `texels`, `mesh`, `slot` | uploads, on another thread where they are large |
+//! | `coarse` | fewer triangles while a large mesh is turned on a slow adapter |
 //! | `pipelines`, `uniforms`, `shader/` | the fixed part of the drawing, and what it is told |
 //! | `overlay`, `renderer` | the part that changes, and when the scene is drawn anew |
 //!
@@ -22,6 +23,7 @@
 //! [`StageContent::traced`]), picking on the surface ([`crate::trace::Bvh`] does), reading the mouse for anything but
 //! the eye, and panicking: content that cannot be shown is told by [`StageStatus::findings`].
 
+mod coarse;
 pub mod content;
 pub mod eye;
 pub mod frustum;

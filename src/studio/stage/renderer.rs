@@ -161,7 +161,7 @@ impl StageRenderer {
         let view = ViewUniform::new(frame, &sizes, bounds);
         if changed || self.drawn != Some(view) {
             self.maker.queue.write_buffer(&self.view_buffer, 0, bytemuck::bytes_of(&view));
-            self.draw_scene(encoder);
+            self.draw_scene(encoder, frame.look.resolution_scale < 1.0);
             self.drawn = Some(view);
             self.status.scenes_drawn += 1;
         }
@@ -273,7 +273,7 @@ impl StageRenderer {
     }
 
     /// Records the scene and then the frustums over it.
-    fn draw_scene(&self, encoder: &mut wgpu::CommandEncoder) {
+    fn draw_scene(&self, encoder: &mut wgpu::CommandEncoder, coarsely: bool) {
         let Some(targets) = &self.targets else { return };
         let (device, pipelines) = (&self.maker.device, &self.pipelines);
         let view = bind(device, &pipelines.view_layout, &[self.view_buffer.as_entire_binding()]);
@@ -308,7 +308,10 @@ impl StageRenderer {
         }
         pass.set_pipeline(&pipelines.behind);
         pass.draw(0..3, 0..1);
-        if let Some((corners, indices, count)) = self.mesh.shown().and_then(|mesh| mesh.buffers.as_ref()) {
+        if let Some(mesh) = self.mesh.shown()
+            && let Some((corners, all)) = &mesh.buffers
+        {
+            let (indices, count) = mesh.coarse.as_ref().filter(|_| coarsely).unwrap_or(all);
             pass.set_pipeline(&pipelines.mesh);
             pass.set_vertex_buffer(0, corners.slice(..));
             pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
