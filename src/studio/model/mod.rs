@@ -213,6 +213,9 @@ pub struct Model {
     pub peek_photo: bool,
     /// Called from any thread when the window should look again.
     pub wake: Wake,
+    /// Called before each step of a fit with the number of steps done, on its thread; for `patina bench studio`.
+    #[doc(hidden)]
+    pub before_step: Option<Arc<dyn Fn(usize) + Send + Sync>>,
 }
 
 impl Model {
@@ -251,6 +254,7 @@ impl Model {
             peek_photo: false,
             light_was_chosen_for_us: None,
             wake,
+            before_step: None,
         };
         for path in model.preferences.lights.clone() {
             model.add_light(path);

@@ -28,10 +28,11 @@ impl Started {
         fitter: Fitter,
         settings: RunSettings,
         folder: RunFolder,
+        mut options: JobOptions,
         wake: super::tasks::Wake,
     ) -> Result<Self> {
         let (fit, surface) = (settings.fit.clone(), Arc::clone(&prepared.surface));
-        let options = JobOptions { wake: Some(wake), ..JobOptions::default() };
+        options.wake = Some(wake);
         let job = job::start_with(prepared, fitter, settings, folder.clone(), options)?;
         Ok(Started { job, folder, settings: fit, surface })
     }
@@ -57,7 +58,7 @@ impl Model {
         settings.fit = self.edits.fit.clone();
         let path = store::new_run_folder(&self.runs_folder(), &project.title);
         let (findings, timings, quality) = (project.findings.clone(), project.timings.clone(), project.quality.clone());
-        let wake = Arc::clone(&self.wake);
+        let (wake, options) = (Arc::clone(&self.wake), self.job_options());
         // The atlas keeps its charts apart at the size it was made for; other map sizes need another atlas.
         let same_atlas = project.settings.fit.map_size == settings.fit.map_size || project.is_run;
         self.fit.losses.clear();
@@ -70,13 +71,19 @@ impl Model {
                 false => prepare_with(scene, findings, &settings, timings, &context.stop, &tell)?,
             };
             let (prepared, fitter, settings) = open::begin(prepared, settings, &context.stop, &tell)?;
-            let started = Started::new(prepared, fitter, settings, folder, wake)?;
+            let started = Started::new(prepared, fitter, settings, folder, options, wake)?;
             Ok(Done::FitStarted(Box::new(started)))
         });
     }
 
+    fn job_options(&self) -> JobOptions {
+        let before_step = self.before_step.clone();
+        let before_step = before_step.map(|hook| Box::new(move |step| hook(step)) as Box<dyn FnMut(usize) + Send>);
+        JobOptions { before_step, ..JobOptions::default() }
+    }
+
     fn go_on_with(&mut self, folder: RunFolder) {
-        let wake = Arc::clone(&self.wake);
+        let (wake, options) = (Arc::clone(&self.wake), self.job_options());
         let wanted = self.edits.fit.clone();
         self.tasks.spawn(TITLE, move |context| {
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
@@ -86,7 +93,7 @@ impl Model {
                 fitter.change(wanted.clone())?;
                 settings.fit = wanted;
             }
-            let started = Started::new(prepared, fitter, settings, folder, wake)?;
+            let started = Started::new(prepared, fitter, settings, folder, options, wake)?;
             Ok(Done::FitStarted(Box::new(started)))
         });
     }
