@@ -92,6 +92,49 @@ pub struct AuditOptions {
 pub enum BenchTask {
     /// Growth with triangles, views and map size: read, atlas, tracer, one step, peak memory.
     Scale(BenchOptions),
+    /// The window: frames a second, time from an act to its answer, what it takes from a fit, memory. Needs a display.
+    Studio(BenchStudioOptions),
+}
+
+/// Options of `patina bench studio`.
+#[derive(Clone, Debug, Args)]
+pub struct BenchStudioOptions {
+    /// Seconds of each measurement.
+    #[arg(long, default_value_t = 20.0)]
+    pub seconds: f64,
+    /// Pairs of a fit with and without the window.
+    #[arg(long, default_value_t = 4)]
+    pub pairs: usize,
+    /// Cycles of open, fit some steps, close.
+    #[arg(long, default_value_t = 40)]
+    pub cycles: usize,
+    /// Measure on this scene in place of a sphere of 454 854 triangles with maps of 2048 x 2048 texels.
+    #[arg(long)]
+    pub scene: Option<PathBuf>,
+    /// A small sphere, few seconds, few cycles.
+    #[arg(long)]
+    pub quick: bool,
+    /// Only these parts.
+    #[arg(long, value_enum, value_delimiter = ',')]
+    pub parts: Vec<BenchPart>,
+    /// Folder of the tables.
+    #[arg(short, long, default_value = "patina-bench")]
+    pub output: PathBuf,
+}
+
+/// A part of `patina bench studio`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum BenchPart {
+    /// Frames a second while the eye moves, frames at rest, share of the processors.
+    Frames,
+    /// Time from an act to the frame that shows its answer.
+    Answers,
+    /// Steps a second with and without the window.
+    Slowdown,
+    /// Memory over cycles of open, fit, close.
+    Memory,
+    /// Whether maps fitted under the window are those fitted without, bit for bit.
+    Equality,
 }
 
 /// Options of `patina bench scale`.

@@ -1,6 +1,6 @@
 //! `patina audit` and `patina bench`.
 
-use super::arguments::{AuditOptions, BenchOptions};
+use super::arguments::{AuditOptions, BenchOptions, BenchStudioOptions};
 use crate::error::{Error, ErrorKind, Result};
 use crate::insight::audit::{AuditSettings, built_in, gradients};
 use crate::job::scale;
@@ -40,4 +40,43 @@ pub fn bench_scale(options: &BenchOptions, json: bool) -> Result<()> {
     table.write(&options.output, "scale")?;
     println!("{}", table.to_markdown());
     Ok(())
+}
+
+/// Measures the window and writes the figures as Markdown, CSV and JSON.
+#[cfg(feature = "studio")]
+pub fn bench_studio(options: &BenchStudioOptions, json: bool) -> Result<()> {
+    use super::arguments::BenchPart;
+    use crate::studio::bench;
+    let asked = |part: BenchPart| options.parts.is_empty() || options.parts.contains(&part);
+    let report = bench::run(bench::BenchOptions {
+        seconds: if options.quick { options.seconds.min(3.0) } else { options.seconds },
+        pairs: if options.quick { options.pairs.min(1) } else { options.pairs },
+        cycles: if options.quick { options.cycles.min(3) } else { options.cycles },
+        scene: options.scene.clone(),
+        is_small: options.quick,
+        output: options.output.clone(),
+        frames: asked(BenchPart::Frames),
+        answers: asked(BenchPart::Answers),
+        slowdown: asked(BenchPart::Slowdown),
+        memory: asked(BenchPart::Memory),
+        equality: asked(BenchPart::Equality),
+        tell: std::sync::Arc::new(move |text| {
+            if !json {
+                eprintln!("{text}");
+            }
+        }),
+    })?;
+    if json {
+        println!("{}", serde_json::json!({"event": "bench", "report": report}));
+    } else {
+        println!("{}", report.to_markdown());
+    }
+    Ok(())
+}
+
+/// Says why the window cannot be measured.
+#[cfg(not(feature = "studio"))]
+pub fn bench_studio(_: &BenchStudioOptions, _: bool) -> Result<()> {
+    Err(Error::new(ErrorKind::Unsupported, "this program was built without its window")
+        .remedy("build it with the feature `studio`; `patina bench scale` needs none"))
 }

@@ -44,6 +44,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Task::Compare(options)) => commands::compare(&options, json),
         Some(Task::Audit(AuditTask::Gradients(options))) => measure::audit_gradients(&options, json),
         Some(Task::Bench(BenchTask::Scale(options))) => measure::bench_scale(&options, json),
+        Some(Task::Bench(BenchTask::Studio(options))) => measure::bench_studio(&options, json),
         Some(Task::Study(StudyTask::Mvcl(options))) => study::mvcl(&options, json),
         Some(Task::Studio(options)) => window(&options),
         None => window(&StudioOptions::default()),

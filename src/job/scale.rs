@@ -68,6 +68,11 @@ pub fn run(quick: bool, folder: &Path, tell: &dyn Fn(&str)) -> Result<StudyTable
     Ok(table)
 }
 
+/// The scene of a case, made in code; its mesh has no texture coordinates yet.
+pub fn scene(case: ScaleCase) -> Scene {
+    scene_of(bumpy_sphere(case.triangles), case.views)
+}
+
 fn run_case(case: ScaleCase, folder: &Path) -> Result<Vec<StageTime>> {
     let mut timings = Vec::new();
     let path = folder.join("scale_mesh.obj");

@@ -3,6 +3,7 @@
 use super::app::{Studio, StudioOptions};
 use super::model::store::Store;
 use crate::error::{Error, ErrorKind, Result};
+use std::path::PathBuf;
 
 /// The packages of Debian that a window needs at run time, for the remedy of an error.
 const DEBIAN_PACKAGES: &str = "libx11-6 libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0 mesa-vulkan-drivers";
@@ -12,8 +13,21 @@ const DEBIAN_PACKAGES: &str = "libx11-6 libx11-xcb1 libxcursor1 libxi6 libxkbcom
 /// # Errors
 /// `Unsupported` when there is no display, or nothing on it can draw.
 pub fn run(options: StudioOptions) -> Result<()> {
+    let settings_file = options.settings_file.clone();
+    open(settings_file, move |creation| Box::new(Studio::new(creation, &options)))
+}
+
+/// Opens a window around an app and returns when it is closed. `settings_file` is where its size is remembered, in place
+/// of the user's own.
+///
+/// # Errors
+/// As of [`run`].
+pub(super) fn open(
+    settings_file: Option<PathBuf>,
+    app: impl FnOnce(&eframe::CreationContext<'_>) -> Box<dyn eframe::App>,
+) -> Result<()> {
     check_display()?;
-    let store = options.settings_file.clone().map_or_else(Store::of_user, |path| Store::at(Some(path)));
+    let store = settings_file.map_or_else(Store::of_user, |path| Store::at(Some(path)));
     let size = store.clone().read().0.window_size;
     let viewport = egui::ViewportBuilder::default()
         .with_title("Patina")
@@ -24,7 +38,7 @@ pub fn run(options: StudioOptions) -> Result<()> {
     let native = eframe::NativeOptions { viewport, renderer: eframe::Renderer::Wgpu, ..Default::default() };
     // A system library that is missing makes the window library panic: the person gets a sentence all the same.
     let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(move || {
-        eframe::run_native("patina", native, Box::new(move |creation| Ok(Box::new(Studio::new(creation, &options)))))
+        eframe::run_native("patina", native, Box::new(move |creation| Ok(app(creation))))
     }));
     match outcome {
         Ok(Ok(())) => Ok(()),

@@ -29,7 +29,7 @@ fn a_worker_that_panics_is_told_and_the_fit_goes_on_from_its_checkpoint() {
     let falls = Arc::new(AtomicBool::new(false));
     let own = Arc::clone(&falls);
     let mut studio = TestStudio::with_small_scene();
-    studio.model().before_step = Some(Box::new(move |_| assert!(!own.load(Ordering::Relaxed), "a fault on purpose")));
+    studio.model().before_step = Some(Arc::new(move |_| assert!(!own.load(Ordering::Relaxed), "a fault on purpose")));
     studio.start_endless_fit();
     let written = studio.model().fit.last_checkpoint;
     studio.click("Checkpoint");

@@ -51,7 +51,8 @@ fn maps_are_switched_by_their_buttons() {
     assert!(size.contains("64 x 64"), "{size}");
     // The toolbar has buttons of the same names: those of the panel lie below it.
     for name in ["Specular", "Roughness", "Diffuse"] {
-        let mine = studio.controls(name).into_iter().find(|node| node.rect().left() > 900.0 && node.rect().top() > 60.0);
+        let mine =
+            studio.controls(name).into_iter().find(|node| node.rect().left() > 900.0 && node.rect().top() > 60.0);
         mine.unwrap().click();
         studio.frames(2);
         studio.control("Map");
@@ -118,7 +119,8 @@ fn a_photo_is_compared_with_its_render() {
 fn order(studio: &TestStudio) -> Vec<String> {
     let is_row = |node: &egui_kittest::Node<'_>| node.accesskit_node().role() == Role::RadioButton;
     let names = (0..6).flat_map(|index| {
-        let name = studio.harness.state().model.project.as_ref().unwrap().scene.as_ref().unwrap().views[index].name.clone();
+        let name =
+            studio.harness.state().model.project.as_ref().unwrap().scene.as_ref().unwrap().views[index].name.clone();
         let rows = studio.controls(&format!("photo {name}"));
         rows.into_iter().filter(is_row).map(move |node| (node.rect().top(), name.clone())).collect::<Vec<_>>()
     });
@@ -162,7 +164,8 @@ fn the_table_of_photos_sorts_chooses_and_looks_through() {
 /// Two clicks within one frame, quicker than the harness' clock.
 fn double_click(studio: &mut TestStudio, at: Pos2) {
     studio.frames(4);
-    let button = |pressed| Event::PointerButton { pos: at, button: PointerButton::Primary, pressed, modifiers: Modifiers::NONE };
+    let button =
+        |pressed| Event::PointerButton { pos: at, button: PointerButton::Primary, pressed, modifiers: Modifiers::NONE };
     let events = [Event::PointerMoved(at), button(true), button(false), button(true), button(false)];
     studio.harness.input_mut().events.extend(events);
     studio.frames(3);

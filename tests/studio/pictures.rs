@@ -32,11 +32,8 @@ fn has_adapter() -> bool {
 
 /// A window that is drawn, with the finished run open.
 fn drawn(size: [f32; 2], pixels_per_point: f32) -> TestStudio {
-    let builder = Harness::builder()
-        .with_size(size)
-        .with_pixels_per_point(pixels_per_point)
-        .with_render_cursor(false)
-        .wgpu();
+    let builder =
+        Harness::builder().with_size(size).with_pixels_per_point(pixels_per_point).with_render_cursor(false).wgpu();
     let folder = Arc::new(tempfile::tempdir().unwrap());
     let mut studio = TestStudio::built(builder, folder, Some(finished_run().into()));
     studio.wait("the run", |model| model.project.is_some());

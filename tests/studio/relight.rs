@@ -49,7 +49,8 @@ fn lights_are_swapped_by_click_and_by_arrow_and_the_fitted_one_comes_back() {
     assert_eq!(studio.model().edits.relight.first, LightName::Fitted);
     studio.model().edits.layer = Layer::Diffuse;
     studio.click_role(Role::RadioButton, "Noon sky");
-    assert_eq!((&studio.model().edits.relight.first, studio.model().edits.layer), (&sky("noon"), Layer::Lit));
+    let edits = &studio.model().edits;
+    assert_eq!((&edits.relight.first, edits.layer), (&sky("noon"), Layer::Lit));
     studio.press(Modifiers::NONE, Key::ArrowRight);
     assert_eq!(studio.model().edits.relight.first, sky("evening"));
     studio.press(Modifiers::NONE, Key::ArrowLeft);

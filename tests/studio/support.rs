@@ -100,9 +100,8 @@ impl TestStudio {
         let settings_file = Some(folder.path().join("studio.json"));
         let options = StudioOptions { path, demo: false, settings_file };
         let runs = folder.path().join("runs");
-        let mut harness = builder
-            .with_wait_for_pending_images(false)
-            .build_eframe(move |creation| Studio::new(creation, &options));
+        let mut harness =
+            builder.with_wait_for_pending_images(false).build_eframe(move |creation| Studio::new(creation, &options));
         harness.state_mut().model.preferences.runs_folder = runs;
         // Pictures are made by threads of their own; most tests do without.
         harness.state_mut().model.switches.traced = false;
@@ -204,7 +203,8 @@ impl TestStudio {
 
     /// All controls with this label.
     pub fn controls(&self, label: &str) -> Vec<Node<'_>> {
-        let is_control = |node: &Node<'_>| !matches!(node.accesskit_node().role(), Role::Label | Role::GenericContainer);
+        let is_control =
+            |node: &Node<'_>| !matches!(node.accesskit_node().role(), Role::Label | Role::GenericContainer);
         // The label's lifetime is that of the query, not of the tree.
         let wanted = label.to_owned();
         let by = By::new().predicate(move |node| node.label().is_some_and(|own| own == wanted));

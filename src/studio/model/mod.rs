@@ -213,9 +213,9 @@ pub struct Model {
     pub peek_photo: bool,
     /// Called from any thread when the window should look again.
     pub wake: Wake,
-    /// Called before each step of the next fit that is started; a seam for tests of faults.
+    /// Called before each step of a fit with the number of steps done, on its thread; for `patina bench studio`.
     #[doc(hidden)]
-    pub before_step: Option<Box<dyn FnMut(usize) + Send>>,
+    pub before_step: Option<Arc<dyn Fn(usize) + Send + Sync>>,
 }
 
 impl Model {

@@ -92,6 +92,15 @@ impl Model {
         });
     }
 
+    /// Opens a scene that was made in code.
+    pub fn open_made(&mut self, scene: Scene, settings: RunSettings) {
+        self.close();
+        self.tasks.spawn(TITLE, move |_| {
+            let opened = OpenedScene { scene, report: Default::default(), timings: Vec::new() };
+            Ok(Done::SceneRead(Box::new(SceneRead::new(None, settings, opened))))
+        });
+    }
+
     /// Takes in what was dropped on the window: a picture is a light, anything else a scene or run.
     pub fn dropped(&mut self, path: PathBuf) {
         let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();

@@ -75,8 +75,10 @@ impl Model {
     }
 
     /// What the next job is given.
-    fn job_options(&mut self) -> JobOptions {
-        JobOptions { wake: Some(Arc::clone(&self.wake)), before_step: self.before_step.take() }
+    fn job_options(&self) -> JobOptions {
+        let before_step = self.before_step.clone();
+        let before_step = before_step.map(|hook| Box::new(move |step| hook(step)) as Box<dyn FnMut(usize) + Send>);
+        JobOptions { wake: Some(Arc::clone(&self.wake)), before_step }
     }
 
     fn go_on_with(&mut self, folder: RunFolder) {

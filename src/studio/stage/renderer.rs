@@ -32,6 +32,8 @@ pub struct StageStatus {
     pub frames_shown: u64,
     /// Something newer is being uploaded.
     pub is_uploading: bool,
+    /// A newer light is being blurred.
+    pub is_light_uploading: bool,
     /// What the user should know of what is shown.
     pub findings: Vec<Finding>,
 }
@@ -231,10 +233,11 @@ impl StageRenderer {
             // A new photo or traced picture changes how the scene is shown, not the scene.
             slot.follow(picture.clone(), speed(texels), move |image| maker.picture(label, image));
         }
+        self.status.is_light_uploading = self.lights.iter().any(Slot::is_pending);
         self.status.is_uploading = self.mesh.is_pending()
             || self.maps.is_pending()
             || self.quantity.is_pending()
-            || self.lights.iter().any(Slot::is_pending)
+            || self.status.is_light_uploading
             || self.photo.is_pending()
             || self.traced.is_pending();
         if changed {

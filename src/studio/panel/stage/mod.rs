@@ -23,6 +23,8 @@ use traced::Traced;
 pub struct StageMemory {
     /// What draws in 3-D; `None` where nothing can.
     pub stage: Option<Stage>,
+    /// Where it was drawn last, in points; for `patina bench studio`.
+    pub rect: Option<Rect>,
     cache: FrameCache,
     traced: Traced,
     dragging: Option<Dragging>,
@@ -81,6 +83,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut StageMemory) {
         );
     };
     let response = stage.show(ui, &frame);
+    memory.rect = Some(response.rect);
     let response = response.on_hover_cursor(CursorIcon::Crosshair);
     interact(ui, model, memory, &frame, &response);
     decorate(ui, model, &frame, response.rect, &traced.caption);
