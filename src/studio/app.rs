@@ -2,15 +2,14 @@
 
 use super::act::{Act, keys};
 use super::layout::Layout;
-use super::model::store::{Follow, Store};
-use super::model::tasks::Wake;
+use super::model::store::Store;
 use super::model::{FitStatus, Model};
+use super::pace::Pace;
 use super::panel::{self, Memory};
-use super::stage::Stage;
+use super::stage::{Stage, StageStatus};
 use super::{perform, theme};
 use egui::{Context, ViewportCommand};
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// The studio.
@@ -24,6 +23,8 @@ pub struct Studio {
     theme_in_force: Option<super::model::store::ThemeChoice>,
     title_in_force: String,
     preferences_written: Instant,
+    pace: Pace,
+    took_snapshot: bool,
     /// Seconds the last frames took to lay out and paint, newest last; for `patina bench studio`.
     pub frame_seconds: Vec<f64>,
 }
@@ -50,14 +51,13 @@ impl Studio {
             Some(path) => Store::at(Some(path.clone())),
             None => Store::of_user(),
         };
-        let waker = context.clone();
-        // Threads may call as often as they like: a frame within a tenth of a second is soon enough.
-        let wake: Wake = Arc::new(move || waker.request_repaint_after(Duration::from_millis(100)));
-        let mut model = Model::new(store, wake);
+        let info = creation.wgpu_render_state.as_ref().map(|state| state.adapter.get_info());
+        let is_software = info.as_ref().is_some_and(|info| info.device_type == eframe::wgpu::DeviceType::Cpu);
+        let pace = Pace::new(is_software);
+        let mut model = Model::new(store, pace.wake(context.clone()));
         let mut memory = Memory::default();
-        if let Some(state) = &creation.wgpu_render_state {
-            let info = state.adapter.get_info();
-            model.software_adapter = info.device_type == eframe::wgpu::DeviceType::Cpu;
+        if let (Some(state), Some(info)) = (&creation.wgpu_render_state, info) {
+            model.software_adapter = is_software;
             model.adapter = format!("{} ({})", info.name, info.backend);
             memory.stage.stage = Some(Stage::new(state));
             if model.software_adapter {
@@ -83,13 +83,26 @@ impl Studio {
             theme_in_force: None,
             title_in_force: String::new(),
             preferences_written: Instant::now(),
+            pace,
+            took_snapshot: false,
             frame_seconds: Vec::new(),
         }
     }
 
     /// Takes in news, without drawing.
     fn take_in(&mut self, context: &Context) {
+        let was_live = self.model.fit.status.is_live();
         self.model.poll();
+        let status = &self.model.fit.status;
+        if status.is_live() && !was_live {
+            self.pace.restart();
+        }
+        // A fit that rests has the window to itself.
+        let follows = is_at_work(status);
+        let follow = self.model.preferences.follow;
+        if !follows || self.pace.takes_snapshot(follow, self.stage_status().is_uploading) {
+            self.took_snapshot |= self.model.take_snapshot() && follows;
+        }
         let dropped: Vec<PathBuf> =
             context.input(|input| input.raw.dropped_files.iter().map(|file| file.path().to_path_buf()).collect());
         for path in dropped {
@@ -142,19 +155,28 @@ impl Studio {
         panel::welcome::drop_hint(ui.ctx());
     }
 
-    /// How long the window may rest when nothing happens.
-    fn rest(&self, context: &Context) {
-        let works = |status: &FitStatus| status.is_live() && *status != FitStatus::Paused;
-        let interval = match (&self.model.fit.status, self.model.preferences.follow) {
-            (status, Follow::Live) if works(status) => 0.25,
-            (status, _) if works(status) => 1.0,
-            _ if self.model.tasks.is_busy() => 0.2,
-            _ => return,
-        };
-        // On the processor every frame is taken from the fit.
-        let factor = if self.model.software_adapter { 2.0 } else { 1.0 };
-        context.request_repaint_after(Duration::from_secs_f64(interval * factor));
+    fn stage_status(&self) -> StageStatus {
+        self.memory.stage.stage.as_ref().map(Stage::status).unwrap_or_default()
     }
+
+    /// Tells the pace what this frame was and lets the window rest for as long as nothing happens.
+    fn rest(&mut self, context: &Context) {
+        let stage = self.stage_status();
+        let took_snapshot = std::mem::take(&mut self.took_snapshot);
+        let follows = is_at_work(&self.model.fit.status);
+        if self.pace.drawn(took_snapshot, stage.is_uploading, stage.upload_seconds, follows) {
+            context.request_repaint();
+        }
+        let (status, follow) = (&self.model.fit.status, self.model.preferences.follow);
+        if let Some(rest) = self.pace.rest(status, follow, self.model.tasks.is_busy()) {
+            context.request_repaint_after(rest);
+        }
+    }
+}
+
+/// Whether a fit takes steps that the window should not hold up.
+fn is_at_work(status: &FitStatus) -> bool {
+    status.is_live() && *status != FitStatus::Paused
 }
 
 /// A control that was pressed by the mouse does not keep the keys: Space goes on to pause and not to press it again.
@@ -174,8 +196,14 @@ impl eframe::App for Studio {
         self.take_in(context);
     }
 
-    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+    fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
         let began = Instant::now();
+        self.pace.begin(|| {
+            if let Some(state) = frame.wgpu_render_state() {
+                // How long the last frame took is all that is wanted of it.
+                let _ = state.device.poll(eframe::wgpu::PollType::wait_indefinitely());
+            }
+        });
         let context = ui.ctx().clone();
         if matches!(self.model.dialog, super::model::Dialog::None) {
             self.model.acts.extend(keys::pressed(&context));

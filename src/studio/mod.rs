@@ -4,7 +4,7 @@
 //! widget; [`act`] lists everything a person can do, once, for menus, palette, keys and help; [`perform`] does it.
 //! [`panel`] draws, one file a panel; [`layout`] arranges them; [`theme`] names every colour. [`stage`] draws the mesh in
 //! 3-D and [`picture`] shows linear pictures: both know nothing of the rest. [`launch`] opens the window, or says in one
-//! sentence why there is none.
+//! sentence why there is none. [`pace`] decides how often a running fit is looked at.
 //!
 //! [`bench`] acts like a person in front of it and measures.
 //!
@@ -17,6 +17,7 @@ pub mod bench;
 pub mod launch;
 pub mod layout;
 pub mod model;
+pub mod pace;
 pub mod panel;
 pub mod perform;
 pub mod picture;

@@ -280,7 +280,6 @@ impl Model {
         }
         changed |= self.fit.poll(&mut self.log);
         self.take_back_refused();
-        self.take_snapshot();
         self.remember_run();
         changed
     }
@@ -360,9 +359,9 @@ impl Model {
         });
     }
 
-    /// The newest snapshot becomes what the panels show.
-    fn take_snapshot(&mut self) {
-        let (Some(project), Some(snapshot)) = (&mut self.project, &self.fit.snapshot) else { return };
+    /// The newest snapshot becomes what the panels show; whether it is another than before.
+    pub fn take_snapshot(&mut self) -> bool {
+        let (Some(project), Some(snapshot)) = (&mut self.project, &self.fit.snapshot) else { return false };
         let newer = project.environment.as_ref().is_none_or(|own| !Arc::ptr_eq(own, &snapshot.environment));
         if newer {
             project.maps = Some(Arc::clone(&snapshot.maps));
@@ -377,6 +376,7 @@ impl Model {
                 self.history.restart(&self.edits);
             }
         }
+        newer
     }
 
     /// Keeps the run in progress in the remembered settings, so that a start after a crash finds it.

@@ -34,6 +34,8 @@ pub struct StageStatus {
     pub is_uploading: bool,
     /// A newer light is being blurred.
     pub is_light_uploading: bool,
+    /// Seconds that threads spent on maps and lights so far.
+    pub upload_seconds: f64,
     /// What the user should know of what is shown.
     pub findings: Vec<Finding>,
 }
@@ -233,6 +235,8 @@ impl StageRenderer {
             // A new photo or traced picture changes how the scene is shown, not the scene.
             slot.follow(picture.clone(), speed(texels), move |image| maker.picture(label, image));
         }
+        let light_seconds: f64 = self.lights.iter().map(Slot::seconds).sum();
+        self.status.upload_seconds = self.maps.seconds() + light_seconds;
         self.status.is_light_uploading = self.lights.iter().any(Slot::is_pending);
         self.status.is_uploading = self.mesh.is_pending()
             || self.maps.is_pending()

@@ -3,6 +3,7 @@
 use eframe::egui;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::time::Instant;
 
 /// Whether two handles are of the same thing; not whether the things are equal.
 pub(super) trait Same {
@@ -42,14 +43,16 @@ pub(super) enum Speed<'a> {
 /// What is shown of a handle `K`, and what is being made of a newer one.
 pub(super) struct Slot<K, G> {
     shown: Option<(K, G)>,
-    pending: Option<(K, Receiver<G>)>,
+    pending: Option<(K, Receiver<(G, f64)>)>,
     /// A handle whose making broke: it is not tried again.
     broken: Option<K>,
+    /// Seconds that other threads took to make what was shown so far.
+    seconds: f64,
 }
 
 impl<K, G> Default for Slot<K, G> {
     fn default() -> Self {
-        Slot { shown: None, pending: None, broken: None }
+        Slot { shown: None, pending: None, broken: None, seconds: 0.0 }
     }
 }
 
@@ -62,6 +65,11 @@ impl<K: Same + Clone + Send + 'static, G: Send + 'static> Slot<K, G> {
     /// Whether something newer is being made.
     pub fn is_pending(&self) -> bool {
         self.pending.is_some()
+    }
+
+    /// Seconds that other threads took to make what was shown so far.
+    pub fn seconds(&self) -> f64 {
+        self.seconds
     }
 
     /// Follows the handle; whether what is shown is another than before.
@@ -86,7 +94,9 @@ impl<K: Same + Clone + Send + 'static, G: Send + 'static> Slot<K, G> {
                 let (key, context) = (wanted.clone(), context.clone());
                 let work = move || {
                     // The window may be gone meanwhile.
-                    let _ = sender.send(make(&key));
+                    let began = Instant::now();
+                    let made = make(&key);
+                    let _ = sender.send((made, began.elapsed().as_secs_f64()));
                     context.request_repaint();
                 };
                 match std::thread::Builder::new().name("stage upload".into()).spawn(work) {
@@ -103,7 +113,8 @@ impl<K: Same + Clone + Send + 'static, G: Send + 'static> Slot<K, G> {
         let Some((key, receiver)) = self.pending.take() else { return false };
         let result = if wait { receiver.recv().map_err(|_| TryRecvError::Disconnected) } else { receiver.try_recv() };
         match result {
-            Ok(made) => {
+            Ok((made, seconds)) => {
+                self.seconds += seconds;
                 self.shown = Some((key, made));
                 true
             }
