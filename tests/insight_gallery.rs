@@ -172,7 +172,7 @@ fn light_that_is_baked_into_the_maps_shows_under_other_lights_only() {
     let mut baked = truth.maps.clone();
     let size = baked.diffuse.width();
     for (index, diffuse) in baked.diffuse.pixels_mut().iter_mut().enumerate() {
-        *diffuse *= if (index / size / 4 + index % size / 4) % 2 == 0 { 0.5 } else { 1.0 };
+        *diffuse *= if (index / size / 4 + index % size / 4).is_multiple_of(2) { 0.5 } else { 1.0 };
     }
     let baked = table(&parameters(&baked, &truth.environment));
     for row in 1..4 {

@@ -48,9 +48,12 @@ pub struct SlowdownRow {
     pub frames_per_second_watched: f64,
 }
 
+/// The number of a step and when it began.
+type StepTime = (usize, Instant);
+
 /// When each step began.
 #[derive(Clone, Default)]
-pub struct StepClock(Arc<Mutex<Vec<(usize, Instant)>>>);
+pub struct StepClock(Arc<Mutex<Vec<StepTime>>>);
 
 impl StepClock {
     /// To be called before each step.
@@ -60,7 +63,7 @@ impl StepClock {
     }
 
     /// The step begun last, and when each began, from the first on.
-    fn times(&self) -> Vec<(usize, Instant)> {
+    fn times(&self) -> Vec<StepTime> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
@@ -84,7 +87,7 @@ impl StepClock {
 }
 
 /// Seconds of so many steps after the warm ones.
-fn seconds_of(times: &[(usize, Instant)], steps: usize) -> Option<f64> {
+fn seconds_of(times: &[StepTime], steps: usize) -> Option<f64> {
     let (_, from) = times.get(WARM_STEPS)?;
     let (_, to) = times.get(WARM_STEPS + steps)?;
     Some(to.saturating_duration_since(*from).as_secs_f64())
@@ -149,7 +152,7 @@ pub fn prepared_of(person: &Person) -> Result<(Prepared, RunSettings)> {
 }
 
 /// A fit without the window; also the frames it drew all the same.
-fn fit_alone(person: &Person, seconds: f64, folder: &Path) -> Result<(Vec<(usize, Instant)>, u64)> {
+fn fit_alone(person: &Person, seconds: f64, folder: &Path) -> Result<(Vec<StepTime>, u64)> {
     let (prepared, settings) = prepared_of(person)?;
     // The path-traced preview rests, as it does while a fit runs.
     person.ask(|studio, _| studio.model.switches.traced = false)?;
@@ -179,7 +182,7 @@ fn fit_alone(person: &Person, seconds: f64, folder: &Path) -> Result<(Vec<(usize
 }
 
 /// The same fit started in the window, which follows it; also its frames and the seconds they took.
-fn fit_watched(person: &Person, seconds: f64) -> Result<(Vec<(usize, Instant)>, u64, f64)> {
+fn fit_watched(person: &Person, seconds: f64) -> Result<(Vec<StepTime>, u64, f64)> {
     let clock = StepClock::default();
     let hook = clock.hook();
     person.ask(move |studio, _| {

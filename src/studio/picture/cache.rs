@@ -50,19 +50,24 @@ impl Pixels {
     }
 }
 
+/// How numbers become colours; `None` for pixels that are colours.
+type Colours = Option<(ValueScale, Palette)>;
+/// Lines, in which space, of which colour.
+type LineKey = (Same<Vec<(Vec2, Vec2)>>, LineSpace, Color32);
+
 /// Everything that the pixels of a panel depend on.
 #[derive(Clone, Debug, PartialEq)]
 struct Key {
-    source: (Pixels, Option<(ValueScale, Palette)>),
-    other: Option<(Pixels, Option<(ValueScale, Palette)>, Compare)>,
+    source: (Pixels, Colours),
+    other: Option<(Pixels, Colours, Compare)>,
     mask: Option<Same<Image<bool>>>,
-    lines: Vec<(Same<Vec<(Vec2, Vec2)>>, LineSpace, Color32)>,
+    lines: Vec<LineKey>,
     frame: Frame,
     display: DisplaySettings,
     inks: Inks,
 }
 
-fn colours_of(source: &Source) -> Option<(ValueScale, Palette)> {
+fn colours_of(source: &Source) -> Colours {
     match source {
         Source::Colour(_) => None,
         Source::Numbers { scale, palette, .. } => Some((*scale, *palette)),

@@ -5,7 +5,7 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | [`eye`] | orbit and photo cameras, their matrix, rays and projection |
+//! | [`eye`], [`orbit`] | orbit and photo cameras, their matrix, rays and projection |
 //! | [`navigate`](mod@navigate) | drags and wheel as movements of the eye |
 //! | [`content`] | what is shown and how |
 //! | [`frustum`] | cameras as pyramids, and picking them |
@@ -30,6 +30,7 @@ pub mod frustum;
 mod light;
 mod mesh;
 pub mod navigate;
+pub mod orbit;
 mod overlay;
 mod pipelines;
 mod renderer;
