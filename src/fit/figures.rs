@@ -7,12 +7,12 @@ use std::sync::Arc;
 /// Figures of the last steps.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LiveFigures {
-    /// Root mean squared error of each view in linear radiance, as last known; `None` before the first look at it and
-    /// for views that are left out.
+    /// Root mean squared error of each view in linear radiance over its unclipped surface pixels, as last known; `None`
+    /// before the first look at one and for views that are left out.
     ///
-    /// Of a training view: over the pixels of its last step that were evidence, background included, with its gain. Of a
-    /// held-out view: over its unclipped surface pixels at the last look. Both are from unbiased estimates of the
-    /// squared error, so that the noise of few paths is not counted; an estimate below zero counts as zero.
+    /// Of a training view: over the pixels of its last step, with its gain. Of a held-out view: over a shrunken photo at
+    /// the last look. Both are from unbiased estimates of the squared error, so that the noise of few paths is not
+    /// counted; an estimate below zero counts as zero.
     pub view_rmse: Vec<Option<f32>>,
     /// Disagreement `V_p` in [0, 1] of the views at each texel in the last step, of the stage's map size, 0 where fewer
     /// than two views saw it; `None` without consistency.

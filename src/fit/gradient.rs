@@ -35,7 +35,7 @@ pub(super) struct StepSums {
     /// Names and numbers of pixels that were not finite; counted when the step is kept, so that a step that is dropped
     /// and done again counts once.
     pub non_finite: Vec<(String, u64)>,
-    /// View and root mean squared error of the pixels of it that were looked at.
+    /// View and root mean squared error of the unclipped surface pixels of it that were looked at.
     pub view_errors: Vec<(usize, f32)>,
     /// Disagreement at each base texel, where it was measured.
     pub agreement: Option<Vec<f32>>,
@@ -87,9 +87,8 @@ impl Fitter {
                 return Ok(None);
             }
             sums.gain_derivatives.push((target.view, loss.gain_derivative() * if separate { share } else { 1.0 }));
-            if totals.pixels > 0 {
-                let mean = f64::from(totals.loss) / (3.0 * f64::from(weight) * totals.pixels as f64);
-                sums.view_errors.push((target.view, mean.max(0.0).sqrt() as f32));
+            if let Some(rmse) = loss.surface_rmse() {
+                sums.view_errors.push((target.view, rmse));
             }
             sums.non_finite.extend(self.non_finite_of(target, &totals, pixels.len())?);
             sums.image_loss += f64::from(totals.loss) * if separate { f64::from(share) } else { 1.0 };

@@ -21,20 +21,48 @@ pub struct ViewLoss<'a> {
     /// Derivative of the loss by the gain over `weight`, in units of 2^-20, added up in whole numbers so that the order
     /// of pixels does not matter. A pixel adds at most 2^42 units: a million of them cannot overflow.
     pub d_gain: AtomicU64,
+    /// Squared error of unclipped surface pixels, summed over channels, in the same units, and their number.
+    surface_error: (AtomicU64, AtomicU64),
 }
 
-const GAIN_UNIT: f64 = (1u64 << 20) as f64;
-const LARGEST_GAIN_UNITS: f64 = (1u64 << 42) as f64;
+/// Units of whole-number sums in one.
+const UNIT: f64 = (1u64 << 20) as f64;
+/// The most that a pixel adds.
+const LARGEST_UNITS: f64 = (1u64 << 42) as f64;
 
 impl<'a> ViewLoss<'a> {
     /// The loss of a view.
     pub fn new(scene: &'a Scene, target: &'a Target, weight: f32, gain: f32, use_background: bool) -> Self {
-        ViewLoss { scene, target, weight, gain, use_background, d_gain: AtomicU64::new(0) }
+        ViewLoss {
+            scene,
+            target,
+            weight,
+            gain,
+            use_background,
+            d_gain: AtomicU64::new(0),
+            surface_error: Default::default(),
+        }
     }
 
     /// Derivative of the loss by the gain.
     pub fn gain_derivative(&self) -> f32 {
-        (self.d_gain.load(Ordering::Relaxed) as i64 as f64 / GAIN_UNIT * f64::from(self.weight)) as f32
+        (self.d_gain.load(Ordering::Relaxed) as i64 as f64 / UNIT * f64::from(self.weight)) as f32
+    }
+
+    /// Root mean squared error over the unclipped surface pixels so far, as held-out views are judged; `None` where there
+    /// was none. Of an unbiased estimate of the squared error; one below zero counts as zero.
+    pub fn surface_rmse(&self) -> Option<f32> {
+        let (sum, count) = &self.surface_error;
+        let (sum, count) = (sum.load(Ordering::Relaxed) as i64 as f64 / UNIT, count.load(Ordering::Relaxed));
+        (count > 0).then(|| (sum / (3.0 * count as f64)).max(0.0).sqrt() as f32)
+    }
+
+    /// Adds up the error of a pixel, over the weight, if it is one that views are judged by.
+    fn add_surface_error(&self, state: PixelState, escaped: f32, error: f64) {
+        if state.is_surface() && !state.is_clipped() && escaped == 0.0 && error.is_finite() {
+            self.surface_error.0.fetch_add(units(error), Ordering::Relaxed);
+            self.surface_error.1.fetch_add(1, Ordering::Relaxed);
+        }
     }
 
     /// What a pixel is evidence for, given which share of its camera rays met nothing.
@@ -50,6 +78,11 @@ impl<'a> ViewLoss<'a> {
             (_, Background::Environment) => escaped == 1.0 && self.use_background,
         }
     }
+}
+
+/// A number in whole units, held in a range in which the sum over all pixels cannot wrap.
+fn units(value: f64) -> u64 {
+    (value * UNIT).clamp(-LARGEST_UNITS, LARGEST_UNITS) as i64 as u64
 }
 
 impl<R: Real> PixelLoss<R> for ViewLoss<'_> {
@@ -86,10 +119,10 @@ impl<R: Real> PixelLoss<R> for ViewLoss<'_> {
             derivative.d_second[channel] = weight * first * gain;
             d_gain += weight * (second * estimate.first[channel] + first * estimate.second[channel]);
         }
-        // Held in a range in which the sum over all pixels cannot wrap.
         let over_weight = f64::from(d_gain.to_f32()) / f64::from(self.weight).max(f64::MIN_POSITIVE);
-        let units = (over_weight * GAIN_UNIT).clamp(-LARGEST_GAIN_UNITS, LARGEST_GAIN_UNITS) as i64;
-        self.d_gain.fetch_add(units as u64, Ordering::Relaxed);
+        self.d_gain.fetch_add(units(over_weight), Ordering::Relaxed);
+        let error = f64::from(derivative.loss.to_f32()) / f64::from(self.weight).max(f64::MIN_POSITIVE);
+        self.add_surface_error(state, estimate.escaped, error);
         Some(derivative)
     }
 }
@@ -123,6 +156,22 @@ mod tests {
     fn at(scene: &Scene, estimate: PixelEstimate<f64>, use_background: bool) -> Option<PixelDerivative<f64>> {
         let target = Target::new(scene, 0, 0);
         ViewLoss::new(scene, &target, 0.5, 1.0, use_background).at(0, &estimate)
+    }
+
+    #[test]
+    fn views_are_judged_by_their_unclipped_surface_alone() {
+        let estimate = PixelEstimate { first: [0.5f64; 3], second: [0.7; 3], escaped: 0.0 };
+        let judged = |state, escaped| {
+            let scene = scene(Vec3::splat(0.2), state);
+            let target = Target::new(&scene, 0, 0);
+            let loss = ViewLoss::new(&scene, &target, 0.01, 1.0, true);
+            loss.at(0, &PixelEstimate { escaped, ..estimate });
+            loss.surface_rmse()
+        };
+        let rmse = judged(PixelState::Surface, 0.0).unwrap();
+        assert!((rmse - 0.15f32.sqrt()).abs() < 1e-4, "{rmse}");
+        assert_eq!(judged(PixelState::Surface, 1.0), None);
+        assert_eq!(judged(PixelState::Background, 1.0), None);
     }
 
     #[test]

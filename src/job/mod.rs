@@ -10,6 +10,7 @@
 //! fits many times over and makes tables. [`preview`] draws for a window beside a fit. After a fit, [`gallery`] makes
 //! what a user shows, [`gauge`] moves its scale, [`entanglement`] tells how much light is baked into the maps.
 
+pub mod background;
 pub mod demo;
 pub mod entanglement;
 pub mod gallery;

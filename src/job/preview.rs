@@ -4,7 +4,7 @@
 //! it keeps its pace ([`Preview::set_share`]). Pictures come out through a [`Slot`]: a watcher that is slow misses steps
 //! of the refinement, never the last one. A panic in the tracer ends one request with a text; the thread lives on.
 
-use super::Slot;
+use super::{Slot, background};
 use crate::error::{Error, ErrorKind, Result};
 use crate::image::RgbImage;
 use crate::render::picture::PictureSettings;
@@ -121,6 +121,7 @@ impl Preview {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .thread_name(|index| format!("patina-preview-{index}"))
+            .start_handler(|_| background::give_way())
             .build()
             .map_err(|source| no_thread(source.to_string()))?;
         let shared = Arc::new(Shared { share: AtomicU32::new((threads as f32).to_bits()), ..Default::default() });

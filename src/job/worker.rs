@@ -29,6 +29,8 @@ pub type Wake = Arc<dyn Fn() + Send + Sync>;
 pub struct JobOptions {
     /// Called after each event and snapshot.
     pub wake: Option<Wake>,
+    /// Threads of its own; the usual ones when not given. Results do not depend on it.
+    pub pool: Option<rayon::ThreadPool>,
     /// Called before each step with the number of steps done; a seam for tests of faults.
     #[doc(hidden)]
     pub before_step: Option<Box<dyn FnMut(usize) + Send>>,
@@ -113,7 +115,11 @@ pub fn start_with(
     let thread = std::thread::Builder::new()
         .name("patina-fit".into())
         .spawn(move || {
-            let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| worker.run(prepared)));
+            let work = move || match options.pool {
+                Some(pool) => pool.install(move || worker.run(prepared)),
+                None => worker.run(prepared),
+            };
+            let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));
             let error = match outcome {
                 Ok(Ok(())) => return,
                 Ok(Err(error)) => error,

@@ -1,6 +1,6 @@
 //! The window's loop: take in news, draw, do what was asked.
 
-use super::act::{Act, keys};
+use super::act::{Act, keys, turns};
 use super::layout::Layout;
 use super::model::store::Store;
 use super::model::{FitStatus, Model};
@@ -25,6 +25,8 @@ pub struct Studio {
     preferences_written: Instant,
     pace: Pace,
     took_snapshot: bool,
+    /// Events that the next frame takes before its own.
+    events_held_back: Vec<egui::Event>,
     /// Seconds the last frames took to lay out and paint, newest last; for `patina bench studio`.
     pub frame_seconds: Vec<f64>,
 }
@@ -85,6 +87,7 @@ impl Studio {
             preferences_written: Instant::now(),
             pace,
             took_snapshot: false,
+            events_held_back: Vec::new(),
             frame_seconds: Vec::new(),
         }
     }
@@ -192,6 +195,16 @@ fn release_focus(context: &Context) {
 }
 
 impl eframe::App for Studio {
+    fn raw_input_hook(&mut self, context: &Context, raw_input: &mut egui::RawInput) {
+        let mut events = std::mem::take(&mut self.events_held_back);
+        events.append(&mut raw_input.events);
+        self.events_held_back = turns::held_back(&mut events);
+        raw_input.events = events;
+        if !self.events_held_back.is_empty() {
+            context.request_repaint();
+        }
+    }
+
     fn logic(&mut self, context: &Context, _frame: &mut eframe::Frame) {
         self.take_in(context);
     }

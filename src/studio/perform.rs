@@ -8,7 +8,7 @@ use super::model::lights::LightName;
 use super::model::{Dialog, Model, PickFor, SaveWhat};
 use super::stage::Layer;
 use crate::image::display::{DisplaySettings, ToneCurve};
-use egui::{Context, Event, ViewportCommand};
+use egui::{Context, ViewportCommand};
 
 /// Degrees by which a key turns the light.
 const TURN_DEGREES: f32 = 15.0;
@@ -41,7 +41,7 @@ pub fn perform(act: Act, model: &mut Model, layout: &mut Layout, context: &Conte
         Act::Quit => context.send_viewport_cmd(ViewportCommand::Close),
         Act::Undo => model.history.undo(&mut model.edits),
         Act::Redo => model.history.redo(&mut model.edits),
-        Act::Palette => model.dialog = Dialog::Palette(typed_meanwhile(context)),
+        Act::Palette => model.dialog = Dialog::Palette(String::new()),
         Act::Help => model.dialog = Dialog::Help,
         Act::NextTheme => model.preferences.theme = model.preferences.theme.next(),
         Act::ZoomIn => context.set_zoom_factor((context.zoom_factor() + 0.1).min(3.0)),
@@ -58,15 +58,6 @@ pub fn perform(act: Act, model: &mut Model, layout: &mut Layout, context: &Conte
         | Act::SurfaceLayers => perform_on_fit(act, model),
         _ => perform_on_view(act, model),
     }
-}
-
-/// Text that was typed in the frame that opens a dialog, after its key.
-fn typed_meanwhile(context: &Context) -> String {
-    let text = |event: &Event| match event {
-        Event::Text(text) => Some(text.clone()),
-        _ => None,
-    };
-    context.input(|input| input.events.iter().filter_map(text).collect())
 }
 
 fn perform_on_fit(act: Act, model: &mut Model) {

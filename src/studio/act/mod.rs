@@ -6,6 +6,7 @@
 
 pub mod availability;
 pub mod keys;
+pub mod turns;
 
 use egui::{Key, KeyboardShortcut, Modifiers};
 

@@ -171,7 +171,7 @@ impl Driven {
 }
 
 impl eframe::App for Driven {
-    fn raw_input_hook(&mut self, _context: &egui::Context, raw_input: &mut egui::RawInput) {
+    fn raw_input_hook(&mut self, context: &egui::Context, raw_input: &mut egui::RawInput) {
         let mut state = self.shared.lock();
         raw_input.events.append(&mut state.events);
         if let Some((orbiting, angle)) = &mut state.orbiting {
@@ -179,6 +179,8 @@ impl eframe::App for Driven {
             let place = orbiting.centre + orbiting.radius * egui::vec2(angle.cos(), 0.5 * angle.sin());
             raw_input.events.push(egui::Event::PointerMoved(place));
         }
+        drop(state);
+        self.studio.raw_input_hook(context, raw_input);
     }
 
     fn logic(&mut self, context: &egui::Context, frame: &mut eframe::Frame) {

@@ -6,8 +6,9 @@ use crate::export::RunFolder;
 use crate::fit::{FitSettings, Fitter};
 use crate::job::open::{self, OpenStage};
 use crate::job::prepare::{Prepared, RunSettings, prepare_with};
-use crate::job::{self, Command, JobHandle, JobOptions};
+use crate::job::{self, Command, JobHandle, JobOptions, background};
 use crate::render::Surface;
+use crate::studio::layout::Panel;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -78,7 +79,7 @@ impl Model {
     fn job_options(&self) -> JobOptions {
         let before_step = self.before_step.clone();
         let before_step = before_step.map(|hook| Box::new(move |step| hook(step)) as Box<dyn FnMut(usize) + Send>);
-        JobOptions { wake: Some(Arc::clone(&self.wake)), before_step }
+        JobOptions { wake: Some(Arc::clone(&self.wake)), pool: background::pool("patina-fit"), before_step }
     }
 
     fn go_on_with(&mut self, folder: RunFolder) {
@@ -109,6 +110,7 @@ impl Model {
         self.preferences.remember(folder.path(), true);
         self.log.note(format!("The run is written to {}", folder.path().display()));
         self.fit.begin(job, folder, settings);
+        self.activate = Some(Panel::Curves);
     }
 
     /// Sends settings that were changed to the running fit, once nothing moves any more.

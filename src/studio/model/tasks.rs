@@ -1,7 +1,8 @@
-//! Work beside the window: reading, preparing, saving. Each task is a thread of its own; it can be stopped, it tells how
+//! Work beside the window: reading, preparing, saving. Each task has threads of its own; it can be stopped, it tells how
 //! far it is, and a panic in it is an error like any other.
 
 use crate::error::{Error, ErrorKind, Result};
+use crate::job::background;
 use crossbeam_channel::{Receiver, bounded};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -63,7 +64,9 @@ impl<T: Send + 'static> Tasks<T> {
         let (sender, outcome) = bounded(1);
         let own = context.clone();
         let spawned = std::thread::Builder::new().name("patina-task".into()).spawn(move || {
-            let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(&own)));
+            let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+                background::run("patina-task", || work(&own))
+            }));
             let result = result.unwrap_or_else(|panic| Err(panicked(panic.as_ref())));
             let _ = sender.send(result);
             (own.wake)();

@@ -2,6 +2,7 @@
 
 use super::{empty, heading};
 use crate::insight::record::{RecordSettings, TexelRecord, texel_record};
+use crate::job::background;
 use crate::studio::model::{Cursor, Model};
 use crate::studio::theme;
 use egui::{Color32, Grid, RichText, ScrollArea, Ui};
@@ -104,7 +105,8 @@ fn ask(ui: &Ui, model: &Model, cursor: &Cursor, memory: &mut RecordMemory) {
     let (sender, receiver) = channel();
     let context = ui.ctx().clone();
     let spawned = std::thread::Builder::new().name("patina-record".into()).spawn(move || {
-        let _ = sender.send(texel_record(&scene, &surface, &parameters, &point, &settings));
+        let record = || texel_record(&scene, &surface, &parameters, &point, &settings);
+        let _ = sender.send(background::run("patina-record", record));
         context.request_repaint();
     });
     if spawned.is_ok() {

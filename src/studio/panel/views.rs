@@ -6,6 +6,11 @@ use crate::studio::model::Model;
 use crate::studio::theme;
 use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui, vec2};
 
+/// Size of the table's letters: many rows are to be seen at once.
+const TEXT_POINTS: f32 = 11.5;
+/// Points between two columns.
+const GAP: f32 = 6.0;
+
 /// What the panel keeps.
 pub struct ViewsMemory {
     sorted_by: Column,
@@ -30,12 +35,29 @@ enum Column {
 
 impl Column {
     const ALL: [(Column, &'static str, f32, &'static str); 5] = [
-        (Column::Name, "Photo", 92.0, "Name of the photo's file"),
-        (Column::Error, "RMSE", 56.0, "Root mean squared error of linear radiance, as last known"),
+        (Column::Name, "Photo", 84.0, "Name of the photo's file"),
+        (
+            Column::Error,
+            "RMSE",
+            56.0,
+            "Root mean squared error of linear radiance over unclipped surface, as last known",
+        ),
         (Column::Exposure, "Stops", 46.0, "Exposure that was fitted for the photo, in stops"),
         (Column::Clipped, "Clipped", 52.0, "Share of the surface's pixels that are clipped and hence no data"),
-        (Column::Role, "Role", 60.0, "Fitted to, held out to judge, or left out"),
+        (Column::Role, "Role", 58.0, "Fitted to, held out to judge, or left out"),
     ];
+
+    fn width(self) -> f32 {
+        Column::ALL.iter().find(|(column, ..)| *column == self).map_or(0.0, |(_, _, width, _)| *width)
+    }
+
+    /// Words begin at the left of a column, numbers end at its right.
+    fn layout(self) -> Layout {
+        match self {
+            Column::Name | Column::Role => Layout::left_to_right(Align::Center),
+            Column::Error | Column::Exposure | Column::Clipped => Layout::right_to_left(Align::Center),
+        }
+    }
 }
 
 /// A row of the table.
@@ -128,7 +150,7 @@ fn controls(ui: &mut Ui, model: &mut Model) {
 
 fn header(ui: &mut Ui, memory: &mut ViewsMemory) {
     ui.horizontal(|ui| {
-        ui.spacing_mut().item_spacing.x = 4.0;
+        ui.spacing_mut().item_spacing.x = GAP;
         for (column, title, width, help) in Column::ALL {
             let own = memory.sorted_by == column;
             let text = match (own, memory.descending) {
@@ -136,8 +158,13 @@ fn header(ui: &mut Ui, memory: &mut ViewsMemory) {
                 (true, false) => format!("{title} +"),
                 _ => title.to_owned(),
             };
-            let button = egui::Button::new(RichText::new(text).small()).frame(false).min_size(vec2(width, 18.0));
-            if ui.add(button).on_hover_text(format!("{help}\nClick sorts by it, again turns the order")).clicked() {
+            let button = egui::Button::new(RichText::new(text).size(TEXT_POINTS)).frame(false).small();
+            let response = ui.allocate_ui_with_layout(vec2(width, 18.0), column.layout(), |ui| {
+                ui.set_min_width(width);
+                ui.add(button)
+            });
+            let response = response.inner;
+            if response.on_hover_text(format!("{help}\nClick sorts by it, again turns the order")).clicked() {
                 memory.descending =
                     if own { !memory.descending } else { column == Column::Error || column == Column::Clipped };
                 memory.sorted_by = column;
@@ -149,7 +176,7 @@ fn header(ui: &mut Ui, memory: &mut ViewsMemory) {
 
 fn line(ui: &mut Ui, model: &mut Model, row: &Row, chosen: bool, worst: f32, scroll: bool) {
     let colours = theme::palette(ui.visuals());
-    let width: f32 = Column::ALL.iter().map(|(_, _, width, _)| width + 4.0).sum();
+    let width: f32 = Column::ALL.iter().map(|(_, _, width, _)| width + GAP).sum();
     let (rect, response) = ui.allocate_exact_size(vec2(width.max(ui.available_width()), 20.0), Sense::click());
     response.widget_info(|| {
         egui::WidgetInfo::selected(egui::Role::RadioButton, true, chosen, format!("photo {}", row.name))
@@ -160,29 +187,28 @@ fn line(ui: &mut Ui, model: &mut Model, row: &Row, chosen: bool, worst: f32, scr
         ui.painter().rect_filled(rect, 3.0, ui.visuals().widgets.hovered.weak_bg_fill);
     }
     let mut inner = ui.new_child(egui::UiBuilder::new().max_rect(rect).layout(Layout::left_to_right(Align::Center)));
-    inner.spacing_mut().item_spacing.x = 4.0;
+    inner.spacing_mut().item_spacing.x = GAP;
     let dim = row.role == "left out";
-    let mut cell = |width: f32, text: String, colour: Option<egui::Color32>| {
-        let text = RichText::new(text).small();
+    let mut cell = |column: Column, text: String, colour: Option<egui::Color32>| {
+        let text = RichText::new(text).size(TEXT_POINTS);
         let text = match colour {
             Some(colour) => text.color(colour),
             None if dim => text.weak(),
             None => text,
         };
-        inner.allocate_ui(vec2(width, 20.0), |ui| {
-            ui.set_min_width(width);
+        inner.allocate_ui_with_layout(vec2(column.width(), 20.0), column.layout(), |ui| {
+            ui.set_min_width(column.width());
             ui.add(egui::Label::new(text).truncate().selectable(false));
         });
     };
-    let [name, error, stops, clipped, role] = Column::ALL.map(|(_, _, width, _)| width);
-    cell(name, row.name.clone(), None);
+    cell(Column::Name, row.name.clone(), None);
     let bad = row.error.is_some_and(|error| worst > 0.0 && error > 0.75 * worst && worst > 0.02);
     let text = row.error.map_or_else(|| "-".into(), |error| format!("{error:.4}"));
-    cell(error, text, bad.then_some(colours.warning));
-    cell(stops, if row.stops == 0.0 { "0".into() } else { format!("{:+.2}", row.stops) }, None);
+    cell(Column::Error, text, bad.then_some(colours.warning));
+    cell(Column::Exposure, if row.stops == 0.0 { "0".into() } else { format!("{:+.2}", row.stops) }, None);
     let much = row.clipped > 0.05;
-    cell(clipped, format!("{:.1} %", 100.0 * row.clipped), much.then_some(colours.warning));
-    cell(role, row.role.into(), None);
+    cell(Column::Clipped, format!("{:.1} %", 100.0 * row.clipped), much.then_some(colours.warning));
+    cell(Column::Role, row.role.into(), None);
     if chosen && scroll {
         response.scroll_to_me(None);
     }
