@@ -172,6 +172,7 @@ fn example_rows() -> Vec<LossRow> {
                 loss: if step == 222 { f64::NAN } else { image_loss * mvcl.exp() },
                 image_loss,
                 mvcl,
+                surface_rmse: None,
                 held_out_rmse: step.is_multiple_of(25).then_some(0.02 + image_loss * 0.6),
             }
         })
@@ -387,6 +388,7 @@ fn numbers_and_pixels_that_are_not_finite_do_not_break_the_page() {
             loss: f64::INFINITY,
             image_loss: f64::NAN,
             mvcl: f64::NAN,
+            surface_rmse: None,
             held_out_rmse: Some(f64::NAN),
         }],
         ..ReportData::default()

@@ -92,7 +92,7 @@ act 'Chart borders'; picture 17_maps
 act 'Chart borders'
 act 'Panel: relight'; picture 18_relight
 act 'Panel: texel'
-xdotool mousemove 800 420 click 1; sleep 6; picture 19_texel
+xdotool mousemove 800 540 click 1; sleep 8; picture 19_texel
 act 'Panel: messages'; picture 20_messages
 act 'Panel: curves'; picture 21_curves
 act 'False colour'; picture 22_false_colour 6

@@ -4,7 +4,7 @@ use crate::error::{Error, ErrorKind, Place, Result};
 use std::io::Write;
 use std::path::Path;
 
-const HEADER: &str = "step,stage,seconds,loss,image_loss,mvcl,held_out_rmse";
+const HEADER: &str = "step,stage,seconds,loss,image_loss,mvcl,surface_rmse,held_out_rmse";
 
 /// One step of a fit.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -25,6 +25,9 @@ pub struct LossRow {
     /// The multi-view consistency value in [0, 1]; 0 when it is off.
     #[serde(deserialize_with = "crate::export::loss_log::number_or_nan")]
     pub mvcl: f64,
+    /// Linear RMSE over the unclipped surface pixels of the step's views: the measure of held-out views.
+    #[serde(default)]
+    pub surface_rmse: Option<f64>,
     /// Linear RMSE over the held-out views, on the steps where it was measured.
     pub held_out_rmse: Option<f64>,
 }
@@ -41,10 +44,8 @@ pub fn write(path: &Path, rows: &[LossRow]) -> Result<()> {
         for row in rows {
             let stage = row.stage.replace([',', '\n', '\r'], " ");
             write!(writer, "{},{stage},{},{},{},{},", row.step, row.seconds, row.loss, row.image_loss, row.mvcl)?;
-            match row.held_out_rmse {
-                Some(rmse) => writeln!(writer, "{rmse}")?,
-                None => writeln!(writer)?,
-            }
+            let field = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
+            writeln!(writer, "{},{}", field(row.surface_rmse), field(row.held_out_rmse))?;
         }
         Ok(())
     })
@@ -69,10 +70,11 @@ fn row_of(path: &Path, line_number: usize, line: &str) -> Result<LossRow> {
             .remedy("the file is cut short or was edited: remove this line")
     };
     let fields: Vec<&str> = line.split(',').map(str::trim).collect();
-    let [step, stage, seconds, loss, image_loss, mvcl, held_out_rmse] = fields[..] else {
-        return Err(malformed(format!("{} fields instead of 7", fields.len())));
+    let [step, stage, seconds, loss, image_loss, mvcl, surface_rmse, held_out_rmse] = fields[..] else {
+        return Err(malformed(format!("{} fields instead of 8", fields.len())));
     };
     let number = |text: &str| text.parse::<f64>().map_err(|_| malformed(format!("\"{text}\" is not a number")));
+    let optional = |text: &str| if text.is_empty() { Ok(None) } else { number(text).map(Some) };
     Ok(LossRow {
         step: step.parse().map_err(|_| malformed(format!("\"{step}\" is not a step number")))?,
         stage: stage.to_string(),
@@ -80,7 +82,8 @@ fn row_of(path: &Path, line_number: usize, line: &str) -> Result<LossRow> {
         loss: number(loss)?,
         image_loss: number(image_loss)?,
         mvcl: number(mvcl)?,
-        held_out_rmse: if held_out_rmse.is_empty() { None } else { Some(number(held_out_rmse)?) },
+        surface_rmse: optional(surface_rmse)?,
+        held_out_rmse: optional(held_out_rmse)?,
     })
 }
 
@@ -92,13 +95,14 @@ mod tests {
     fn rows_come_back_bit_for_bit_and_a_cut_line_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("loss.csv");
-        let row = |step, held_out_rmse| LossRow {
+        let row = |step, held_out_rmse: Option<f64>| LossRow {
             step,
             stage: "all maps".into(),
             seconds: 0.1 + step as f64 / 3.0,
             loss: 1e-12 / 7.0,
             image_loss: 0.25,
             mvcl: 0.0,
+            surface_rmse: held_out_rmse.map(|rmse| rmse / 7.0),
             held_out_rmse,
         };
         let rows = vec![row(0, None), row(1, Some(0.1 / 3.0))];

@@ -221,6 +221,7 @@ mod tests {
                 loss: 1.0 / 3.0,
                 image_loss: 0.3,
                 consistency: 0.0,
+                surface_rmse: Some(0.2),
                 held_out_rmse: Some(0.1),
             }],
             non_finite: vec![("x".into(), 3)],

@@ -267,6 +267,7 @@ impl Fitter {
             loss: sums.loss,
             image_loss: sums.image_loss,
             consistency: sums.consistency,
+            surface_rmse: sums.surface_rmse(),
             held_out_rmse: None,
         };
         self.state.losses.push(row);

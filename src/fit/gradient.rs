@@ -41,6 +41,15 @@ pub(super) struct StepSums {
     pub agreement: Option<Vec<f32>>,
 }
 
+impl StepSums {
+    /// Root mean squared error over the surface of the views that were looked at; each view counts alike.
+    pub fn surface_rmse(&self) -> Option<f64> {
+        let squares = self.view_errors.iter().map(|(_, rmse)| f64::from(*rmse).powi(2));
+        let count = self.view_errors.len();
+        (count > 0).then(|| (squares.sum::<f64>() / count as f64).sqrt())
+    }
+}
+
 impl Fitter {
     /// Adds up the gradient of a step into the stage's gradient, on the base level. `None` when stopped.
     pub(super) fn sum_gradient(&mut self, stage: &Stage, stop: &AtomicBool) -> Result<Option<StepSums>> {

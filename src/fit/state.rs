@@ -20,6 +20,10 @@ pub struct LossRow {
     pub image_loss: f64,
     /// Disagreement of the views in [0, 1]; 0 when it is not measured.
     pub consistency: f64,
+    /// Root mean squared error over the unclipped surface pixels of the step's views, as held-out views are judged: the
+    /// loss itself counts background and clipped pixels too. `None` where there was none.
+    #[serde(default)]
+    pub surface_rmse: Option<f64>,
     /// Root mean squared error over held-out views, in the steps that look at them.
     pub held_out_rmse: Option<f64>,
 }

@@ -48,6 +48,7 @@ pub fn loss_rows(state: &FitState) -> Vec<LossRow> {
         loss: row.loss,
         image_loss: row.image_loss,
         mvcl: row.consistency,
+        surface_rmse: row.surface_rmse,
         held_out_rmse: row.held_out_rmse,
     };
     state.losses.iter().map(row).collect()

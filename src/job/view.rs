@@ -147,6 +147,7 @@ fn losses_of(folder: &RunFolder, findings: &mut Vec<Finding>) -> Vec<LossRow> {
         loss: row.loss,
         image_loss: row.image_loss,
         consistency: row.mvcl,
+        surface_rmse: row.surface_rmse,
         held_out_rmse: row.held_out_rmse,
     };
     rows.into_iter().map(row).collect()

@@ -26,11 +26,19 @@ impl Default for CurvesMemory {
 /// Points of each curve.
 #[derive(Default)]
 struct Series {
-    step: Vec<[f64; 2]>,
-    smooth: Vec<[f64; 2]>,
+    all: Vec<[f64; 2]>,
+    surface: Vec<[f64; 2]>,
     held_out: Vec<[f64; 2]>,
     consistency: Vec<[f64; 2]>,
     borders: Vec<(f64, String)>,
+}
+
+impl Series {
+    /// The highest value of any curve.
+    fn top(&self) -> f64 {
+        let points = [&self.all, &self.surface, &self.held_out].into_iter().flatten();
+        points.map(|point| point[1]).fold(f64::NEG_INFINITY, f64::max).max(-300.0)
+    }
 }
 
 /// Draws the panel.
@@ -68,7 +76,13 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut CurvesMemory) {
 fn figures(ui: &mut Ui, rows: &[LossRow]) {
     ui.separator();
     if let Some(row) = rows.last() {
-        ui.label(format!("Training RMSE {:.4}", row.image_loss.max(0.0).sqrt()));
+        ui.label(format!("Loss {:.4}", row.image_loss.max(0.0).sqrt())).on_hover_text(
+            "Root of what the fit lowers: every pixel that is evidence, background and clipped ones included",
+        );
+        if let Some(surface) = row.surface_rmse {
+            ui.label(format!("Training RMSE {surface:.4}"))
+                .on_hover_text("Unclipped surface pixels of the step's photos, as held-out photos are judged");
+        }
         if row.consistency > 0.0 {
             ui.label(format!("MVCL {:.2e}", row.consistency))
                 .on_hover_text("Disagreement of the views' gradients, in [0, 1]: Joy and Poullis 2023, eq. 3");
@@ -76,14 +90,14 @@ fn figures(ui: &mut Ui, rows: &[LossRow]) {
     }
     if let Some(held_out) = rows.iter().rev().find_map(|row| row.held_out_rmse) {
         ui.label(RichText::new(format!("Held-out RMSE {held_out:.4}")).strong())
-            .on_hover_text("Error of photos that the fit never sees");
+            .on_hover_text("Unclipped surface pixels of photos that the fit never sees, shrunk");
     }
 }
 
 /// Points of the curves. On a logarithmic axis values are powers of ten, and what is not above zero is left out.
 fn series(rows: &[LossRow], over_seconds: bool, logarithmic: bool, stage: Option<&str>) -> Series {
     let mut lines = Series::default();
-    let mut mean: Option<f64> = None;
+    let (mut mean_all, mut mean_surface) = (None, None);
     let mut last_stage = "";
     for row in rows.iter().filter(|row| stage.is_none_or(|stage| row.stage == stage)) {
         let x = if over_seconds { row.seconds } else { row.step as f64 };
@@ -91,18 +105,17 @@ fn series(rows: &[LossRow], over_seconds: bool, logarithmic: bool, stage: Option
             lines.borders.push((x, row.stage.clone()));
             last_stage = &row.stage;
             // Another resolution, another error: a mean over the border would mean nothing.
-            mean = None;
+            (mean_all, mean_surface) = (None, None);
         }
         let put = |line: &mut Vec<[f64; 2]>, value: f64| match logarithmic {
             true if value > 0.0 => line.push([x, value.log10()]),
             true => {}
             false => line.push([x, value]),
         };
-        let rmse = row.image_loss.max(0.0).sqrt();
-        put(&mut lines.step, rmse);
-        let smooth = mean.map_or(row.image_loss, |mean| mean + 0.15 * (row.image_loss - mean));
-        mean = Some(smooth);
-        put(&mut lines.smooth, smooth.max(0.0).sqrt());
+        put(&mut lines.all, smoothed(&mut mean_all, row.image_loss));
+        if let Some(rmse) = row.surface_rmse {
+            put(&mut lines.surface, smoothed(&mut mean_surface, rmse * rmse));
+        }
         if let Some(held_out) = row.held_out_rmse {
             put(&mut lines.held_out, held_out);
         }
@@ -111,6 +124,12 @@ fn series(rows: &[LossRow], over_seconds: bool, logarithmic: bool, stage: Option
         }
     }
     lines
+}
+
+/// The root of the mean of squared errors up to here, in which each older step counts less.
+fn smoothed(mean: &mut Option<f64>, squared: f64) -> f64 {
+    let mean = mean.insert(mean.map_or(squared, |mean| mean + 0.15 * (squared - mean)));
+    mean.max(0.0).sqrt()
 }
 
 fn plot(ui: &mut Ui, memory: &CurvesMemory) {
@@ -133,19 +152,19 @@ fn plot(ui: &mut Ui, memory: &CurvesMemory) {
         })
         .allow_scroll(false)
         .show(ui, |plot| {
+            let top = memory.lines.top();
             for (x, stage) in &memory.lines.borders {
                 // Without a name a line is not in the legend.
                 plot.vline(VLine::new("", *x).color(weak.gamma_multiply(0.6)).width(1.0));
-                let top = plot.plot_bounds().max()[1];
                 let label = RichText::new(format!(" {stage}")).color(weak).small();
-                let text = Text::new("", PlotPoint::new(*x, top), label).anchor(Align2::LEFT_TOP);
-                plot.text(text);
+                // Not at the border of what is shown: text counts among what is to be shown, and the plot would grow for ever.
+                plot.text(Text::new("", PlotPoint::new(*x, top), label).anchor(Align2::LEFT_BOTTOM));
             }
             let line = |name: &str, points: &Vec<[f64; 2]>, colour, width: f32| {
                 Line::new(name.to_owned(), PlotPoints::from(points.clone())).color(colour).width(width)
             };
-            plot.line(line("Step", &memory.lines.step, colours[0].gamma_multiply(0.35), 1.0));
-            plot.line(line("Training, smoothed", &memory.lines.smooth, colours[0], 2.0));
+            plot.line(line("Loss, all pixels", &memory.lines.all, colours[0].gamma_multiply(0.4), 1.5));
+            plot.line(line("Training photos", &memory.lines.surface, colours[0], 2.0));
             if !memory.lines.held_out.is_empty() {
                 plot.line(line("Held-out photos", &memory.lines.held_out, colours[1], 2.0));
                 let dots = PlotPoints::from(memory.lines.held_out.clone());
@@ -175,15 +194,19 @@ mod tests {
             loss: image_loss,
             image_loss,
             consistency: 0.0,
+            surface_rmse: Some(2.0 * image_loss.max(0.0).sqrt()),
             held_out_rmse: (step == 3).then_some(0.5),
         };
         let rows = [row(1, "coarse", 0.04), row(2, "coarse", -0.01), row(3, "fine", 0.25)];
         let lines = series(&rows, true, true, None);
         assert_eq!(lines.borders.len(), 2);
-        assert_eq!(lines.step.len(), 2, "a step below zero has no logarithm");
-        assert_eq!(lines.step[0], [2.0, 0.2f64.log10()]);
-        assert_eq!(lines.smooth.last(), Some(&[6.0, 0.5f64.log10()]), "the mean begins anew");
+        assert_eq!(lines.all[0], [2.0, 0.2f64.log10()]);
+        assert_eq!(lines.all.last(), Some(&[6.0, 0.5f64.log10()]), "the mean begins anew");
+        assert_eq!(lines.surface.last(), Some(&[6.0, 0.0]), "errors of the surface are a curve of their own");
+        assert_eq!(lines.top(), 0.0);
+        let below = series(&rows[1..2], true, true, None);
+        assert_eq!(below.all.len(), 0, "a step below zero has no logarithm");
         assert_eq!(lines.held_out, [[6.0, 0.5f64.log10()]]);
-        assert_eq!(series(&rows, false, false, Some("fine")).step, [[3.0, 0.5]]);
+        assert_eq!(series(&rows, false, false, Some("fine")).all, [[3.0, 0.5]]);
     }
 }

@@ -50,7 +50,7 @@ pub fn show(context: &Context, model: &mut Model) {
     }
 }
 
-/// Acts whose name or help holds all words of a query, those that begin with it first.
+/// Acts whose name or help holds all words of a query: the one called so first, then those that begin with it.
 fn found(query: &str) -> Vec<&'static ActInfo> {
     let words: Vec<String> = query.to_lowercase().split_whitespace().map(str::to_owned).collect();
     let holds = |text: &str| words.iter().all(|word| text.to_lowercase().contains(word));
@@ -59,7 +59,7 @@ fn found(query: &str) -> Vec<&'static ActInfo> {
     let query = query.trim().to_lowercase();
     hits.sort_by_key(|info| {
         let name = info.name.to_lowercase();
-        (!name.starts_with(&query), !holds(info.name))
+        (name != query, !name.starts_with(&query), !holds(info.name))
     });
     hits
 }

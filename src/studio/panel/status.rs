@@ -54,8 +54,10 @@ fn left(ui: &mut Ui, model: &mut Model) {
                 number::duration(progress.seconds_left)
             ));
         }
-        ui.label(format!("RMSE {:.4}", row.image_loss.max(0.0).sqrt()))
-            .on_hover_text("Root of the mean squared error of the last step's pixels, linear radiance");
+        let rmse = row.surface_rmse.unwrap_or_else(|| row.image_loss.max(0.0).sqrt());
+        ui.label(format!("RMSE {rmse:.4}")).on_hover_text(
+            "Root mean squared error of linear radiance over the unclipped surface of the last step's photos",
+        );
     }
 }
 
