@@ -172,7 +172,12 @@ impl Behavior<Panel> for Frames<'_> {
     }
 
     fn tab_bg_color(&self, visuals: &Visuals, _tiles: &Tiles<Panel>, _tile: TileId, state: &TabState) -> Color32 {
-        if state.active { visuals.panel_fill } else { visuals.extreme_bg_color }
+        match (state.active, visuals.override_text_color) {
+            // With all text of one colour, as in high contrast, the ground tells the tab that is open.
+            (true, Some(_)) => visuals.selection.bg_fill,
+            (true, None) => visuals.panel_fill,
+            (false, _) => visuals.extreme_bg_color,
+        }
     }
 
     fn tab_outline_stroke(&self, _: &Visuals, _: &Tiles<Panel>, _: TileId, _: &TabState) -> Stroke {
