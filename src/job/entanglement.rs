@@ -6,8 +6,8 @@
 //! have moved its reflectance by a factor that no photo forbids.
 
 use super::gallery::{NamedLight, drawn, set_light};
-use super::outcome::exposure_of;
 use super::pictures::parameters;
+use super::shown::exposure_of;
 use crate::error::Result;
 use crate::fit::targets::{Target, shrink_picture};
 use crate::image::{Image, RgbImage};

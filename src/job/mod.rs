@@ -10,9 +10,11 @@
 //! fits many times over and makes tables. [`preview`] draws for a window beside a fit. After a fit, [`gallery`] makes
 //! what a user shows, [`gauge`] moves its scale, [`entanglement`] tells how much light is baked into the maps.
 
+pub mod against_truth;
 pub mod background;
 pub mod demo;
 pub mod entanglement;
+mod facts;
 pub mod gallery;
 pub mod gauge;
 pub mod open;
@@ -22,6 +24,7 @@ pub mod prepare;
 pub mod preview;
 mod save;
 pub mod scale;
+pub mod shown;
 pub mod slot;
 pub mod study;
 mod view;

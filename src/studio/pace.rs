@@ -15,13 +15,14 @@ use std::time::{Duration, Instant};
 /// Share of the time that following may cost with a graphics card.
 const SHARE_CARD: f64 = 0.05;
 /// The same where the processor draws.
-const SHARE_SOFTWARE: f64 = 0.1;
+const SHARE_SOFTWARE: f64 = 0.08;
 /// Least and most seconds between two frames that nobody asked for.
-const FRAME_INTERVAL: (f64, f64) = (0.25, 3.0);
+const FRAME_INTERVAL: (f64, f64) = (0.25, 4.0);
 /// Least and most seconds between two snapshots that are taken in.
 const SNAPSHOT_INTERVAL: (f64, f64) = (0.5, 120.0);
-/// Seconds between two frames while something is about to change that was asked for.
-const SOON: f64 = 0.1;
+/// Seconds between two frames while something is about to change that was asked for: the change itself wakes the window,
+/// and frames would only put it off.
+const SOON: f64 = 0.5;
 /// A cost is measured anew after so many frames.
 const FRAMES_BETWEEN_MEASURES: u32 = 16;
 /// Weight of a new cost against those before.
@@ -184,10 +185,10 @@ mod tests {
         let rest = |pace: &mut Pace, status: &FitStatus| pace.rest(status, Follow::Live, false);
         assert_eq!(rest(&mut pace, &FitStatus::Running), Some(Duration::from_millis(250)));
         pace.frame_seconds = Some(0.04);
-        assert_eq!(rest(&mut pace, &FitStatus::Running), Some(Duration::from_millis(800)));
+        assert_eq!(rest(&mut pace, &FitStatus::Running), Some(Duration::from_secs(1)));
         pace.frame_seconds = Some(9.0);
-        assert_eq!(rest(&mut pace, &FitStatus::Running), Some(Duration::from_secs(3)));
-        assert_eq!(rest(&mut pace, &FitStatus::Pausing), Some(Duration::from_millis(100)));
+        assert_eq!(rest(&mut pace, &FitStatus::Running), Some(Duration::from_secs(4)));
+        assert_eq!(rest(&mut pace, &FitStatus::Pausing), Some(Duration::from_millis(500)));
         assert_eq!(rest(&mut pace, &FitStatus::Paused), None);
         assert_eq!(pace.rest(&FitStatus::Idle, Follow::Live, true), Some(Duration::from_millis(200)));
         assert!(Pace::new(false).share < pace.share);
@@ -200,10 +201,10 @@ mod tests {
         pace.begin(|| {});
         assert!(!pace.drawn(true, true, 0.0, true));
         assert!(!pace.takes_snapshot(Follow::Live, false));
-        // Its upload took four seconds: at a twentieth of the time the next but one comes after eighty.
+        // Its upload took four seconds: at a twenty-fifth of the time the next but one comes after a hundred.
         pace.begin(|| {});
         pace.drawn(true, true, 4.0, true);
-        assert!((pace.snapshot_interval() - 80.0).abs() < 1.0, "{}", pace.snapshot_interval());
+        assert!((pace.snapshot_interval() - 100.0).abs() < 1.0, "{}", pace.snapshot_interval());
         pace.restart();
         assert!(pace.takes_snapshot(Follow::Live, false));
     }

@@ -5,7 +5,7 @@ use crate::fit::Fitter;
 use crate::image::{Image, RgbImage};
 use crate::insight::report::number::short;
 use crate::insight::scores::{AlignmentSums, counted_pixels};
-use crate::job::outcome::truth_errors;
+use crate::job::against_truth::truth_errors;
 use crate::light::Environment;
 use crate::material::texels::{PyramidWeights, TexelPyramid, texels_from_maps};
 use crate::render::Parameters;

@@ -1,0 +1,179 @@
+//! The pictures by which a fit is judged: of its views with their scores, and relit.
+
+use super::pictures::{light_of, matched, relit};
+use super::prepare::RunSettings;
+use crate::error::Result;
+use crate::export::RunResult;
+use crate::fit::targets::Target;
+use crate::fit::views::views_of;
+use crate::fit::{Fitter, ViewUse};
+use crate::image::{Image, RgbImage};
+use crate::insight::report::{RelitPicture, RelitStrip, ViewPictures};
+use crate::insight::scores::{ViewScores, score_view};
+use crate::render::picture::{PictureSettings, render};
+use crate::render::{Parameters, Surface};
+use crate::scene::{Background, PixelState, Scene};
+use std::sync::atomic::AtomicBool;
+
+/// Pixels of a held-out view in the report, at most; larger photos are halved first.
+const HELD_OUT_PIXELS: usize = 400_000;
+/// Pixels of a training view in the report, at most.
+const TRAINING_PIXELS: usize = 60_000;
+/// Paths a pixel in the report's pictures of held-out views.
+const HELD_OUT_SAMPLES: usize = 32;
+/// Paths a pixel in the report's pictures of training views.
+const TRAINING_SAMPLES: usize = 8;
+/// Paths a pixel in relit pictures.
+const RELIT_SAMPLES: usize = 16;
+/// Pixels of a relit picture, at most.
+const RELIT_PIXELS: usize = 130_000;
+
+/// A view at the size the report shows, with its score.
+pub(super) struct ScoredView {
+    pub index: usize,
+    pub kind: ViewUse,
+    pub scores: ViewScores,
+    pub pictures: ViewPictures,
+}
+
+/// The level at which a view has at most so many pixels.
+fn level_of(scene: &Scene, view: usize, most_pixels: usize) -> usize {
+    let camera = &scene.views[view].camera;
+    (0..12).find(|level| (camera.width >> level) * (camera.height >> level) <= most_pixels).unwrap_or(12)
+}
+
+fn picture_settings(scene: &Scene, settings: &RunSettings, samples: usize) -> PictureSettings {
+    PictureSettings {
+        samples,
+        max_bounces: settings.fit.bounces,
+        filter: settings.fit.pixel_filter,
+        background_visible: scene.background == Background::Environment,
+        lobe_strength: if settings.fit.has_lobe() { 1.0 } else { 0.0 },
+        // A scan has holes through which its inside shows; a scene with a truth is drawn as its truth was.
+        two_sided: scene.truth.is_none(),
+        seed: settings.fit.seed ^ 0x5c0e,
+        ..Default::default()
+    }
+}
+
+pub(super) fn score_views(
+    fitter: &Fitter,
+    surface: &Surface,
+    own: &Parameters<f32>,
+    settings: &RunSettings,
+    stop: &AtomicBool,
+) -> Result<Vec<ScoredView>> {
+    let scene = fitter.scene().as_ref();
+    let mut scored = Vec::with_capacity(scene.views.len());
+    for (index, (view, &kind)) in scene.views.iter().zip(fitter.view_uses()).enumerate() {
+        let (most, samples) = match kind {
+            ViewUse::HeldOut => (HELD_OUT_PIXELS, HELD_OUT_SAMPLES),
+            ViewUse::Training | ViewUse::LeftOut => (TRAINING_PIXELS, TRAINING_SAMPLES),
+        };
+        let picture_settings = picture_settings(scene, settings, samples);
+        let target = Target::new(scene, index, level_of(scene, index, most));
+        let gain = fitter.state().log_gains[index].exp();
+        let mut picture = render(surface, &target.camera, own, index as u32, &picture_settings, stop);
+        picture.radiance.pixels_mut().iter_mut().for_each(|pixel| *pixel *= gain);
+        let (width, height) = (target.camera.width, target.camera.height);
+        let pixel = |row: usize, column: usize| target.at(scene, row * width + column);
+        let photo: RgbImage = Image::from_fn(width, height, |row, column| pixel(row, column).0);
+        let states: Image<PixelState> = Image::from_fn(width, height, |row, column| pixel(row, column).1);
+        let coverage = picture.coverage.map(|&coverage| coverage >= 0.999);
+        let scores = score_view(&photo, &picture.radiance, &states, Some(&coverage), exposure_of(scene))?;
+        let counted = crate::insight::scores::counted_pixels(&states, Some(&coverage));
+        let pictures = ViewPictures {
+            name: view.name.clone(),
+            held_out: view.held_out,
+            photo,
+            fit: picture.radiance,
+            counted: Some(counted),
+        };
+        scored.push(ScoredView { index, kind, scores, pictures });
+    }
+    Ok(scored)
+}
+
+/// Stops that bring photographs without an exposure of their own to a visible range: 0 for 8-bit photographs.
+pub fn exposure_of(scene: &Scene) -> f32 {
+    let Some(view) = scene.views.first() else { return 0.0 };
+    if matches!(view.photo, crate::scene::Photo::Srgb8(_)) {
+        return 0.0;
+    }
+    let mut luminances: Vec<f64> = Vec::new();
+    for row in (0..view.photo.height()).step_by(4) {
+        for column in (0..view.photo.width()).step_by(4) {
+            let luminance = crate::math::luminance(view.photo.radiance(row, column));
+            if luminance > 0.0 {
+                luminances.push(f64::from(luminance));
+            }
+        }
+    }
+    let bright = crate::math::statistics::quantile(&luminances, 0.95);
+    if bright.is_finite() && bright > 0.0 { (0.8 / bright).log2() as f32 } else { 0.0 }
+}
+
+/// Pictures under the light of the truth, when there is one, and under built-in skies.
+pub(super) fn relit_strips(
+    fitter: &Fitter,
+    surface: &Surface,
+    own: &Parameters<f32>,
+    result: &RunResult,
+    settings: &RunSettings,
+    stop: &AtomicBool,
+) -> Result<(Vec<RelitStrip>, Vec<ViewScores>)> {
+    let scene = fitter.scene().as_ref();
+    let uses = fitter.view_uses();
+    let mut strips = Vec::new();
+    let mut errors = Vec::new();
+    if let Some(truth) = scene.truth.as_ref().and_then(|truth| truth.relight.as_ref()) {
+        let own_settings = picture_settings(scene, settings, 2 * RELIT_SAMPLES);
+        let mut strip = RelitStrip {
+            light: "a light that no photo shows".into(),
+            environment: Some(truth.environment.radiance.clone()),
+            pictures: Vec::new(),
+        };
+        for (view, picture) in &truth.pictures {
+            let camera = &scene.views[*view].camera;
+            let ours = relit(surface, own, &truth.environment, camera, *view, &own_settings, stop);
+            let states = scene.views[*view].states.clone();
+            let coverage = ours.coverage.map(|&coverage| coverage >= 0.999);
+            errors.push(score_view(picture, &ours.radiance, &states, Some(&coverage), exposure_of(scene))?);
+            if strip.pictures.len() < 6 {
+                strip.pictures.push(RelitPicture {
+                    caption: scene.views[*view].name.clone(),
+                    picture: ours.radiance,
+                    truth: Some(picture.clone()),
+                });
+            }
+        }
+        strips.push(strip);
+    }
+    // Held-out views first: they are the ones a reader compares.
+    let mut order = views_of(uses, ViewUse::HeldOut);
+    order.extend(views_of(uses, ViewUse::Training));
+    let shown: Vec<usize> = order.iter().copied().step_by((order.len() / 3).max(1)).take(3).collect();
+    let relight_settings =
+        PictureSettings { background_visible: true, ..picture_settings(scene, settings, RELIT_SAMPLES) };
+    let turned = |degrees: f32| (format!("the fitted light turned by {degrees} degrees"), degrees.to_radians());
+    let mut lights = Vec::new();
+    for name in ["noon", "evening", "overcast"] {
+        let (name, light) = light_of(name, settings.fit.environment_height.max(64))?;
+        lights.push((format!("built-in sky: {name}"), matched(&light, &result.environment).0));
+    }
+    for (name, radians) in [turned(90.0), turned(180.0)] {
+        lights.push((name, result.environment.rotated_about_up(radians)));
+    }
+    for (name, light) in lights {
+        let mut strip = RelitStrip { light: name, environment: Some(light.radiance.clone()), pictures: Vec::new() };
+        for &view in &shown {
+            let level = level_of(scene, view, RELIT_PIXELS);
+            let camera = scene.views[view].camera.shrunk(1 << level);
+            let picture = relit(surface, own, &light, &camera, view, &relight_settings, stop);
+            let caption = scene.views[view].name.clone();
+            strip.pictures.push(RelitPicture { caption, picture: picture.radiance, truth: None });
+        }
+        strips.push(strip);
+    }
+    Ok((strips, errors))
+}
