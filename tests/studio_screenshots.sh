@@ -3,6 +3,8 @@
 #
 #   bash tests/studio_screenshots.sh OUT [SCENE] [SECONDS OF FIT]
 #
+# With README_PICTURES=screenshots the README's pictures of the window are made of them.
+#
 # SCENE is a scene folder; without one, or when it is not there, the built-in demo. Needs the Debian packages
 # xvfb xdotool imagemagick mesa-vulkan-drivers libxcursor1 libxi6 libxkbcommon-x11-0 libx11-xcb1.
 set -euo pipefail
@@ -91,21 +93,21 @@ act 'Panel: maps'
 act 'Chart borders'; picture 17_maps
 act 'Chart borders'
 act 'Panel: relight'; picture 18_relight
+act 'Strip of lights'; sleep 12; picture 18_strip
 act 'Panel: texel'
 xdotool mousemove 800 540 click 1; sleep 8; picture 19_texel
 act 'Panel: messages'; picture 20_messages
+act 'Panel: scores'; picture 21_scores
 act 'Panel: curves'; picture 21_curves
 act 'False colour'; picture 22_false_colour 6
 act 'Reset display'
-keys ctrl+k; xdotool type 'light'; picture 23_palette; keys Escape
-keys F1; picture 24_help; keys Escape
-act 'Save picture'; picture 25_save; keys Escape
-for _ in $(seq 120); do act 'Error of the photos'; sleep 1; break; done
+keys ctrl+k; sleep 1; xdotool type --delay 60 'light'; picture 23_palette 2; keys Escape; sleep 1
+keys F1; picture 24_help 3; keys Escape; sleep 1
+act 'Save picture'; picture 25_save 3; keys Escape; sleep 1
+act 'Error of the photos'
 picture 26_photo_error 30
 act 'Lit'
-act 'Next theme'; picture 27_theme
-act 'Next theme'; picture 28_theme
-act 'Next theme'; picture 29_theme
+for theme in 27 28 29; do act 'Next theme'; picture "${theme}_theme" 3; done
 act 'Pause or go on'; sleep 3
 act 'Stop fit'
 wait_for_title 'Stopped' 120
@@ -114,4 +116,9 @@ act 'Quit'
 for _ in $(seq 60); do kill -0 "$studio" 2>/dev/null || break; sleep 0.5; done
 if kill -0 "$studio" 2>/dev/null; then echo 'the window did not close'; exit 1; fi
 studio=$server
+if [ -n "${README_PICTURES:-}" ]; then
+  for pair in 03_fitting:fitting 12_two_lights:two_lights 19_texel:texel; do
+    convert "$out/${pair%%:*}.png" -quality 88 "$README_PICTURES/window_${pair##*:}.jpg"
+  done
+fi
 echo 'done'

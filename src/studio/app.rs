@@ -25,6 +25,8 @@ pub struct Studio {
     preferences_written: Instant,
     pace: Pace,
     took_snapshot: bool,
+    /// When a person last did something.
+    touched: Instant,
     /// Events that the next frame takes before its own.
     events_held_back: Vec<egui::Event>,
     /// Seconds the last frames took to lay out and paint, newest last; for `patina bench studio`.
@@ -42,6 +44,8 @@ pub struct StudioOptions {
     pub settings_file: Option<PathBuf>,
 }
 
+/// For how long a person waits for the answer to what they did.
+const PERSON_WAITS: Duration = Duration::from_secs(3);
 /// Seconds between two writings of what is remembered.
 const PREFERENCES_INTERVAL: Duration = Duration::from_secs(10);
 
@@ -87,6 +91,7 @@ impl Studio {
             preferences_written: Instant::now(),
             pace,
             took_snapshot: false,
+            touched: Instant::now(),
             events_held_back: Vec::new(),
             frame_seconds: Vec::new(),
         }
@@ -222,6 +227,10 @@ impl eframe::App for Studio {
             self.model.acts.extend(keys::pressed(&context));
         }
         self.model.peek_photo = context.input(|input| input.modifiers.shift);
+        if context.input(|input| !input.events.is_empty() || input.pointer.any_down()) {
+            self.touched = Instant::now();
+        }
+        self.model.nobody_waits = is_at_work(&self.model.fit.status) && self.touched.elapsed() > PERSON_WAITS;
         self.draw(ui);
         release_focus(&context);
         for act in std::mem::take(&mut self.model.acts) {

@@ -35,7 +35,9 @@ pub(super) fn open(
         .with_inner_size(size)
         .with_min_inner_size([640.0, 400.0])
         .with_drag_and_drop(true);
-    let native = eframe::NativeOptions { viewport, renderer: eframe::Renderer::Wgpu, ..Default::default() };
+    // Dithering costs a seventh of a frame where the processor draws, and the window shows hardly a gradient of its own.
+    let native =
+        eframe::NativeOptions { viewport, renderer: eframe::Renderer::Wgpu, dithering: false, ..Default::default() };
     // A system library that is missing makes the window library panic: the person gets a sentence all the same.
     let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(move || {
         eframe::run_native("patina", native, Box::new(move |creation| Ok(app(creation))))

@@ -125,6 +125,12 @@ impl Pace {
             return false;
         }
         self.draw_seconds += 0.2 * (seconds - self.draw_seconds);
+        if self.redraw_is_due
+            && let (Some((_, cost, _)), Some(frame)) = (&mut self.snapshot, self.frame_seconds)
+        {
+            // Frames between a snapshot and the last of its uploads would not be drawn without it.
+            *cost += frame;
+        }
         self.frames_unmeasured = self.frames_unmeasured.saturating_add(1);
         if !follows {
             return false;

@@ -211,6 +211,8 @@ pub struct Model {
     pub light_was_chosen_for_us: Option<LightName>,
     /// Shift is held over the stage: the photo shows as long.
     pub peek_photo: bool,
+    /// A fit runs and nobody touched anything for a moment: what changes need not be shown at once.
+    pub nobody_waits: bool,
     /// Called from any thread when the window should look again.
     pub wake: Wake,
     /// Called before each step of a fit with the number of steps done, on its thread; for `patina bench studio`.
@@ -252,6 +254,7 @@ impl Model {
             interrupted_run,
             hovered_value: String::new(),
             peek_photo: false,
+            nobody_waits: false,
             light_was_chosen_for_us: None,
             wake,
             before_step: None,

@@ -234,4 +234,6 @@ pub struct StageFrame {
     pub look: StageLook,
     /// Waits for uploads within the frame, as a picture file needs; a window rather shows the last state meanwhile.
     pub wait_for_uploads: bool,
+    /// Nobody waits for what is uploaded: it is shown by whatever frame comes next, and asks for none.
+    pub quiet_uploads: bool,
 }

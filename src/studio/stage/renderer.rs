@@ -195,8 +195,10 @@ impl StageRenderer {
     /// Follows every handle of the content; whether the scene looks different.
     fn follow_content(&mut self, frame: &StageFrame, context: &egui::Context) -> bool {
         let content = &frame.content;
-        let speed = |texels: usize| {
-            if frame.wait_for_uploads || texels <= TEXELS_AT_ONCE { Speed::Now } else { Speed::Later(context) }
+        let speed = |texels: usize| match (frame.wait_for_uploads || texels <= TEXELS_AT_ONCE, frame.quiet_uploads) {
+            (true, _) => Speed::Now,
+            (false, true) => Speed::Quietly,
+            (false, false) => Speed::Later(context),
         };
         let pixels = |image: &RgbImage| image.pixels().len();
 

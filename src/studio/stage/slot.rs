@@ -38,6 +38,8 @@ pub(super) enum Speed<'a> {
     Now,
     /// On another thread, which wakes the window; the last one stays until then.
     Later(&'a egui::Context),
+    /// On another thread; whatever frame comes next shows it.
+    Quietly,
 }
 
 /// What is shown of a handle `K`, and what is being made of a newer one.
@@ -89,15 +91,18 @@ impl<K: Same + Clone + Send + 'static, G: Send + 'static> Slot<K, G> {
                 self.shown = Some((wanted, made));
                 changed = true;
             }
-            Speed::Later(context) => {
+            Speed::Later(_) | Speed::Quietly => {
                 let (sender, receiver) = channel();
-                let (key, context) = (wanted.clone(), context.clone());
+                let context = if let Speed::Later(context) = speed { Some(context.clone()) } else { None };
+                let key = wanted.clone();
                 let work = move || {
                     // The window may be gone meanwhile.
                     let began = Instant::now();
                     let made = make(&key);
                     let _ = sender.send((made, began.elapsed().as_secs_f64()));
-                    context.request_repaint();
+                    if let Some(context) = context {
+                        context.request_repaint();
+                    }
                 };
                 match std::thread::Builder::new().name("stage upload".into()).spawn(work) {
                     Ok(_) => self.pending = Some((wanted, receiver)),

@@ -90,6 +90,7 @@ impl FrameCache {
                 ..StageLook::default()
             },
             wait_for_uploads: false,
+            quiet_uploads: model.nobody_waits,
         }
     }
 
