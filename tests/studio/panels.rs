@@ -219,6 +219,7 @@ fn a_finding_with_a_place_is_a_link_that_goes_there() {
     studio.frames(1);
     assert!(studio.says("2 to look at"));
     studio.click("2 to look at");
+    studio.frames(1);
     assert!(!studio.says("to look at"), "looked at");
     assert!(studio.says("This photo is dark"));
     let link = Place::View(name.clone()).to_string();

@@ -56,7 +56,7 @@ fn picture(studio: &mut TestStudio, name: &str) -> RgbaImage {
 }
 
 fn stage_rect(studio: &TestStudio) -> Rect {
-    studio.control("Stage").rect()
+    studio.control("Scene in 3-D").rect()
 }
 
 /// Pixels of a part of the window.
