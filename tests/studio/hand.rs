@@ -45,35 +45,50 @@ impl TestStudio {
     /// Clicks the one control with this label.
     #[track_caller]
     pub fn click(&mut self, label: &str) {
-        self.bring_into_view(label);
-        let node = self.control(label);
-        assert!(!node.accesskit_node().is_disabled(), "{label:?} is grey; {}", self.log());
-        node.click();
-        self.frames(2);
-    }
-
-    /// Scrolls, as a person does, until the one control with this label is seen: a click goes where the mouse is, and
-    /// below the end of a panel there is another panel.
-    #[track_caller]
-    fn bring_into_view(&mut self, label: &str) {
-        self.control(label).scroll_to_me();
-        // Scrolling glides over some frames.
-        let mut before = self.control(label).rect();
-        for _ in 0..60 {
-            self.frames(2);
-            let now = self.control(label).rect();
-            if now == before {
-                return;
-            }
-            before = now;
-        }
+        self.click_found(|studio| studio.control(label));
     }
 
     /// Clicks the one control of this kind with this label.
     #[track_caller]
     pub fn click_role(&mut self, role: Role, label: &str) {
-        self.control_of(role, label).click();
-        self.frames(2);
+        self.click_found(|studio| studio.control_of(role, label));
+    }
+
+    /// Scrolls, as a person does, until a control is seen, and clicks it: a click goes where the mouse is, and below the
+    /// end of a panel there is another panel.
+    #[track_caller]
+    fn click_found(&mut self, find: impl for<'a> Fn(&'a TestStudio) -> Node<'a>) {
+        find(self).scroll_to_me();
+        let mut before = find(self).rect();
+        for _ in 0..30 {
+            self.frames(2);
+            let now = find(self).rect();
+            if std::env::var_os("DBG").is_some() {
+                println!("{before:?} {now:?}");
+            }
+            if now == before {
+                break;
+            }
+            before = now;
+        }
+        let node = find(self);
+        assert!(!node.accesskit_node().is_disabled(), "{node:?} is grey; {}", self.log());
+        node.click();
+        // A window over the window is measured in one frame and seen in the next.
+        self.frames(3);
+    }
+
+    /// Clicks the tab of a panel; menus are called alike, but are not switched on and off.
+    #[track_caller]
+    pub fn click_tab(&mut self, title: &str) {
+        let is_tab = |node: &Node<'_>| {
+            let node = node.accesskit_node();
+            node.role() == Role::Button && node.toggled().is_some()
+        };
+        let tabs: Vec<_> = self.controls(title).into_iter().filter(is_tab).collect();
+        assert_eq!(tabs.len(), 1, "tabs called {title}: {tabs:#?}");
+        tabs[0].click();
+        self.frames(3);
     }
 
     /// The one control of this kind with this label.
