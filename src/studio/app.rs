@@ -126,19 +126,23 @@ impl Studio {
             self.title_in_force = title;
         }
         if self.preferences_written.elapsed() > PREFERENCES_INTERVAL {
-            self.remember(context);
+            self.remember();
         }
     }
 
-    fn remember(&mut self, context: &Context) {
+    fn remember(&mut self) {
         self.preferences_written = Instant::now();
         self.model.preferences.layout = self.layout.to_text();
+        self.model.write_preferences();
+    }
+
+    /// Takes up how large the interface and the window are.
+    fn take_up_sizes(&mut self, context: &Context) {
         self.model.preferences.zoom = context.zoom_factor();
         let size = context.content_rect().size();
         if size.x > 100.0 && size.y > 100.0 {
             self.model.preferences.window_size = (size * context.zoom_factor()).into();
         }
-        self.model.write_preferences();
     }
 
     /// Draws everything.
@@ -239,6 +243,7 @@ impl eframe::App for Studio {
         if let Some(panel) = self.model.activate.take() {
             self.layout.activate(panel);
         }
+        self.take_up_sizes(&context);
         let seconds = context.input(|input| input.time);
         self.model.history.feed(seconds, &self.model.edits);
         self.model.send_changed_settings(&context);
@@ -250,6 +255,7 @@ impl eframe::App for Studio {
     }
 
     fn on_exit(&mut self) {
+        // Zoom and size are taken up with every frame: here there is no window any more to ask.
         self.model.tasks.stop_all();
         self.model.fit.stop_and_wait();
         self.model.preferences.running = None;

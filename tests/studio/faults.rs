@@ -42,6 +42,7 @@ fn a_worker_that_panics_is_told_and_the_fit_goes_on_from_its_checkpoint() {
     assert!(studio.says("Failed: "), "the line at the bottom keeps it");
     assert_lives(&mut studio);
 
+    falls.store(false, Ordering::Relaxed);
     // What helps is to go on: the button is there, and the steps before the checkpoint are not done again.
     studio.click("Go on from the checkpoint");
     studio.wait_for_word("The fit goes on after step");
@@ -181,7 +182,7 @@ fn a_scene_that_vanished_keeps_its_run_from_going_on_and_says_what_to_do() {
     let run = studio.run_folder();
     studio.model().open(run);
     studio.wait("the run", |model| model.project.as_ref().is_some_and(|own| own.scene.is_some()));
-    studio.click("Fit");
+    studio.click_tab("Fit");
     studio.click("Go on from the checkpoint");
     studio.wait_for_word("The fit goes on after step");
 }

@@ -2,8 +2,10 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod acts;
 mod faults;
 mod fit;
+mod hand;
 mod manners;
 mod memory;
 mod panels;

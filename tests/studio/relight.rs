@@ -71,9 +71,8 @@ fn the_light_turns_by_key_and_slider_and_is_made_stronger() {
     studio.press(Modifiers::SHIFT, Key::ArrowRight);
     studio.press(Modifiers::SHIFT, Key::ArrowRight);
     assert_eq!(studio.number("Turn"), 345.0, "around, not below zero");
-    studio.control("Turn").set_value_accesskit(90.0);
-    studio.control("Strength").set_value_accesskit(2.0);
-    studio.frames(2);
+    studio.move_slider("Turn", 90.0);
+    studio.move_slider("Strength", 2.0);
     assert_eq!((studio.number("Turn"), studio.number("Strength")), (90.0, 2.0));
     let stage_light = studio.model().stage_light(&LightName::Fitted).unwrap();
     let traced = studio.model().traced_light(&LightName::Fitted).unwrap();

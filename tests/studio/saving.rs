@@ -37,7 +37,7 @@ fn a_picture_is_saved_as_the_screen_shows_it_and_in_linear_radiance() {
     assert!(studio.says("Size in pixels"));
     studio.harness.check_accessibility();
     let png = folder.path().join("stage.png");
-    save(&mut studio, &png, "File");
+    save(&mut studio, &png, "Picture file");
     assert_shows_something(&png);
     assert!(!studio.says("Size in pixels"), "the dialog is gone");
 
@@ -46,7 +46,7 @@ fn a_picture_is_saved_as_the_screen_shows_it_and_in_linear_radiance() {
     studio.model().edits.display.exposure_stops = 2.0;
     studio.press(Modifiers::COMMAND, Key::S);
     let exr = folder.path().join("deeper").join("stage.exr");
-    save(&mut studio, &exr, "File");
+    save(&mut studio, &exr, "Picture file");
     assert_shows_something(&exr);
     let mean = |path: &Path| {
         let picture = file::read_rgb(path).unwrap();
@@ -61,7 +61,7 @@ fn a_strip_shows_every_light_of_the_shelf_and_a_turntable_goes_around() {
     let folder = tempfile::tempdir().unwrap();
     let strip = folder.path().join("strip");
     studio.click("Save strip of lights…");
-    save(&mut studio, &strip, "Folder");
+    save(&mut studio, &strip, "Folder of pictures");
     let lights = studio.model().shelf.lights().len();
     let pictures: Vec<PathBuf> = files_of(&strip);
     assert!(pictures.len() >= lights, "{pictures:?}");
@@ -71,7 +71,7 @@ fn a_strip_shows_every_light_of_the_shelf_and_a_turntable_goes_around() {
     let turntable = folder.path().join("turntable");
     studio.click("Save turntable…");
     studio.type_number("Pictures", "3");
-    save(&mut studio, &turntable, "Folder");
+    save(&mut studio, &turntable, "Folder of pictures");
     let frames = files_of(&turntable);
     assert_eq!(frames.len(), 3, "{frames:?}");
     frames.iter().for_each(|frame| assert_shows_something(frame));
@@ -85,7 +85,7 @@ fn a_picture_that_cannot_be_written_is_told_and_one_that_is_not_wished_is_not() 
     let file_not_folder = folder.path().join("file");
     patina::files::write_bytes(&file_not_folder, b"in the way").unwrap();
     studio.press(Modifiers::COMMAND, Key::S);
-    studio.replace_text("File", &file_not_folder.join("stage.png").display().to_string());
+    studio.replace_text("Picture file", &file_not_folder.join("stage.png").display().to_string());
     for (field, number) in [("Width", "16"), ("Height", "16"), ("Paths a pixel", "1")] {
         studio.type_number(field, number);
     }
@@ -95,7 +95,7 @@ fn a_picture_that_cannot_be_written_is_told_and_one_that_is_not_wished_is_not() 
     studio.click("Dismiss");
 
     studio.press(Modifiers::COMMAND, Key::S);
-    studio.replace_text("File", &folder.path().join("unwished.png").display().to_string());
+    studio.replace_text("Picture file", &folder.path().join("unwished.png").display().to_string());
     studio.press(Modifiers::NONE, Key::Escape);
     assert!(!studio.says("Size in pixels"));
     assert!(!studio.model().tasks.is_busy() && files_of(folder.path()).len() == 1);

@@ -1,8 +1,7 @@
-//! A studio in a harness, what a hand does to it, and a small scene on disk for it to open.
+//! A studio in a harness, and a small scene on disk for it to open; what a hand does to it is in `hand`.
 
 use eframe::App;
-use egui_kittest::kittest::{By, NodeT, Queryable};
-use egui_kittest::{Harness, HarnessBuilder, Node};
+use egui_kittest::{Harness, HarnessBuilder};
 use patina::export::exchange::{self, ExchangeOptions};
 use patina::scene::demo::DemoSettings;
 use patina::studio::act::Act;
@@ -20,6 +19,8 @@ pub use eframe::egui::{Key, Modifiers};
 
 /// What waits longer than this is taken to hang.
 const PATIENCE: Duration = Duration::from_secs(240);
+/// The same where neither a task nor a fit is at work.
+const PATIENCE_AT_REST: Duration = Duration::from_secs(10);
 /// Steps of a fit that only a stop ends.
 pub const ENDLESS: usize = 100_000;
 
@@ -194,102 +195,6 @@ impl TestStudio {
         self.frames(2);
     }
 
-    /// The one control with this label: not a text, not a title.
-    pub fn control(&self, label: &str) -> Node<'_> {
-        let all = self.controls(label);
-        assert_eq!(all.len(), 1, "{} controls are called {label:?}: {all:#?}; {}", all.len(), self.log());
-        all[0]
-    }
-
-    /// All controls with this label.
-    pub fn controls(&self, label: &str) -> Vec<Node<'_>> {
-        let is_control =
-            |node: &Node<'_>| !matches!(node.accesskit_node().role(), Role::Label | Role::GenericContainer);
-        // The label's lifetime is that of the query, not of the tree.
-        let wanted = label.to_owned();
-        let by = By::new().predicate(move |node| node.label().is_some_and(|own| own == wanted));
-        self.harness.query_all(by).filter(is_control).collect()
-    }
-
-    /// Whether any widget, text included, says this somewhere.
-    pub fn says(&self, text: &str) -> bool {
-        let wanted = text.to_owned();
-        let by = By::new().predicate(move |node| {
-            let is_text = node.role() == Role::Label;
-            let own = if is_text { node.value() } else { node.label() };
-            own.is_some_and(|own| own.contains(&wanted))
-        });
-        self.harness.query_all(by).next().is_some()
-    }
-
-    /// Clicks the one control with this label.
-    #[track_caller]
-    pub fn click(&mut self, label: &str) {
-        let node = self.control(label);
-        assert!(!node.accesskit_node().is_disabled(), "{label:?} is grey; {}", self.log());
-        node.click();
-        self.frames(2);
-    }
-
-    /// Clicks the one control of this kind with this label.
-    #[track_caller]
-    pub fn click_role(&mut self, role: Role, label: &str) {
-        let nodes: Vec<_> =
-            self.controls(label).into_iter().filter(|node| node.accesskit_node().role() == role).collect();
-        assert_eq!(nodes.len(), 1, "{nodes:#?}");
-        nodes[0].click();
-        self.frames(2);
-    }
-
-    /// Clicks the uppermost control with this label, where a menu and a tab are called alike.
-    #[track_caller]
-    pub fn click_first(&mut self, label: &str) {
-        let nodes = self.controls(label);
-        assert!(!nodes.is_empty(), "no control is called {label:?}; {}", self.log());
-        let top = nodes.iter().min_by(|a, b| a.rect().top().total_cmp(&b.rect().top())).copied().unwrap();
-        top.click();
-        self.frames(2);
-    }
-
-    /// Whether the one control with this label is grey.
-    pub fn is_grey(&self, label: &str) -> bool {
-        self.control(label).accesskit_node().is_disabled()
-    }
-
-    /// The number in a field.
-    pub fn number(&self, label: &str) -> f64 {
-        self.control(label).accesskit_node().numeric_value().unwrap()
-    }
-
-    /// Clicks a field of a number, types another and leaves it by Enter.
-    #[track_caller]
-    pub fn type_number(&mut self, label: &str, number: &str) {
-        self.click(label);
-        self.type_text(number);
-        self.press(Modifiers::NONE, Key::Enter);
-    }
-
-    /// Replaces the text of a field.
-    #[track_caller]
-    pub fn replace_text(&mut self, label: &str, text: &str) {
-        self.control(label).focus();
-        self.frames(2);
-        self.press(Modifiers::COMMAND, Key::A);
-        self.type_text(text);
-    }
-
-    /// Types into whatever has the focus.
-    pub fn type_text(&mut self, text: &str) {
-        self.harness.event(eframe::egui::Event::Text(text.to_owned()));
-        self.frames(2);
-    }
-
-    /// Presses a key and lets it go.
-    pub fn press(&mut self, modifiers: Modifiers, key: Key) {
-        self.harness.key_press_modifiers(modifiers, key);
-        self.frames(2);
-    }
-
     /// Frames until something is so.
     #[track_caller]
     pub fn wait(&mut self, what: &str, is_so: impl Fn(&Model) -> bool) {
@@ -302,8 +207,9 @@ impl TestStudio {
                 self.frames(2);
                 return;
             }
-            let failed = matches!(model.fit.status, FitStatus::Failed(_));
-            let patience = if failed { Duration::from_secs(5) } else { PATIENCE };
+            // Where nothing works any more, nothing will come either.
+            let is_at_rest = !model.fit.status.is_live() && !model.tasks.is_busy();
+            let patience = if is_at_rest { PATIENCE_AT_REST } else { PATIENCE };
             assert!(began.elapsed() < patience, "{what} did not come; {:?}, {}", model.fit.status, self.log());
             std::thread::sleep(Duration::from_millis(5));
         }

@@ -12,7 +12,7 @@ fn a_typed_path_opens_a_scene_and_the_next_start_remembers_it() {
     studio.click("Open path");
     studio.wait("the atlas", |model| model.project.as_ref().is_some_and(|own| own.surface.is_some()));
     studio.control("Start the fit");
-    assert!(studio.says("6 photos, 2 held out to judge"));
+    assert!(studio.says("8 photos, 2 held out to judge"));
 
     let folder = studio.close();
     let mut again = TestStudio::in_folder(folder, None);

@@ -75,10 +75,12 @@ pub struct FitControl {
     pub report: Option<Arc<ReportData>>,
     /// Where the run is written.
     pub folder: Option<RunFolder>,
-    /// Settings the worker goes by.
+    /// Settings the worker goes by, or will once it has taken what was sent.
     pub settings_in_force: Option<FitSettings>,
-    /// Settings before a change that was sent and may still be refused.
-    pub settings_before_change: Option<FitSettings>,
+    /// Settings the worker has last said to go by.
+    pub settings_confirmed: Option<FitSettings>,
+    /// Changes that were sent and neither taken nor refused yet.
+    pub changes_sent: usize,
     /// Whether the worker refused the last change.
     pub was_refused: bool,
     /// When the last checkpoint was written.
@@ -94,7 +96,8 @@ impl FitControl {
             folder: Some(folder),
             losses: std::mem::take(&mut self.losses),
             snapshot: self.snapshot.take(),
-            settings_in_force: Some(settings),
+            settings_in_force: Some(settings.clone()),
+            settings_confirmed: Some(settings),
             ..FitControl::default()
         };
     }
@@ -187,11 +190,12 @@ impl FitControl {
             Event::Paused => self.status = FitStatus::Paused,
             Event::Resumed => self.status = FitStatus::Running,
             Event::SettingsChanged(settings) => {
-                self.settings_in_force = Some(*settings);
-                self.settings_before_change = None;
+                self.changes_sent = self.changes_sent.saturating_sub(1);
+                self.settings_confirmed = Some(*settings);
                 log.note("The fit goes on with the changed settings");
             }
             Event::Refused(error) => {
+                self.changes_sent = self.changes_sent.saturating_sub(1);
                 self.was_refused = true;
                 log.add(Message::from(
                     &Finding::new(Severity::Warning, "refused", error.message()).at(error.place().clone()),

@@ -126,18 +126,22 @@ impl Model {
             return;
         }
         let wanted = self.edits.fit.clone();
-        // Taken as sent: if the worker refuses, its event brings back what is in force.
-        self.fit.settings_before_change = self.fit.settings_in_force.replace(wanted.clone());
+        // Taken as sent: if the worker refuses, what it said last comes back.
+        self.fit.settings_in_force = Some(wanted.clone());
+        self.fit.changes_sent += 1;
         self.fit.send(Command::Change(Box::new(wanted)));
     }
 
-    /// Puts the form back to what is in force after the worker refused a change.
+    /// Puts the form back to what is in force after the worker refused a change. While another change is on its way, that
+    /// one decides.
     pub(super) fn take_back_refused(&mut self) {
-        if let Some(before) =
-            self.fit.settings_before_change.take().filter(|_| std::mem::take(&mut self.fit.was_refused))
-        {
-            self.fit.settings_in_force = Some(before.clone());
-            self.edits.fit = before;
+        if !self.fit.was_refused || self.fit.changes_sent > 0 {
+            return;
+        }
+        self.fit.was_refused = false;
+        if let Some(confirmed) = self.fit.settings_confirmed.clone() {
+            self.fit.settings_in_force = Some(confirmed.clone());
+            self.edits.fit = confirmed;
         }
     }
 }

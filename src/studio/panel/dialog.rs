@@ -1,6 +1,6 @@
 //! Windows over the window: the palette of acts, help, a path, how to save.
 
-use crate::studio::act::availability::availability;
+use super::act_line;
 use crate::studio::act::{Act, ActInfo, Group, LIST};
 use crate::studio::model::{Dialog, Model, PickFor, SaveRequest, SaveWhat};
 use crate::studio::theme;
@@ -50,16 +50,16 @@ pub fn show(context: &Context, model: &mut Model) {
     }
 }
 
-/// Acts whose name or help holds all words of a query: the one called so first, then those that begin with it.
+/// Acts whose name or help holds all words of a query: the one that is called so first, then those that begin with it.
 fn found(query: &str) -> Vec<&'static ActInfo> {
     let words: Vec<String> = query.to_lowercase().split_whitespace().map(str::to_owned).collect();
     let holds = |text: &str| words.iter().all(|word| text.to_lowercase().contains(word));
     let mut hits: Vec<&ActInfo> =
         LIST.iter().filter(|info| info.act != Act::Palette && (holds(info.name) || holds(info.help))).collect();
-    let query = query.trim().to_lowercase();
+    let query = query.trim().trim_end_matches('…').to_lowercase();
     hits.sort_by_key(|info| {
         let name = info.name.to_lowercase();
-        (name != query, !name.starts_with(&query), !holds(info.name))
+        (name.trim_end_matches('…') != query, !name.starts_with(&query), !holds(info.name))
     });
     hits
 }
@@ -81,20 +81,13 @@ fn palette(ui: &mut Ui, model: &mut Model, query: &mut String) -> bool {
     place = (place + usize::from(down)).saturating_sub(usize::from(up)).min(hits.len().saturating_sub(1));
     ScrollArea::vertical().max_height(360.0).auto_shrink([false, true]).show(ui, |ui| {
         for (index, info) in hits.iter().enumerate() {
-            let available = availability(info.act, model);
-            let mut button = Button::new(info.name).selected(index == place).min_size(egui::vec2(440.0, 0.0));
-            if let Some(shortcut) = info.shortcut {
-                button = button.shortcut_text(ui.ctx().format_shortcut(&shortcut));
-            }
-            let response = ui.add_enabled(available.is_ok(), button).on_hover_text(info.help);
-            if index == place && (down || up) {
+            let marked = index == place;
+            let dress = |button: Button<'static>| button.selected(marked).min_size(egui::vec2(440.0, 0.0));
+            let response = act_line(ui, model, info, dress);
+            if marked && (down || up) {
                 response.scroll_to_me(None);
             }
-            let response = match available {
-                Ok(()) => response,
-                Err(why) => response.on_disabled_hover_text(format!("Not now: {why}")),
-            };
-            if response.clicked() || (enter && index == place) {
+            if response.clicked() || (enter && marked) {
                 chosen = Some(info.act);
             }
         }
@@ -177,7 +170,7 @@ fn save(ui: &mut Ui, model: &mut Model, request: &mut SaveRequest) -> bool {
         SaveWhat::Strip => "Save strip of lights",
     });
     Grid::new("save").num_columns(2).spacing([12.0, 6.0]).show(ui, |ui| {
-        let label = ui.label(if request.what == SaveWhat::Picture { "File" } else { "Folder" });
+        let label = ui.label(if request.what == SaveWhat::Picture { "Picture file" } else { "Folder of pictures" });
         ui.add(TextEdit::singleline(&mut request.path).desired_width(380.0))
             .labelled_by(label.id)
             .on_hover_text("PNG as shown on the stage, EXR in linear radiance; by the ending of the name");
@@ -231,6 +224,9 @@ mod tests {
         assert_eq!(found("next li").first().map(|info| info.act), Some(Act::NextLight));
         assert_eq!(found("start fit").first().map(|info| info.act), Some(Act::Start));
         assert!(found("shadows interreflection").iter().any(|info| info.act == Act::Traced));
+        // A whole name comes before a longer one that begins with it.
+        assert_eq!(found("panel: photo").first().map(|info| info.act), Some(Act::PanelPhoto));
+        assert_eq!(found("panel: photos").first().map(|info| info.act), Some(Act::PanelViews));
         assert!(found("xyzzy").is_empty());
         assert_eq!(found("").len(), LIST.len() - 1);
     }

@@ -1,6 +1,7 @@
 //! The fit: what is open, presets, settings, where the run goes.
 
 use super::{act_button, act_button_named, form, heading, reading};
+use crate::error::Place;
 use crate::fit::{FitSettings, Preset};
 use crate::insight::report::number;
 use crate::studio::act::Act;
@@ -17,6 +18,10 @@ pub fn can_go_on(model: &Model) -> bool {
 
 /// Draws the panel.
 pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut form::FormMemory, reading: &mut reading::ReadingMemory) {
+    if let Some(Place::Setting(name)) = &model.go_to {
+        memory.sought = Some(name.clone());
+        model.go_to = None;
+    }
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         facts(ui, model);
         controls(ui, model);

@@ -1,9 +1,9 @@
 //! The menu bar, drawn from the list of acts.
 
-use crate::studio::act::availability::availability;
+use super::act_line;
 use crate::studio::act::{Group, LIST};
 use crate::studio::model::Model;
-use egui::{Button, Ui};
+use egui::Ui;
 
 /// Draws the menu bar.
 pub fn show(ui: &mut Ui, model: &mut Model) {
@@ -13,17 +13,7 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
                 ui.menu_button(title, |ui| {
                     ui.set_min_width(230.0);
                     for info in LIST.iter().filter(|info| info.group == group) {
-                        let mut button = Button::new(info.name);
-                        if let Some(shortcut) = info.shortcut {
-                            button = button.shortcut_text(ui.ctx().format_shortcut(&shortcut));
-                        }
-                        let available = availability(info.act, model);
-                        let response = ui.add_enabled(available.is_ok(), button).on_hover_text(info.help);
-                        let response = match available {
-                            Ok(()) => response,
-                            Err(why) => response.on_disabled_hover_text(format!("Not now: {why}")),
-                        };
-                        if response.clicked() {
+                        if act_line(ui, model, info, |button| button).clicked() {
                             model.act(info.act);
                             ui.close();
                         }

@@ -9,7 +9,11 @@ use egui::{RichText, ScrollArea, Ui};
 
 /// Draws the list, newest first.
 pub fn show(ui: &mut Ui, model: &mut Model) {
-    model.log.unread = 0;
+    if model.log.unread > 0 {
+        model.log.unread = 0;
+        // The count at the bottom was drawn before.
+        ui.ctx().request_repaint();
+    }
     let messages: Vec<Message> = model.log.messages().iter().rev().take(300).cloned().collect();
     if messages.is_empty() {
         return empty(ui, "Nothing was noticed", "Findings of the check and of the fit appear here");

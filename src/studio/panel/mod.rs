@@ -23,12 +23,12 @@ pub mod toolbar;
 pub mod views;
 pub mod welcome;
 
-use super::act::Act;
+use super::act::{Act, ActInfo};
 use super::act::availability::availability;
 use super::layout::Panel;
 use super::model::Model;
 use super::theme::PANEL_MARGIN;
-use egui::{Align, Layout, Margin, Response, RichText, Ui};
+use egui::{Align, Button, Layout, Margin, Response, RichText, Ui};
 
 /// What panels keep between frames.
 #[derive(Default)]
@@ -88,7 +88,7 @@ pub fn act_button(ui: &mut Ui, model: &mut Model, act: Act) -> Response {
 /// The same under another label.
 pub fn act_button_named(ui: &mut Ui, model: &mut Model, act: Act, label: &str) -> Response {
     let available = availability(act, model);
-    let response = ui.add_enabled(available.is_ok(), egui::Button::new(label));
+    let response = ui.add_enabled(available.is_ok(), Button::new(label));
     let response = with_help(ui, response, act, available);
     if response.clicked() {
         model.act(act);
@@ -99,13 +99,35 @@ pub fn act_button_named(ui: &mut Ui, model: &mut Model, act: Act, label: &str) -
 /// A switch that does an act and shows whether it is on.
 pub fn act_switch(ui: &mut Ui, model: &mut Model, act: Act, label: &str, is_on: bool) -> Response {
     let available = availability(act, model);
-    let button = egui::Button::selectable(is_on, label);
+    let button = Button::selectable(is_on, label);
     let response = ui.add_enabled(available.is_ok(), button);
     let response = with_help(ui, response, act, available);
     if response.clicked() {
         model.act(act);
     }
     response
+}
+
+/// A line of a menu or of the palette: the act's name with its key beside it; grey with the reason where it cannot be
+/// done now. For readers of the screen its name is the act's alone, and the key is told as a key.
+pub fn act_line(ui: &mut Ui, model: &Model, info: &ActInfo, dress: impl FnOnce(Button<'static>) -> Button<'static>) -> Response {
+    let keys = info.shortcut.map(|shortcut| ui.ctx().format_shortcut(&shortcut));
+    let mut button = dress(Button::new(info.name));
+    if let Some(keys) = &keys {
+        button = button.shortcut_text(keys.clone());
+    }
+    let available = availability(info.act, model);
+    let response = ui.add_enabled(available.is_ok(), button).accessible_name(info.name).on_hover_text(info.help);
+    ui.ctx().accesskit_node_builder(response.id, |node| {
+        node.set_role(egui::accesskit::Role::MenuItem);
+        if let Some(keys) = keys {
+            node.set_keyboard_shortcut(keys);
+        }
+    });
+    match available {
+        Ok(()) => response,
+        Err(why) => response.on_disabled_hover_text(format!("{}\nNot now: {why}", info.help)),
+    }
 }
 
 fn with_help(ui: &Ui, response: Response, act: Act, available: Result<(), &'static str>) -> Response {

@@ -130,10 +130,11 @@ fn photo(ui: &mut Ui, model: &mut Model) {
 }
 
 fn display(ui: &mut Ui, model: &mut Model) {
-    let exposure = ui.label("Exposure");
+    ui.label("Exposure");
     let stops = &mut model.edits.display.exposure_stops;
     ui.add(DragValue::new(stops).speed(0.05).range(-20.0..=20.0).max_decimals(2).suffix(" stops"))
-        .labelled_by(exposure.id)
+        // A setting of the fit is called exposure too.
+        .accessible_name("Display exposure")
         .on_hover_text("Pictures are scaled by two to this power\nKeys: E and Shift+E");
     let curve = &mut model.edits.display.curve;
     let name = ToneCurve::NAMED.iter().find(|(own, _)| own == curve).map_or("", |(_, name)| name);

@@ -69,7 +69,7 @@ impl Stage {
     pub fn show(&self, ui: &mut egui::Ui, frame: &StageFrame) -> egui::Response {
         let size = ui.available_size().max(egui::Vec2::ZERO);
         let (rect, response) = ui.allocate_exact_size(size, egui::Sense::click_and_drag());
-        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Stage"));
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Scene in 3-D"));
         if ui.is_rect_visible(rect) && rect.is_positive() {
             let painting =
                 Painting { renderer: self.renderer.clone(), frame: frame.clone(), rect, context: ui.ctx().clone() };

@@ -101,7 +101,9 @@ fn interact(ui: &mut Ui, model: &mut Model, memory: &mut StageMemory, frame: &St
     if response.drag_started()
         && let Some(at) = pointer
     {
-        memory.dragging = Some(grip(model, frame, rect, at, shift));
+        // What is gripped lies where the button went down: a quick hand is elsewhere once it counts as a drag.
+        let from = ui.input(|input| input.pointer.press_origin()).unwrap_or(at);
+        memory.dragging = Some(grip(model, frame, rect, from, shift));
     }
     if response.dragged()
         && let (Some(dragging), Some(at)) = (memory.dragging, pointer)
