@@ -75,6 +75,25 @@ fn share_changed(before: &[[u8; 3]], after: &[[u8; 3]]) -> f64 {
     before.iter().zip(after).filter(differ).count() as f64 / before.len() as f64
 }
 
+/// The middle of the stage, where the things stand.
+fn middle(rect: Rect) -> Rect {
+    Rect::from_center_size(rect.center(), rect.size() * eframe::egui::vec2(0.4, 0.3))
+}
+
+/// Mean brightness of blocks of so many pixels a side: the noise of a path tracer is less than a shadow there.
+fn blocks(picture: &RgbaImage, rect: Rect) -> Vec<f32> {
+    const SIDE: u32 = 6;
+    let (left, top) = (rect.left() as u32, rect.top() as u32);
+    let (columns, rows) = (rect.width() as u32 / SIDE, rect.height() as u32 / SIDE);
+    let brightness = |pixel: &image::Rgba<u8>| pixel.0[..3].iter().map(|byte| f32::from(*byte)).sum::<f32>() / 3.0;
+    let mean = |row: u32, column: u32| {
+        let pixels = (0..SIDE * SIDE).map(|index| (column * SIDE + index % SIDE, row * SIDE + index / SIDE));
+        let sum: f32 = pixels.map(|(x, y)| brightness(picture.get_pixel(left + x, top + y))).sum();
+        sum / (SIDE * SIDE) as f32
+    };
+    (0..rows).flat_map(|row| (0..columns).map(move |column| mean(row, column))).collect()
+}
+
 #[test]
 fn the_stage_shows_the_mesh_and_changes_with_layer_and_light() {
     if !has_adapter() {
@@ -95,12 +114,16 @@ fn the_stage_shows_the_mesh_and_changes_with_layer_and_light() {
     assert!(share_changed(&diffuse, &seen(&mut studio, "normal")) > 0.1);
 
     studio.click_role(Role::RadioButton, "Evening sky");
+    assert_eq!(studio.model().edits.relight.first, LightName::Sky("evening".into()));
     let evening = seen(&mut studio, "evening");
     assert!(share_changed(&lit, &evening) > 0.3);
+    let things = |studio: &mut TestStudio, name: &str| part(&picture(studio, name), middle(rect), 1.0);
+    let before = things(&mut studio, "evening");
     for _ in 0..6 {
         studio.press(Modifiers::SHIFT, Key::ArrowLeft);
     }
-    assert!(share_changed(&evening, &seen(&mut studio, "evening_turned")) > 0.1);
+    let changed = share_changed(&before, &things(&mut studio, "evening_turned"));
+    assert!(changed > 0.1, "a quarter turn changes only {changed} of the things");
     studio.press(Modifiers::NONE, Key::Home);
     assert!(share_changed(&lit, &seen(&mut studio, "fitted_again")) < 0.01, "the fitted light is as before");
     studio.press(Modifiers::NONE, Key::M);
@@ -165,54 +188,61 @@ fn the_traced_preview_takes_the_place_of_the_quick_look_and_shadows_appear() {
     }
     let mut studio = drawn([1024.0, 640.0], 1.0);
     studio.click_role(Role::RadioButton, "Noon sky");
-    let rect = stage_rect(&studio);
-    let quick = part(&picture(&mut studio, "quick"), rect, 1.0);
+    assert_eq!(studio.model().edits.relight.first, LightName::Sky("noon".into()));
+    let rect = middle(stage_rect(&studio));
+    let quick = blocks(&picture(&mut studio, "quick"), rect);
     studio.press(Modifiers::NONE, Key::T);
-    let mut changed = 0.0;
+    assert!(studio.model().switches.traced);
+    let mut darker = 0.0;
     for _ in 0..120 {
         std::thread::sleep(std::time::Duration::from_millis(20));
         studio.frames(1);
-        if studio.harness.state().model.switches.traced {
-            changed = share_changed(&quick, &part(&picture(&mut studio, "traced"), rect, 1.0));
-        }
-        if changed > 0.2 {
+        let traced = blocks(&picture(&mut studio, "traced"), rect);
+        let count = quick.iter().zip(&traced).filter(|(before, after)| **before - **after > 15.0).count();
+        darker = count as f64 / quick.len() as f64;
+        if darker > 0.03 {
             break;
         }
     }
-    assert!(changed > 0.2, "{changed}; {}", studio.log());
+    assert!(darker > 0.03, "only {darker} of the things lie in shadow; {}", studio.log());
 }
 
-#[test]
-fn the_window_is_drawn_in_every_theme_and_size() {
+/// Draws the window in a size and themes, and every panel in it.
+fn draw_in(size: [f32; 2], pixels_per_point: f32, name: &str, themes: &[(ThemeChoice, &str)]) {
     if !has_adapter() {
         return;
     }
-    let (dark, light) = ((ThemeChoice::Dark, "dark"), (ThemeChoice::Light, "light"));
-    let strong = (ThemeChoice::HighContrast, "strong");
-    // Every size and every theme, not every size in every theme: a processor that draws takes its time.
-    let sizes = [
-        ([1440.0, 900.0], 1.0, "1440", vec![dark]),
-        ([1024.0, 640.0], 1.0, "1024", vec![dark, light, strong]),
-        ([1024.0, 640.0], 2.0, "1024_twice", vec![light]),
-    ];
-    for (size, pixels_per_point, name, themes) in sizes {
-        let mut studio = drawn(size, pixels_per_point);
-        for (theme, word) in themes {
-            studio.model().preferences.theme = theme;
-            let picture = picture(&mut studio, &format!("{name}_{word}"));
-            assert_eq!(picture.width(), (size[0] * pixels_per_point) as u32);
-            let window = Rect::from_min_size(Pos2::ZERO, size.into());
-            let colours: std::collections::HashSet<_> = part(&picture, window, pixels_per_point).into_iter().collect();
-            assert!(colours.len() > 1000, "{name} {word}: {} colours", colours.len());
-        }
-        for (panel, title, _) in Panel::ALL {
-            studio.show(panel);
-            if std::env::var_os("PATINA_WINDOW_PICTURES").is_some() {
-                picture(&mut studio, &format!("{name}_panel_{}", title.to_lowercase()));
-            }
-            let rect = studio.controls(title).last().unwrap().rect();
-            assert!(rect.right() <= size[0] && rect.bottom() <= size[1], "{title} at {rect:?}");
-        }
-        assert_eq!(studio.model().edits.relight.first, LightName::Fitted);
+    let mut studio = drawn(size, pixels_per_point);
+    for &(theme, word) in themes {
+        studio.model().preferences.theme = theme;
+        let picture = picture(&mut studio, &format!("{name}_{word}"));
+        assert_eq!(picture.width(), (size[0] * pixels_per_point) as u32);
+        let window = Rect::from_min_size(Pos2::ZERO, size.into());
+        let colours: std::collections::HashSet<_> = part(&picture, window, pixels_per_point).into_iter().collect();
+        assert!(colours.len() > 1000, "{name} {word}: {} colours", colours.len());
     }
+    for (panel, title, _) in Panel::ALL {
+        studio.show(panel);
+        if std::env::var_os("PATINA_WINDOW_PICTURES").is_some() {
+            picture(&mut studio, &format!("{name}_panel_{}", title.to_lowercase()));
+        }
+        let rect = studio.controls(title).last().unwrap().rect();
+        assert!(rect.right() <= size[0] && rect.bottom() <= size[1], "{title} at {rect:?}");
+    }
+    assert_eq!(studio.model().edits.relight.first, LightName::Fitted);
+}
+
+const THEMES: [(ThemeChoice, &str); 3] =
+    [(ThemeChoice::Dark, "dark"), (ThemeChoice::Light, "light"), (ThemeChoice::HighContrast, "strong")];
+
+#[test]
+fn the_window_is_drawn_in_every_theme() {
+    draw_in([1024.0, 640.0], 1.0, "1024", &THEMES);
+}
+
+#[test]
+#[ignore = "slow where the processor draws"]
+fn the_window_is_drawn_large_and_in_fine_pixels() {
+    draw_in([1440.0, 900.0], 1.0, "1440", &THEMES);
+    draw_in([1024.0, 640.0], 2.0, "1024_twice", &THEMES);
 }
