@@ -32,11 +32,18 @@ opening=(--demo)
 if [ -n "$scene" ] && [ -d "$scene" ]; then opening=("$scene"); else echo 'the built-in demo is opened'; fi
 "$program" studio --settings-file "$work/studio.json" "${opening[@]}" >"$work/log" 2>&1 & studio=$!
 
-alive() { kill -0 "$studio" 2>/dev/null || { echo 'the window is gone:'; cat "$work/log"; exit 1; }; }
+alive() {
+  kill -0 "$studio" 2>/dev/null && return 0
+  local code=0
+  wait "$studio" || code=$?
+  echo "the window is gone, exit code $code, last act: ${last_act:-none}"
+  cat "$work/log"
+  exit 1
+}
 picture() { alive; sleep "${2:-0.6}"; import -window root "$out/$1.png"; echo "$out/$1.png"; }
 keys() { alive; xdotool key --delay 60 "$@"; sleep 0.4; }
 # An act by its name, through the palette.
-act() { keys ctrl+k; sleep 0.8; xdotool type --delay 30 "$1"; sleep 1.2; keys Return; sleep 0.6; }
+act() { last_act=$1; keys ctrl+k; sleep 0.8; xdotool type --delay 30 "$1"; sleep 1.2; keys Return; sleep 0.6; }
 title() { xdotool getwindowname "$(xdotool search --onlyvisible --class patina | head -1)" 2>/dev/null || true; }
 wait_for_title() { # pattern, seconds
   for _ in $(seq "$(( $2 * 2 ))"); do
@@ -77,7 +84,8 @@ picture 08_paused_and_traced 12
 act 'Next light'; picture 09_second_light 10
 act 'Next light'; picture 10_third_light 10
 act 'Next light'; picture 11_fourth_light 10
-act 'Two lights side by side'; picture 12_two_lights 16
+act 'Previous light'; sleep 1
+act 'Two lights side by side'; picture 12_two_lights 20
 act 'Two lights side by side'
 act 'Fitted light'
 act "Look through the photo's camera"; picture 13_through_a_photo 10
@@ -112,12 +120,15 @@ act 'Pause or go on'; sleep 3
 act 'Stop fit'
 wait_for_title 'Stopped' 120
 picture 30_stopped
+# From here on the window may go: that is what is asked for.
+alive() { return 0; }
 act 'Quit'
 for _ in $(seq 60); do kill -0 "$studio" 2>/dev/null || break; sleep 0.5; done
 if kill -0 "$studio" 2>/dev/null; then echo 'the window did not close'; exit 1; fi
+wait "$studio" || { echo "the window closed with exit code $?"; cat "$work/log"; exit 1; }
 studio=$server
 if [ -n "${README_PICTURES:-}" ]; then
-  for pair in 03_fitting:fitting 12_two_lights:two_lights 19_texel:texel; do
+  for pair in 03_fitting:fitting 12_two_lights:two_lights 14_photo_wiped:photo_wiped 19_texel:texel; do
     convert "$out/${pair%%:*}.png" -quality 88 "$README_PICTURES/window_${pair##*:}.jpg"
   done
 fi

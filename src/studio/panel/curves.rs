@@ -4,8 +4,8 @@ use super::empty;
 use crate::fit::LossRow;
 use crate::studio::model::Model;
 use crate::studio::theme;
-use egui::{Align2, ComboBox, RichText, Ui};
-use egui_plot::{Corner, GridMark, HoverPosition, Legend, Line, Plot, PlotPoint, PlotPoints, Points, Text, VLine};
+use egui::{Align2, Color32, ComboBox, RichText, Sense, Ui, vec2};
+use egui_plot::{GridMark, HoverPosition, Line, Plot, PlotPoint, PlotPoints, Points, Text, VLine};
 
 /// What the panel keeps.
 pub struct CurvesMemory {
@@ -73,22 +73,32 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut CurvesMemory) {
     plot(ui, memory);
 }
 
+/// The newest figures, each with a dot in the colour of its curve: they are the legend.
 fn figures(ui: &mut Ui, rows: &[LossRow]) {
     ui.separator();
+    let colours = theme::palette(ui.visuals()).curves;
+    let dot = |ui: &mut Ui, colour: Color32| {
+        let (rect, _) = ui.allocate_exact_size(vec2(9.0, 9.0), Sense::hover());
+        ui.painter().circle_filled(rect.center(), 4.0, colour);
+    };
     if let Some(row) = rows.last() {
+        dot(ui, faint(colours[0]));
         ui.label(format!("Loss {:.4}", row.image_loss.max(0.0).sqrt())).on_hover_text(
             "Root of what the fit lowers: every pixel that is evidence, background and clipped ones included",
         );
         if let Some(surface) = row.surface_rmse {
+            dot(ui, colours[0]);
             ui.label(format!("Training RMSE {surface:.4}"))
                 .on_hover_text("Unclipped surface pixels of the step's photos, as held-out photos are judged");
         }
         if row.consistency > 0.0 {
+            dot(ui, colours[2]);
             ui.label(format!("MVCL {:.2e}", row.consistency))
                 .on_hover_text("Disagreement of the views' gradients, in [0, 1]: Joy and Poullis 2023, eq. 3");
         }
     }
     if let Some(held_out) = rows.iter().rev().find_map(|row| row.held_out_rmse) {
+        dot(ui, colours[1]);
         ui.label(RichText::new(format!("Held-out RMSE {held_out:.4}")).strong())
             .on_hover_text("Unclipped surface pixels of photos that the fit never sees, shrunk");
     }
@@ -140,7 +150,8 @@ fn plot(ui: &mut Ui, memory: &CurvesMemory) {
     let unit = if memory.over_seconds { "seconds of work" } else { "steps" };
     let over_seconds = memory.over_seconds;
     Plot::new("loss curves")
-        .legend(Legend::default().position(Corner::LeftBottom))
+        // Room for the names of the stages above the curves.
+        .set_margin_fraction(vec2(0.02, 0.14))
         .x_axis_label(unit)
         .y_axis_label("RMSE, linear radiance")
         .y_axis_formatter(move |mark: GridMark, _: &_| number(value(mark.value)))
@@ -163,7 +174,7 @@ fn plot(ui: &mut Ui, memory: &CurvesMemory) {
             let line = |name: &str, points: &Vec<[f64; 2]>, colour, width: f32| {
                 Line::new(name.to_owned(), PlotPoints::from(points.clone())).color(colour).width(width)
             };
-            plot.line(line("Loss, all pixels", &memory.lines.all, colours[0].gamma_multiply(0.4), 1.5));
+            plot.line(line("Loss, all pixels", &memory.lines.all, faint(colours[0]), 1.5));
             plot.line(line("Training photos", &memory.lines.surface, colours[0], 2.0));
             if !memory.lines.held_out.is_empty() {
                 plot.line(line("Held-out photos", &memory.lines.held_out, colours[1], 2.0));
@@ -174,6 +185,11 @@ fn plot(ui: &mut Ui, memory: &CurvesMemory) {
                 plot.line(line("MVCL (own scale)", &memory.lines.consistency, colours[2], 1.5));
             }
         });
+}
+
+/// The colour of a curve that is there for comparison.
+fn faint(colour: Color32) -> Color32 {
+    colour.gamma_multiply(0.4)
 }
 
 /// A number with three digits, however small.

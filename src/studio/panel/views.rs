@@ -8,6 +8,8 @@ use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui, vec2};
 
 /// Size of the table's letters: many rows are to be seen at once.
 const TEXT_POINTS: f32 = 11.5;
+/// An error so many times that of the photo in the middle is marked.
+const CONSPICUOUS: f32 = 1.4;
 /// Points between two columns.
 const GAP: f32 = 6.0;
 
@@ -83,10 +85,11 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ViewsMemory) {
     let chosen = model.project.as_ref().map_or(0, |project| project.chosen_view);
     let scroll = memory.last_chosen != chosen;
     memory.last_chosen = chosen;
-    let worst = rows.iter().filter_map(|row| row.error).fold(0.0f32, f32::max);
+    let errors: Vec<f64> = rows.iter().filter_map(|row| row.error).map(f64::from).collect();
+    let usual = crate::math::statistics::quantile(&errors, 0.5) as f32;
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         for row in &rows {
-            line(ui, model, row, row.index == chosen, worst, scroll);
+            line(ui, model, row, row.index == chosen, usual, scroll);
         }
     });
 }
@@ -174,7 +177,7 @@ fn header(ui: &mut Ui, memory: &mut ViewsMemory) {
     ui.separator();
 }
 
-fn line(ui: &mut Ui, model: &mut Model, row: &Row, chosen: bool, worst: f32, scroll: bool) {
+fn line(ui: &mut Ui, model: &mut Model, row: &Row, chosen: bool, usual: f32, scroll: bool) {
     let colours = theme::palette(ui.visuals());
     let width: f32 = Column::ALL.iter().map(|(_, _, width, _)| width + GAP).sum();
     let (rect, response) = ui.allocate_exact_size(vec2(width.max(ui.available_width()), 20.0), Sense::click());
@@ -202,7 +205,7 @@ fn line(ui: &mut Ui, model: &mut Model, row: &Row, chosen: bool, worst: f32, scr
         });
     };
     cell(Column::Name, row.name.clone(), None);
-    let bad = row.error.is_some_and(|error| worst > 0.0 && error > 0.75 * worst && worst > 0.02);
+    let bad = row.error.is_some_and(|error| error > CONSPICUOUS * usual && error > 0.01);
     let text = row.error.map_or_else(|| "-".into(), |error| format!("{error:.4}"));
     cell(Column::Error, text, bad.then_some(colours.warning));
     cell(Column::Exposure, if row.stops == 0.0 { "0".into() } else { format!("{:+.2}", row.stops) }, None);
