@@ -23,8 +23,8 @@ pub mod toolbar;
 pub mod views;
 pub mod welcome;
 
-use super::act::{Act, ActInfo};
 use super::act::availability::availability;
+use super::act::{Act, ActInfo};
 use super::layout::Panel;
 use super::model::Model;
 use super::theme::PANEL_MARGIN;
@@ -110,7 +110,12 @@ pub fn act_switch(ui: &mut Ui, model: &mut Model, act: Act, label: &str, is_on: 
 
 /// A line of a menu or of the palette: the act's name with its key beside it; grey with the reason where it cannot be
 /// done now. For readers of the screen its name is the act's alone, and the key is told as a key.
-pub fn act_line(ui: &mut Ui, model: &Model, info: &ActInfo, dress: impl FnOnce(Button<'static>) -> Button<'static>) -> Response {
+pub fn act_line(
+    ui: &mut Ui,
+    model: &Model,
+    info: &ActInfo,
+    dress: impl FnOnce(Button<'static>) -> Button<'static>,
+) -> Response {
     let keys = info.shortcut.map(|shortcut| ui.ctx().format_shortcut(&shortcut));
     let mut button = dress(Button::new(info.name));
     if let Some(keys) = &keys {
