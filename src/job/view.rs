@@ -36,7 +36,7 @@ pub struct OpenedRun {
     pub times_seen: Option<GreyImage>,
     /// What could not be opened beside that.
     pub findings: Vec<Finding>,
-    /// Whether the fit has ended and these are its results; otherwise [`resume`] goes on.
+    /// Whether the fit has ended and these are its results; otherwise `resume` goes on.
     pub is_finished: bool,
     /// Whether there is a checkpoint to go on from.
     pub can_resume: bool,

@@ -6,7 +6,7 @@ use crate::image::Image;
 use crate::material::TextureTap;
 use glam::Vec3;
 
-/// Least share of a texel in a pixel that counts as being seen, as in [`super::coverage`].
+/// Least share of a texel in a pixel that counts as being seen, as in [`crate::insight::coverage`].
 const LEAST_WEIGHT: f32 = 0.05;
 
 /// Sums of one view over the texels.

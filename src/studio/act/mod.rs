@@ -1,6 +1,6 @@
 //! Everything a person can do, in one list.
 //!
-//! Menus, the command palette, keys and the help page all read [`Act::ALL`] and [`Act::info`]; an act that is not in the
+//! Menus, the command palette, keys and the help page all read [`LIST`] and [`Act::info`]; an act that is not in the
 //! list cannot be done, and one that is in it can be found in all four places. What an act does is
 //! [`crate::studio::perform`]; whether it can be done now, and why not, is [`availability`].
 

@@ -2,7 +2,7 @@
 //!
 //! Read [`person`] first: a thread that acts like somebody in front of the window, by keys, mouse and acts, and watches
 //! what comes of it. [`driven`] is the window it sits at: the studio and nothing less, with a mark on every frame that
-//! tells when the adapter was done with it. [`script`] runs the measurements one after another: [`frames`], [`answers`],
+//! tells when the adapter was done with it. `script` runs the measurements one after another: [`frames`], [`answers`],
 //! [`slowdown`], [`memory`], [`equality`]; [`scenes`] makes what they work on, [`machine`] reads threads, memory and load
 //! from the system, [`report`] writes the tables.
 //!

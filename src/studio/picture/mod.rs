@@ -2,7 +2,7 @@
 //!
 //! Read [`widget::show`] first: every picture of the studio goes through it, be it a photograph, a map, an environment
 //! or a relit view. It takes a [`Source`], a [`PictureView`] kept by the caller and an [`Overlay`], and tells what is
-//! under the pointer. [`paint`] makes the pixels from the values that `rows` reads, [`cache`] keeps them while nothing changes. [`histogram`],
+//! under the pointer. [`paint`] makes the pixels from the values that `rows` reads, `cache` keeps them while nothing changes. [`histogram`],
 //! [`scale_bar`] and [`thumbnails`] are the small ones beside it.
 //!
 //! It keeps nothing of the application: which picture, which exposure and which view are the caller's. It computes no
