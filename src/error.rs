@@ -260,6 +260,12 @@ impl fmt::Display for Finding {
     }
 }
 
+/// What a thread said when it panicked, as far as it was text.
+pub fn text_of_panic(panic: &(dyn std::any::Any + Send)) -> &str {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

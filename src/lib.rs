@@ -14,12 +14,15 @@
 //! | [`trace`] | rays and the bounding volume hierarchy |
 //! | [`light`] | the environment |
 //! | [`material`] | texture maps and the reflection lobe |
+//! | [`measured`] | measured reflectance: tables, models that stand for them, figures between the two |
+//! | [`neural`] | the invertible neural model of reflectance: flow, training, fit, sampler |
 //! | [`scene`] | mesh, cameras, photographs, their readers and the pre-flight check |
 //! | [`atlas`] | from any mesh to a texture atlas |
 //! | [`render`] | where light is added up: the path tracer and its reverse pass |
 //! | [`fit`] | where a texel is changed: losses, consistency, Adam, schedule, checkpoint |
 //! | [`insight`] | coverage, comparison, report |
 //! | [`export`] | the run folder and the files in it |
+//! | [`object`] | light and measured reflectance from one photo |
 //! | [`job`] | the only door between a fit and whoever watches it |
 //! | [`cli`] | the command line; it holds no algorithm |
 //! | `studio` | the window, behind the feature of that name; it holds no algorithm either |
@@ -76,6 +79,9 @@ pub mod job;
 pub mod light;
 pub mod material;
 pub mod math;
+pub mod measured;
+pub mod neural;
+pub mod object;
 pub mod render;
 pub mod scene;
 #[cfg(feature = "studio")]

@@ -5,7 +5,7 @@
 use std::path::Path;
 
 /// Rank of each top-level module. A module may use modules of lower rank, and of its own rank only where listed.
-const RANKS: [(&str, usize); 16] = [
+const RANKS: [(&str, usize); 19] = [
     ("error", 0),
     ("files", 0),
     ("math", 1),
@@ -14,18 +14,21 @@ const RANKS: [(&str, usize); 16] = [
     ("light", 3),
     ("material", 3),
     ("scene", 4),
+    ("measured", 4),
     ("atlas", 5),
+    ("neural", 5),
     ("render", 6),
     ("fit", 7),
     ("insight", 8),
     ("export", 8),
+    ("object", 8),
     ("job", 9),
     ("cli", 10),
     ("studio", 10),
 ];
 /// Pairs of the same rank in which the first may use the second.
-const ALLOWED_SIBLINGS: [(&str, &str); 4] =
-    [("files", "error"), ("material", "light"), ("insight", "export"), ("cli", "studio")];
+const ALLOWED_SIBLINGS: [(&str, &str); 5] =
+    [("files", "error"), ("material", "light"), ("insight", "export"), ("object", "insight"), ("cli", "studio")];
 
 fn rank(module: &str) -> Option<usize> {
     RANKS.iter().find(|(name, _)| *name == module).map(|(_, rank)| *rank)

@@ -1,7 +1,7 @@
 //! What can be typed. The text of each field is its help.
 
 use crate::atlas::KeepUv;
-use crate::fit::{FitSettings, Preset};
+use crate::fit::{FitSettings, Method, Preset};
 use crate::scene::settings::{BackgroundChoice, PixelCentre, Up};
 use clap::{Args, FromArgMatches, Parser, Subcommand};
 use std::path::PathBuf;
@@ -36,12 +36,17 @@ pub enum Task {
     Resume(ResumeOptions),
     /// Render a run under other lights.
     Relight(RelightOptions),
+    /// Estimate light and measured reflectance from photos of one object of known shape.
+    Object(Box<super::object::ObjectOptions>),
     /// Move a run along what photos leave open, reflectance against light, into a new run folder.
     Gauge(super::gauge::GaugeOptions),
     /// Render a run from a scene's cameras, as pictures or layers in linear EXR.
     Render(RenderOptions),
     /// Score a run against the photographs of a scene.
     Compare(CompareOptions),
+    /// Look at measured reflectance, convert it, and fit models to it.
+    #[command(subcommand)]
+    Measured(super::measured::MeasuredTask),
     /// Check the program against itself.
     #[command(subcommand)]
     Audit(AuditTask),
@@ -92,6 +97,15 @@ pub struct AuditOptions {
 pub enum BenchTask {
     /// Growth with triangles, views and map size: read, atlas, tracer, one step, peak memory.
     Scale(BenchOptions),
+    /// Error against seconds: this program's methods and Mitsuba fit the same exchange scenes, judged alike.
+    Fit(super::contest::ContestArguments),
+    /// Hard cases: error, steps, non-finite numbers and what was told, for this program's methods.
+    Hard(super::contest::HardArguments),
+    /// Rays, paths and gradients a second, beside Mitsuba's.
+    Tracer(super::contest::TracerArguments),
+    /// What `bench fit` starts for each of this program's fits.
+    #[command(hide = true)]
+    Entry(super::contest::EntryArguments),
     /// The window: frames a second, time from an act to its answer, what it takes from a fit, memory. Needs a display.
     Studio(BenchStudioOptions),
 }
@@ -143,6 +157,18 @@ pub struct BenchOptions {
     /// Two small cases only.
     #[arg(long)]
     pub quick: bool,
+    /// The methods whose step is timed.
+    #[arg(long, value_enum, value_delimiter = ',', default_values_t = [crate::job::contest::Contestant::Adam])]
+    pub methods: Vec<crate::job::contest::Contestant>,
+    /// Triangles: vary these in place of the built-in cases, the first with the first of the other lists.
+    #[arg(long, value_delimiter = ',')]
+    pub triangles: Vec<usize>,
+    /// Views, in the same way.
+    #[arg(long, value_delimiter = ',')]
+    pub views: Vec<usize>,
+    /// Widths of the maps in texels, in the same way.
+    #[arg(long, value_delimiter = ',')]
+    pub maps: Vec<usize>,
     /// Folder of the tables.
     #[arg(short, long, default_value = "patina-bench")]
     pub output: PathBuf,
@@ -153,6 +179,8 @@ pub struct BenchOptions {
 pub enum StudyTask {
     /// What consistency between views changes: errors of pictures, maps and light for its settings, over seeds.
     Mvcl(MvclOptions),
+    /// What one photo tells of light and reflectance: figures 3 to 5 of the paper, and shadows.
+    Ibrdf(super::object::StudyIbrdfOptions),
 }
 
 /// Options of `patina study mvcl`.
@@ -192,6 +220,9 @@ pub struct DemoOptions {
     /// A TOML file of fit settings that differ from the demo's, such as `consistency = "exact"`.
     #[arg(long)]
     pub settings: Option<PathBuf>,
+    /// How maps and light are found.
+    #[arg(long, value_enum)]
+    pub method: Option<Method>,
 }
 
 /// How a scene is read.

@@ -31,6 +31,7 @@ pub fn demo(options: &DemoOptions, json: bool) -> Result<()> {
         table.extend(changes);
         settings.fit = FitSettings::from_toml(&table.to_string())?;
     }
+    settings.fit.method = options.method.unwrap_or(settings.fit.method);
     let demo_settings = DemoSettings { seed: options.seed, ..DemoSettings::default() };
     let (prepared, fitter, settings) = with_bar(json, |tell| {
         let opened = open::open_demo(&demo_settings, &stop, tell)?;

@@ -32,7 +32,12 @@ pub fn audit_gradients(options: &AuditOptions, json: bool) -> Result<()> {
 /// Measures growth and writes the table as Markdown, CSV and SVG.
 pub fn bench_scale(options: &BenchOptions, json: bool) -> Result<()> {
     std::fs::create_dir_all(&options.output).map_err(|source| Error::writing(&options.output, source))?;
-    let table = scale::run(options.quick, &options.output, &|case| {
+    let own = [&options.triangles, &options.views, &options.maps];
+    let cases = match own.iter().all(|list| list.is_empty()) {
+        true => scale::cases(options.quick),
+        false => scale::cases_along(&options.triangles, &options.views, &options.maps),
+    };
+    let table = scale::run(&cases, &options.methods, &options.output, &|case| {
         if !json {
             eprintln!("{case}");
         }

@@ -1,14 +1,20 @@
 //! The command line; it holds no algorithm.
 //!
 //! [`arguments`] is what can be typed, [`fit`] drives a job and shows its events, [`measure`] audits and benches,
-//! [`study`] runs studies, [`gauge`] moves the scale of a run, [`turntable`] belongs to `relight`, [`commands`] holds
+//! [`contest`] holds methods against each other, [`study`] runs studies, [`measured`] is for measured reflectance and
+//! [`neural`] for its neural model, [`object`] is object mode, [`gauge`] moves the scale of a run,
+//! [`turntable`] belongs to `relight`, [`commands`] holds
 //! the rest. Whatever is asked here can be asked of the library in the same words.
 
 pub mod arguments;
 pub mod commands;
+pub mod contest;
 pub mod fit;
 pub mod gauge;
 pub mod measure;
+pub mod measured;
+pub mod neural;
+pub mod object;
 pub mod study;
 pub mod turntable;
 
@@ -44,8 +50,15 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Task::Compare(options)) => commands::compare(&options, json),
         Some(Task::Audit(AuditTask::Gradients(options))) => measure::audit_gradients(&options, json),
         Some(Task::Bench(BenchTask::Scale(options))) => measure::bench_scale(&options, json),
+        Some(Task::Bench(BenchTask::Fit(options))) => contest::fit(&options, json, arguments.threads),
+        Some(Task::Bench(BenchTask::Hard(options))) => contest::hard(&options, json),
+        Some(Task::Bench(BenchTask::Tracer(options))) => contest::tracer(&options, json, arguments.threads),
+        Some(Task::Bench(BenchTask::Entry(options))) => contest::entry(&options, json),
         Some(Task::Bench(BenchTask::Studio(options))) => measure::bench_studio(&options, json),
+        Some(Task::Object(options)) => object::object(&options, json),
+        Some(Task::Study(StudyTask::Ibrdf(options))) => object::study(&options, json),
         Some(Task::Study(StudyTask::Mvcl(options))) => study::mvcl(&options, json),
+        Some(Task::Measured(task)) => measured::run(&task, json),
         Some(Task::Studio(options)) => window(&options),
         None => window(&StudioOptions::default()),
     };

@@ -6,6 +6,8 @@
 //! | `settings.toml` | settings of the run | `patina fit`, at its start |
 //! | `checkpoint` | state to resume from | `patina fit`, while it runs |
 //! | `diffuse.exr specular.exr roughness.exr seen.exr env.exr mesh.obj` | the result | `patina fit`, at its end |
+//! | `diffuse_deviation.exr specular_deviation.exr roughness_deviation.exr` | standard deviations of the maps given the light | `patina fit --method solver`, at its end |
+//! | `lobe_sharing.exr` | number of texels that share a texel's lobe, 0 where no pixel shows the texel best | the same |
 //! | `loss.csv` | the loss of every step | `patina fit` |
 //! | `report.json report.html` | scores and pictures | `patina fit`, `patina compare` |
 
@@ -115,6 +117,21 @@ impl RunFolder {
         file::write_exr_grey(&self.file("seen.exr"), &result.times_seen)?;
         file::write_exr_rgb(&self.file("env.exr"), &result.environment.radiance)?;
         obj::write(&self.file("mesh.obj"), &result.mesh)
+    }
+
+    /// Writes standard deviations of the maps, in the units of the maps.
+    pub fn write_deviations(&self, deviations: &MaterialMaps) -> Result<()> {
+        file::write_exr_rgb(&self.file("diffuse_deviation.exr"), &deviations.diffuse)?;
+        file::write_exr_rgb(&self.file("specular_deviation.exr"), &deviations.specular)?;
+        file::write_exr_grey(&self.file("roughness_deviation.exr"), &deviations.roughness)
+    }
+
+    /// Writes the number of texels that share each texel's lobe.
+    ///
+    /// # Errors
+    /// Files that cannot be written.
+    pub fn write_lobe_sharing(&self, sharing: &GreyImage) -> Result<()> {
+        file::write_exr_grey(&self.file("lobe_sharing.exr"), sharing)
     }
 
     /// Reads the result. Before anything is read, all missing files are named in one error.

@@ -13,7 +13,8 @@ use super::views::{ViewUse, training_views, uses_of};
 use crate::error::{Error, ErrorKind, Place, Result};
 
 /// Settings that cannot change: shapes, random numbers and the order of stages hang on them.
-const FIXED: [&str; 6] = ["seed", "map-size", "environment-height", "levels", "steps", "start"];
+const FIXED: [&str; 9] =
+    ["seed", "method", "map-size", "environment-height", "levels", "steps", "start", "solver-rounds", "solver-grid"];
 /// Settings that what a stage keeps between its steps was made for.
 const OF_STAGE_WORK: [&str; 7] =
     ["exclude", "samples", "pixel-filter", "views-per-step", "pixels-per-step", "consistency", "first-hits-mib"];
@@ -55,6 +56,10 @@ impl Fitter {
         let stage_moved = self.stage().map(|stage| (stage.kind, stage.photo_level)) != stage_before;
         if stage_moved || changed.iter().any(|name| OF_STAGE_WORK.contains(&name.as_str())) {
             self.work = None;
+        }
+        // The solver's cache hangs on many of them; it is traced anew in a few seconds.
+        if !changed.is_empty() {
+            self.solver = None;
         }
         self.uses = uses;
         self.training = training;

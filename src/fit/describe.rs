@@ -288,7 +288,18 @@ mod tests {
         let fixed = FitSettings::described().into_iter().filter(|setting| !setting.changes_mid_run);
         let mut fixed: Vec<String> = fixed.map(|setting| setting.name).collect();
         fixed.sort();
-        assert_eq!(fixed, ["environment-height", "levels", "map-size", "seed", "start", "steps"]);
+        let expected = [
+            "environment-height",
+            "levels",
+            "map-size",
+            "method",
+            "seed",
+            "solver-grid",
+            "solver-rounds",
+            "start",
+            "steps",
+        ];
+        assert_eq!(fixed, expected);
         assert!(!FitSettings::changes_mid_run("no-such"));
     }
 }

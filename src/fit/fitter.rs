@@ -11,7 +11,8 @@ use super::figures::LiveFigures;
 use super::gauge::GaugeRule;
 use super::held_out::held_out_targets;
 use super::schedule::{Stage, stages};
-use super::settings::{FitSettings, Start};
+use super::settings::{FitSettings, Method, Start};
+use super::solver::SolverScene;
 use super::start;
 use super::state::{FitState, LossRow};
 use super::targets::{Target, targets};
@@ -49,6 +50,8 @@ pub struct Fitter {
     pub(super) state: FitState,
     pub(super) figures: LiveFigures,
     pub(super) work: Option<StageWork>,
+    /// What the solver traced; `None` under Adam and before its first step.
+    pub(super) solver: Option<SolverScene>,
 }
 
 impl Fitter {
@@ -131,7 +134,7 @@ impl Fitter {
         let held_out = held_out_targets(&scene, &uses);
         let figures = LiveFigures::new(scene.views.len());
         let state = FitState::default();
-        Ok(Fitter { scene, surface, settings, uses, training, held_out, state, figures, work: None })
+        Ok(Fitter { scene, surface, settings, uses, training, held_out, state, figures, work: None, solver: None })
     }
 
     pub(super) fn measured_start(&self) -> start::StartValues {
@@ -238,7 +241,7 @@ impl Fitter {
     /// Does one step. `stop` may be raised by another thread at any time: the step in progress is then dropped.
     pub fn step(&mut self, stop: &AtomicBool) -> Result<StepOutcome> {
         let began = Instant::now();
-        if !self.look_at_held_out(stop) {
+        if self.settings.method == Method::Paper && !self.look_at_held_out(stop) {
             return Ok(StepOutcome::Interrupted);
         }
         while self.stage().is_some_and(|stage| self.state.step_in_stage >= stage.steps) {
@@ -247,6 +250,9 @@ impl Fitter {
             self.work = None;
         }
         let Some(&stage) = self.stage() else { return Ok(StepOutcome::Finished) };
+        if self.settings.method == Method::Solver {
+            return self.solver_step(&stage, stop);
+        }
         self.enter(&stage);
 
         let Some(mut sums) = self.sum_gradient(&stage, stop)? else { return Ok(StepOutcome::Interrupted) };

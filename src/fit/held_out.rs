@@ -20,14 +20,7 @@ const HELD_OUT_PIXELS: usize = 20_000;
 pub(super) fn held_out_targets(scene: &Scene, uses: &[ViewUse]) -> Vec<Target> {
     (0..scene.views.len())
         .filter(|&view| uses[view] == ViewUse::HeldOut)
-        .map(|view| {
-            let camera = &scene.views[view].camera;
-            let mut level = 0;
-            while (camera.width >> level) * (camera.height >> level) > HELD_OUT_PIXELS {
-                level += 1;
-            }
-            Target::new(scene, view, level)
-        })
+        .map(|view| Target::new(scene, view, scene.views[view].camera.level_within(HELD_OUT_PIXELS)))
         .collect()
 }
 

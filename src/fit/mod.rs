@@ -7,6 +7,7 @@
 //! up, `weigh` applies consistency, `advance` moves the numbers, `held_out` judges them. [`state`] is all they change.
 //! `change` takes other settings between two steps, [`views`] leaves photos out, [`figures`] are for who watches.
 //! [`describe`] lists, reads and sets each setting by name, [`presets`] are whole sets of them.
+//! [`solver`] is the other method, `solver_step` does its steps.
 //! [`start`] chooses where to begin, [`gauge`] names the freedom that photographs leave, [`checkpoint`] saves it all.
 //!
 //! A fit knows nothing of threads that watch it, of files it came from or of windows: that is `job`.
@@ -29,6 +30,8 @@ pub mod loss;
 pub mod presets;
 pub mod schedule;
 pub mod settings;
+pub mod solver;
+mod solver_step;
 pub mod start;
 pub mod state;
 pub mod targets;
@@ -39,6 +42,6 @@ mod work;
 pub use figures::LiveFigures;
 pub use fitter::{Fitter, StepOutcome};
 pub use presets::Preset;
-pub use settings::FitSettings;
+pub use settings::{FitSettings, Method};
 pub use state::{FitState, LossRow};
 pub use views::ViewUse;

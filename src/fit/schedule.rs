@@ -1,17 +1,23 @@
 //! From settings to stages: which parameters move, at which resolution, for how many steps.
 
-use super::settings::{FitSettings, Steps};
+use super::settings::{FitSettings, Method, Steps};
 use crate::error::{Error, ErrorKind, Place, Result};
 use serde::{Deserialize, Serialize};
 
 /// Which maps move in a stage. The light moves in all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum StageKind {
     /// Diffuse alone; the specular lobe is absent (first step of the paper).
     Diffuse,
     /// Diffuse, specular and roughness (second step).
     All,
+    /// Rounds of the solver on the light in wide hats.
+    WideLight,
+    /// Rounds of the solver on the light with narrow hats where it is bright.
+    NarrowLight,
+    /// The solver makes all maps under the light that was found.
+    Maps,
 }
 
 /// A run of steps at one resolution.
@@ -32,11 +38,14 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// Name for logs: `diffuse 1/4` or `all 1/1`.
+    /// Name for logs: `diffuse 1/4`, `all 1/1` or `wide light`.
     pub fn name(&self) -> String {
         let kind = match self.kind {
             StageKind::Diffuse => "diffuse",
             StageKind::All => "all",
+            StageKind::WideLight => return "wide light".into(),
+            StageKind::NarrowLight => return "narrow light".into(),
+            StageKind::Maps => return "maps".into(),
         };
         format!("{kind} 1/{}", 1usize << self.photo_level)
     }
@@ -53,6 +62,7 @@ impl Stage {
         match self.kind {
             StageKind::Diffuse => 0.0,
             StageKind::All if ramp == 0 => 1.0,
+            StageKind::WideLight | StageKind::NarrowLight | StageKind::Maps => 1.0,
             StageKind::All => ((self.steps_before + step + 1) as f32 / ramp as f32).min(1.0),
         }
     }
@@ -81,6 +91,13 @@ fn positions(settings: &FitSettings) -> Vec<Position> {
             positions.push(Position { kind, photo_level, map_size, total, place, places });
         }
     };
+    if settings.method == Method::Solver {
+        let wide = settings.solver_rounds / 2;
+        add(StageKind::WideLight, wide, 1, false);
+        add(StageKind::NarrowLight, settings.solver_rounds - wide, 1, false);
+        add(StageKind::Maps, 1, 1, false);
+        return positions;
+    }
     let levels = settings.levels;
     match settings.steps {
         Steps::TwoStep => {
@@ -202,6 +219,7 @@ fn of_steps(settings: &FitSettings, kind: StageKind, message: String) -> Error {
     let name = match (kind, settings.steps) {
         (StageKind::Diffuse, _) => "steps-diffuse",
         (StageKind::All, _) => "steps-all",
+        _ => "solver-rounds",
     };
     Error::new(ErrorKind::InvalidSetting, message)
         .at(Place::Setting(name.into()))

@@ -4,6 +4,18 @@ use crate::error::{Error, ErrorKind, Place, Result};
 use crate::render::first_hits::PixelFilter;
 use serde::{Deserialize, Serialize};
 
+/// How maps and light are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// As in the paper: many small steps of Adam along gradients of the path tracer.
+    #[default]
+    Paper,
+    /// A few large steps without noise: rays are traced once, then texels are solved in closed form and the light by
+    /// Gauss-Newton with the texels eliminated. Settings of Adam's steps do not matter to it.
+    Solver,
+}
+
 /// How gradients of different views are weighed against each other (multi-view gradient consistency, Joy and Poullis
 /// 2023, eq. 2 and 3).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -61,6 +73,9 @@ pub struct FitSettings {
     /// Seed of all random numbers.
     #[arg(long, default_value_t = FitSettings::default().seed)]
     pub seed: u64,
+    /// How maps and light are found.
+    #[arg(long, value_enum, default_value_t)]
+    pub method: Method,
     /// Width and height of the maps in texels: a power of two, 16 to 8192.
     #[arg(long, default_value_t = FitSettings::default().map_size)]
     pub map_size: usize,
@@ -134,6 +149,13 @@ pub struct FitSettings {
     /// long and smooths edges better.
     #[arg(long, default_value_t = FitSettings::default().first_hits_mib)]
     pub first_hits_mib: usize,
+    /// Rounds of the solver on the light: half of them on wide patches of sky, half with narrow ones where it is bright.
+    #[arg(long, default_value_t = FitSettings::default().solver_rounds)]
+    pub solver_rounds: usize,
+    /// Width and height of the solver's grid over the atlas at whose points rays are traced; at most the maps' size is
+    /// used.
+    #[arg(long, default_value_t = FitSettings::default().solver_grid)]
+    pub solver_grid: usize,
     /// Optimiser steps between two looks at the held-out views; 0 never looks.
     #[arg(long, default_value_t = FitSettings::default().held_out_interval)]
     pub held_out_interval: usize,
@@ -146,6 +168,7 @@ impl Default for FitSettings {
     fn default() -> Self {
         FitSettings {
             seed: 1,
+            method: Method::Paper,
             map_size: 2048,
             environment_height: 32,
             steps: Steps::TwoStep,
@@ -170,6 +193,8 @@ impl Default for FitSettings {
             final_rate: 0.05,
             lobe_ramp: 20,
             first_hits_mib: 0,
+            solver_rounds: 8,
+            solver_grid: 256,
             held_out_interval: 10,
             exclude: Vec::new(),
         }
@@ -179,7 +204,7 @@ impl Default for FitSettings {
 impl FitSettings {
     /// Whether some stage frees the specular lobe; without one, pictures are drawn without it too.
     pub fn has_lobe(&self) -> bool {
-        self.steps == Steps::OneStep || self.steps_all > 0
+        self.method == Method::Solver || self.steps == Steps::OneStep || self.steps_all > 0
     }
 
     /// Checks every range; the error names the setting.
@@ -214,6 +239,12 @@ impl FitSettings {
         }
         if self.steps_diffuse + self.steps_all == 0 {
             return wrong("steps-all", "must be at least 1");
+        }
+        if !(2..=64).contains(&self.solver_rounds) {
+            return wrong("solver-rounds", "must be 2 to 64");
+        }
+        if !(16..=4096).contains(&self.solver_grid) {
+            return wrong("solver-grid", "must be 16 to 4096");
         }
         for (name, rate) in [
             ("rate-diffuse", self.rate_diffuse),

@@ -43,7 +43,8 @@ pub struct FitState {
     pub map_size: usize,
     /// Texels of the maps.
     pub texels: Vec<Texel<f32>>,
-    /// Moments of the texels.
+    /// Moments of the texels under Adam. The solver keeps the variances of their numbers in `second`, see
+    /// [`Estimate::variances`](crate::fit::solver::Estimate::variances).
     pub moments: Moments,
     /// Radiance of the light's texels.
     pub light: Vec<[f32; 3]>,

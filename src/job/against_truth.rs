@@ -42,7 +42,7 @@ fn same_atlas(scene: &Scene, surface: &Surface) -> bool {
 }
 
 /// Maps read at the texel centres of another size.
-fn resampled(maps: &MaterialMaps, (width, height): (usize, usize)) -> MaterialMaps {
+pub(super) fn resampled(maps: &MaterialMaps, (width, height): (usize, usize)) -> MaterialMaps {
     if (maps.diffuse.width(), maps.diffuse.height()) == (width, height) {
         return maps.clone();
     }

@@ -120,9 +120,7 @@ struct Compare<'a> {
 
 impl Compare<'_> {
     fn level(&self, view: usize) -> usize {
-        let camera = &self.scene.views[view].camera;
-        let most = self.settings.most_pixels.max(1);
-        (0..12).find(|level| (camera.width >> level) * (camera.height >> level) <= most).unwrap_or(12)
+        self.scene.views[view].camera.level_within(self.settings.most_pixels)
     }
 
     /// Draws the fit and scores it against a picture of the same pixels.

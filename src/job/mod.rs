@@ -7,26 +7,32 @@
 //! [`open`] opens scenes and runs, begins fits and takes them up; [`prepare`] turns a scene into a surface with an atlas,
 //! [`worker`] is the thread, `save` keeps the run folder whole while it runs, [`outcome`] renders, scores and
 //! writes the run folder, [`demo`] makes the built-in scene, [`study`]
-//! fits many times over and makes tables. [`preview`] draws for a window beside a fit. After a fit, [`gallery`] makes
-//! what a user shows, [`gauge`] moves its scale, [`entanglement`] tells how much light is baked into the maps.
+//! fits many times over and makes tables, [`contest`] holds methods against each other by the clock, [`hard`] on
+//! cases that break fits; [`scale`] and [`tracer_speed`] time parts; [`rivals`] fits reflectance models to measured tables.
+//! [`preview`] draws for a window beside a fit. After a fit, [`gallery`] makes what a user shows, [`gauge`] moves its
+//! scale, [`entanglement`] tells how much light is baked into the maps.
 
 pub mod against_truth;
 pub mod background;
+pub mod contest;
 pub mod demo;
 pub mod entanglement;
 mod facts;
 pub mod gallery;
 pub mod gauge;
+pub mod hard;
 pub mod open;
 pub mod outcome;
 pub mod pictures;
 pub mod prepare;
 pub mod preview;
+pub mod rivals;
 mod save;
 pub mod scale;
 pub mod shown;
 pub mod slot;
 pub mod study;
+pub mod tracer_speed;
 mod view;
 pub mod worker;
 

@@ -1,7 +1,7 @@
 //! What a finished fit leaves behind: maps, scores, pictures, report.
 
 use super::against_truth::truth_errors;
-use super::facts::describe;
+use super::facts::{describe, solver_facts};
 use super::pictures::parameters;
 use super::prepare::{Prepared, RunSettings, covered, timed};
 use super::shown::{exposure_of, relit_strips, score_views};
@@ -58,6 +58,12 @@ pub fn write(
     let environment = fitter.environment();
     let result = RunResult { maps, environment, mesh: surface.mesh().clone(), times_seen };
     timed(&mut timings, "write maps", || folder.write_result(&result))?;
+    if let Some(deviations) = fitter.deviations() {
+        folder.write_deviations(&deviations)?;
+    }
+    if let Some(sharing) = fitter.lobe_sharing() {
+        folder.write_lobe_sharing(&sharing)?;
+    }
     folder.write_loss(&loss_rows(fitter.state()))?;
 
     tell("pictures of the views");
@@ -72,6 +78,8 @@ pub fn write(
     }
 
     let mut data = describe(fitter, &prepared, settings, &result, &covered);
+    let transport = timed(&mut timings, "check of transport", || fitter.transport_error(stop));
+    data.scene_facts.extend(solver_facts(fitter, transport));
     data.views = views
         .iter()
         .map(|view| {

@@ -5,7 +5,7 @@
 //! of the refinement, never the last one. A panic in the tracer ends one request with a text; the thread lives on.
 
 use super::{Slot, background};
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::{Error, ErrorKind, Result, text_of_panic};
 use crate::image::RgbImage;
 use crate::render::picture::PictureSettings;
 use crate::render::progressive::{Accumulation, PictureTracer, samples_of_next_pass};
@@ -196,8 +196,7 @@ impl Worker {
         while let Some(request) = self.next_request() {
             let key = request.key;
             let Err(panic) = catch_unwind(AssertUnwindSafe(|| self.draw(&request))) else { continue };
-            let message = panic.downcast_ref::<String>().map(String::as_str);
-            let message = message.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
+            let message = text_of_panic(&*panic);
             let error =
                 Error::new(ErrorKind::Internal, format!("the path-traced picture ended unexpectedly: {message}"))
                     .remedy("a defect of this program; other pictures can still be drawn");

@@ -3,6 +3,7 @@
 //! Scenes are bumpy spheres in code with exact triangle counts; photographs are one colour, since only cost is looked
 //! at. Peak memory is that of the whole process so far, so cases run from small to large.
 
+use super::contest::Contestant;
 use super::prepare::timed;
 use crate::atlas::{self, AtlasSettings};
 use crate::error::{Error, ErrorKind, Result};
@@ -30,6 +31,17 @@ pub struct ScaleCase {
     pub map_size: usize,
 }
 
+/// Cases along three axes: the first of each list together, then each list in turn with the first of the others.
+pub fn cases_along(triangles: &[usize], views: &[usize], maps: &[usize]) -> Vec<ScaleCase> {
+    let first = |list: &[usize], otherwise: usize| list.first().copied().unwrap_or(otherwise);
+    let base = ScaleCase { triangles: first(triangles, 31_964), views: first(views, 48), map_size: first(maps, 512) };
+    let mut cases = vec![base];
+    cases.extend(maps.iter().skip(1).map(|&map_size| ScaleCase { map_size, ..base }));
+    cases.extend(triangles.iter().skip(1).map(|&triangles| ScaleCase { triangles, ..base }));
+    cases.extend(views.iter().skip(1).map(|&views| ScaleCase { views, ..base }));
+    cases
+}
+
 /// The cases, from small to large: maps, then triangles, then views.
 pub fn cases(quick: bool) -> Vec<ScaleCase> {
     let case = |triangles, views, map_size| ScaleCase { triangles, views, map_size };
@@ -46,8 +58,9 @@ pub fn cases(quick: bool) -> Vec<ScaleCase> {
     ]
 }
 
-/// Runs the cases and gathers seconds and memory; `tell` hears of each case before it runs.
-pub fn run(quick: bool, folder: &Path, tell: &dyn Fn(&str)) -> Result<StudyTable> {
+/// Runs the cases by each method and gathers seconds and memory; `tell` hears of each case before it runs. A step of the
+/// solver is its first, which traces what later ones share.
+pub fn run(cases: &[ScaleCase], methods: &[Contestant], folder: &Path, tell: &dyn Fn(&str)) -> Result<StudyTable> {
     let columns = [
         ("mesh file read", "s"),
         ("atlas", "s"),
@@ -56,14 +69,31 @@ pub fn run(quick: bool, folder: &Path, tell: &dyn Fn(&str)) -> Result<StudyTable
         ("one step", "s"),
         ("peak memory", "MiB"),
     ];
-    let mut table = StudyTable::new("Growth with triangles, views and maps", "case", &columns);
-    for case in cases(quick) {
-        let name = format!("{} triangles, {} views, maps {}", case.triangles, case.views, case.map_size);
-        tell(&name);
-        let timings = run_case(case, folder)?;
-        let mut row: Vec<f64> = timings.iter().map(|time| time.seconds).collect();
-        row.push(peak_bytes().map_or(f64::NAN, |bytes| bytes as f64 / (1 << 20) as f64));
-        table.add(&name, &row);
+    let title = format!("Growth with triangles, views and maps, {} threads", rayon::current_num_threads());
+    let mut table = StudyTable::new(&title, "case", &columns);
+    for &case in cases {
+        for &method in methods {
+            let name = format!(
+                "{}: {} triangles, {} views, maps {}",
+                method.name(),
+                case.triangles,
+                case.views,
+                case.map_size
+            );
+            let settings = settings(case);
+            let Some(settings) = method.settings(&settings).filter(|_| method != Contestant::Mitsuba) else {
+                let note = format!("`{}` was left out: this build has no such method.", method.name());
+                if !table.notes.contains(&note) {
+                    table.notes.push(note);
+                }
+                continue;
+            };
+            tell(&name);
+            let timings = run_case(case, settings, folder)?;
+            let mut row: Vec<f64> = timings.iter().map(|time| time.seconds).collect();
+            row.push(peak_bytes().map_or(f64::NAN, |bytes| bytes as f64 / (1 << 20) as f64));
+            table.add(&name, &row);
+        }
     }
     Ok(table)
 }
@@ -73,7 +103,20 @@ pub fn scene(case: ScaleCase) -> Scene {
     scene_of(bumpy_sphere(case.triangles), case.views)
 }
 
-fn run_case(case: ScaleCase, folder: &Path) -> Result<Vec<StageTime>> {
+/// One step at full size.
+fn settings(case: ScaleCase) -> FitSettings {
+    FitSettings {
+        map_size: case.map_size,
+        steps: Steps::OneStep,
+        steps_diffuse: 0,
+        steps_all: 1,
+        levels: 1,
+        held_out_interval: 0,
+        ..Default::default()
+    }
+}
+
+fn run_case(case: ScaleCase, settings: FitSettings, folder: &Path) -> Result<Vec<StageTime>> {
     let mut timings = Vec::new();
     let path = folder.join("scale_mesh.obj");
     crate::export::obj::write(&path, &bumpy_sphere(case.triangles))?;
@@ -88,15 +131,6 @@ fn run_case(case: ScaleCase, folder: &Path) -> Result<Vec<StageTime>> {
     let atlas = timed(&mut timings, "atlas", || atlas::build(&mesh, &atlas_settings, &|_| {}))?;
     let surface = timed(&mut timings, "tracer", || Surface::new(atlas.mesh))?;
     let scene = scene_of(mesh, case.views);
-    let settings = FitSettings {
-        map_size: case.map_size,
-        steps: Steps::OneStep,
-        steps_diffuse: 0,
-        steps_all: 1,
-        levels: 1,
-        held_out_interval: 0,
-        ..Default::default()
-    };
     let mut fitter =
         timed(&mut timings, "prepare", || Fitter::new(Arc::new(scene), Arc::new(surface), settings, None))?;
     match timed(&mut timings, "step", || fitter.step(&AtomicBool::new(false)))? {
@@ -172,8 +206,22 @@ mod tests {
             assert_eq!(bumpy_sphere(count).triangles.len(), count);
         }
         let folder = tempfile::tempdir().unwrap();
-        let timings = run_case(ScaleCase { triangles: 500, views: 3, map_size: 64 }, folder.path()).unwrap();
+        let timings = {
+            let case = ScaleCase { triangles: 500, views: 3, map_size: 64 };
+            run_case(case, settings(case), folder.path()).unwrap()
+        };
         assert_eq!(timings.len(), 5);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "the mesh file is gone");
+    }
+
+    #[test]
+    fn cases_vary_one_thing_at_a_time() {
+        let cases = cases_along(&[100, 200], &[8, 16, 32], &[64]);
+        assert_eq!(cases.len(), 1 + 1 + 2);
+        assert!(cases.iter().skip(1).all(|case| {
+            let same = [case.triangles == 100, case.views == 8, case.map_size == 64];
+            same.iter().filter(|same| **same).count() == 2
+        }));
+        assert_eq!(cases_along(&[], &[], &[]).len(), 1);
     }
 }

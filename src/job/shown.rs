@@ -36,12 +36,6 @@ pub(super) struct ScoredView {
     pub pictures: ViewPictures,
 }
 
-/// The level at which a view has at most so many pixels.
-fn level_of(scene: &Scene, view: usize, most_pixels: usize) -> usize {
-    let camera = &scene.views[view].camera;
-    (0..12).find(|level| (camera.width >> level) * (camera.height >> level) <= most_pixels).unwrap_or(12)
-}
-
 fn picture_settings(scene: &Scene, settings: &RunSettings, samples: usize) -> PictureSettings {
     PictureSettings {
         samples,
@@ -71,7 +65,7 @@ pub(super) fn score_views(
             ViewUse::Training | ViewUse::LeftOut => (TRAINING_PIXELS, TRAINING_SAMPLES),
         };
         let picture_settings = picture_settings(scene, settings, samples);
-        let target = Target::new(scene, index, level_of(scene, index, most));
+        let target = Target::new(scene, index, scene.views[index].camera.level_within(most));
         let gain = fitter.state().log_gains[index].exp();
         let mut picture = render(surface, &target.camera, own, index as u32, &picture_settings, stop);
         picture.radiance.pixels_mut().iter_mut().for_each(|pixel| *pixel *= gain);
@@ -167,7 +161,7 @@ pub(super) fn relit_strips(
     for (name, light) in lights {
         let mut strip = RelitStrip { light: name, environment: Some(light.radiance.clone()), pictures: Vec::new() };
         for &view in &shown {
-            let level = level_of(scene, view, RELIT_PIXELS);
+            let level = scene.views[view].camera.level_within(RELIT_PIXELS);
             let camera = scene.views[view].camera.shrunk(1 << level);
             let picture = relit(surface, own, &light, &camera, view, &relight_settings, stop);
             let caption = scene.views[view].name.clone();

@@ -4,9 +4,9 @@ use super::outcome;
 use super::prepare::{Prepared, RunSettings};
 use super::save::Saver;
 use super::{Command, Event, Progress, Slot, Snapshot};
-use crate::error::{Error, ErrorKind, Finding, Result, Severity};
+use crate::error::{Error, ErrorKind, Finding, Result, Severity, text_of_panic};
 use crate::export::RunFolder;
-use crate::fit::{FitSettings, Fitter, LossRow, StepOutcome};
+use crate::fit::{FitSettings, Fitter, LossRow, Method, StepOutcome};
 use crate::insight::report::data::StageTime;
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use std::sync::Arc;
@@ -124,8 +124,7 @@ pub fn start_with(
                 Ok(Ok(())) => return,
                 Ok(Err(error)) => error,
                 Err(panic) => {
-                    let message = panic.downcast_ref::<String>().map(String::as_str);
-                    let message = message.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
+                    let message = text_of_panic(&*panic);
                     Error::new(ErrorKind::Internal, format!("the worker of the fit ended unexpectedly: {message}"))
                         .remedy("a defect of this program; the last checkpoint is whole: `patina resume`")
                 }
@@ -224,8 +223,9 @@ impl Worker {
             if was_single && !self.paused && self.steps_asked == 0 {
                 self.set_paused(true);
             }
-            // While it holds, what is seen is what a single step did.
-            if self.paused || last_snapshot.elapsed() > SNAPSHOT_INTERVAL {
+            // While it holds, what is seen is what a single step did; the solver's steps are few, and each is shown.
+            let is_large_step = self.settings.fit.method == Method::Solver;
+            if self.paused || is_large_step || last_snapshot.elapsed() > SNAPSHOT_INTERVAL {
                 self.put_snapshot();
                 last_snapshot = Instant::now();
             }

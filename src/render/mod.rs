@@ -8,7 +8,8 @@
 //!    it. Both run in any [`Real`](crate::math::real::Real): `f32` to fit, `f64` to audit, dual numbers for
 //!    Hessian-vector products.
 //! 4. [`accumulate`]: pixels in parallel, gradients reduced in a fixed order.
-//! 5. [`picture`]: pictures and layers. [`first_hits`]: primary rays traced once.
+//! 5. [`cached`]: the same light without rays, for scenes whose geometry is known and stays.
+//! 6. [`picture`]: pictures and layers. [`first_hits`]: primary rays traced once.
 //!    [`progressive`]: a picture that refines.
 //!
 //! The record replaces a second tracing pass: it lives for one pixel, so memory grows neither with the picture nor
@@ -17,6 +18,7 @@
 //! What is not here: losses and optimisers (those are in `fit`), transmission, volumes, light sources in the scene.
 
 pub mod accumulate;
+pub mod cached;
 pub mod first_hits;
 pub mod path;
 pub mod picture;

@@ -63,6 +63,12 @@ impl Camera {
         }
     }
 
+    /// How many times the picture is halved until it has at most so many pixels (no fewer than one); at most 12 times.
+    pub fn level_within(&self, most_pixels: usize) -> usize {
+        let most_pixels = most_pixels.max(1);
+        (0..12).find(|level| (self.width >> level) * (self.height >> level) <= most_pixels).unwrap_or(12)
+    }
+
     /// A camera at `eye` that looks at `target`, with +y of the world up on the picture.
     pub fn looking_at(eye: Vec3, target: Vec3, width: usize, height: usize, field_of_view_x_radians: f32) -> Self {
         let forward = (target - eye).try_normalize().unwrap_or(Vec3::NEG_Z);

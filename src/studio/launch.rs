@@ -2,7 +2,7 @@
 
 use super::app::{Studio, StudioOptions};
 use super::model::store::Store;
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::{Error, ErrorKind, Result, text_of_panic};
 use std::path::PathBuf;
 
 /// The packages of Debian that a window needs at run time, for the remedy of an error.
@@ -45,11 +45,7 @@ pub(super) fn open(
     match outcome {
         Ok(Ok(())) => Ok(()),
         Ok(Err(source)) => Err(no_window(&source.to_string())),
-        Err(panic) => {
-            let text = panic.downcast_ref::<String>().map(String::as_str);
-            let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
-            Err(no_window(text))
-        }
+        Err(panic) => Err(no_window(text_of_panic(&*panic))),
     }
 }
 

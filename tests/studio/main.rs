@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used)]
 
 mod acts;
+#[path = "../common/adapter.rs"]
+mod adapter;
 mod faults;
 mod fit;
 mod hand;

@@ -1,34 +1,16 @@
 //! The window as it is seen, drawn by whatever adapter there is. Properties of pixels are held, not the pixels: every
 //! adapter rounds in its own way.
 
+use super::adapter::has_adapter;
 use super::support::{Key, Modifiers, Role, TestStudio, finished_run};
 use eframe::egui::{Event, PointerButton, Pos2, Rect};
-use eframe::wgpu;
 use egui_kittest::Harness;
 use image::RgbaImage;
 use patina::studio::layout::Panel;
 use patina::studio::model::LightName;
 use patina::studio::model::store::ThemeChoice;
-use std::future::Future;
 use std::path::PathBuf;
-use std::pin::pin;
 use std::sync::Arc;
-use std::task::{Context, Poll, Waker};
-
-/// Whether there is anything to draw with, a software adapter included; says so when there is not.
-fn has_adapter() -> bool {
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
-    let mut search = pin!(instance.enumerate_adapters(wgpu::Backends::all()));
-    let found = loop {
-        if let Poll::Ready(adapters) = search.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
-            break !adapters.is_empty();
-        }
-    };
-    if !found {
-        println!("skipped: no graphics adapter");
-    }
-    found
-}
 
 /// A window that is drawn, with the finished run open.
 fn drawn(size: [f32; 2], pixels_per_point: f32) -> TestStudio {

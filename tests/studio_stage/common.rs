@@ -1,6 +1,6 @@
 //! A stage in a window without a display, and scenes small enough to know every pixel.
 
-use eframe::{egui, wgpu};
+use eframe::egui;
 use egui_kittest::Harness;
 use glam::{Vec2, Vec3};
 use patina::image::{Image, RgbImage};
@@ -8,10 +8,7 @@ use patina::light::Environment;
 use patina::material::MaterialMaps;
 use patina::scene::Mesh;
 use patina::studio::stage::{Eye, OrbitEye, Stage, StageContent, StageFrame, StageLight};
-use std::future::Future;
-use std::pin::pin;
 use std::sync::Arc;
-use std::task::{Context, Poll, Waker};
 
 /// A window with nothing but a stage.
 pub struct Shown {
@@ -29,21 +26,6 @@ impl eframe::App for Shown {
             self.rect = response.rect;
         });
     }
-}
-
-/// Whether there is anything to draw with, a software adapter included; says so when there is not.
-pub fn has_adapter() -> bool {
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
-    let mut search = pin!(instance.enumerate_adapters(wgpu::Backends::all()));
-    let found = loop {
-        if let Poll::Ready(adapters) = search.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
-            break !adapters.is_empty();
-        }
-    };
-    if !found {
-        println!("skipped: no graphics adapter");
-    }
-    found
 }
 
 /// A window of this size that shows a frame, every upload waited for.

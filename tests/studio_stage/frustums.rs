@@ -1,6 +1,7 @@
 //! Cameras on the stage.
 
-use crate::common::{assert_colour, has_adapter, pixels, window};
+use crate::adapter::has_adapter;
+use crate::common::{assert_colour, pixels, window};
 use eframe::egui::Color32;
 use glam::{Vec2, Vec3};
 use patina::image::Image;

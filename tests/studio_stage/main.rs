@@ -4,6 +4,8 @@
 
 #![allow(clippy::unwrap_used)]
 
+#[path = "../common/adapter.rs"]
+mod adapter;
 mod common;
 mod frustums;
 mod pictures;

@@ -1,6 +1,7 @@
 //! The stage beside the path tracer, and pictures of the demo scene for a person to look at.
 
-use crate::common::{has_adapter, one_material, pixels, sphere, sphere_frame, window};
+use crate::adapter::has_adapter;
+use crate::common::{one_material, pixels, sphere, sphere_frame, window};
 use eframe::egui::Color32;
 use glam::{Vec2, Vec3};
 use patina::image::Image;

@@ -1,6 +1,7 @@
 //! From the drawn scene to the screen: display transform, photo, traced picture, and when nothing is drawn anew.
 
-use crate::common::{assert_colour, has_adapter, one_material, pixels, sphere_frame, test_picture, window};
+use crate::adapter::has_adapter;
+use crate::common::{assert_colour, one_material, pixels, sphere_frame, test_picture, window};
 use eframe::egui::{self, Color32};
 use glam::{Vec2, Vec3};
 use patina::image::Image;

@@ -1,6 +1,7 @@
 //! How long a frame takes. Printed, never asserted.
 
-use crate::common::{has_adapter, sphere, try_pixels, window};
+use crate::adapter::has_adapter;
+use crate::common::{sphere, try_pixels, window};
 use glam::{Vec2, Vec3};
 use patina::image::Image;
 use patina::light::sky::{SkySettings, sun_and_sky};

@@ -1,6 +1,7 @@
 //! What is drawn on the surface.
 
-use crate::common::{assert_colour, has_adapter, normal_at, one_material, pixels, sphere_frame, window};
+use crate::adapter::has_adapter;
+use crate::common::{assert_colour, normal_at, one_material, pixels, sphere_frame, window};
 use eframe::egui::Color32;
 use glam::{Vec2, Vec3};
 use patina::image::Image;

@@ -27,7 +27,7 @@ use crate::math::statistics::quantile;
 use crate::render::picture::PictureSettings;
 use crate::render::progressive::PictureTracer;
 use crate::render::{Parameters, Surface};
-use crate::scene::{Camera, Scene};
+use crate::scene::Scene;
 use pixels::{PixelSays, pixels_of_view};
 use std::sync::atomic::{AtomicBool, Ordering};
 use texels::{OverViews, ViewTexels};
@@ -141,7 +141,7 @@ pub fn surface_layers(
     let mut kept = Vec::new();
     let (mut views, mut pictures) = (Vec::new(), Vec::new());
     for view in 0..scene.views.len() {
-        let target = Target::new(scene, view, level_of(&scene.views[view].camera, settings.most_pixels));
+        let target = Target::new(scene, view, scene.views[view].camera.level_within(settings.most_pixels));
         let gain = settings.gains.get(view).copied().unwrap_or(1.0);
         let says = pixels_of_view(scene, &tracer, &target, gain, size, stop);
         if stop.load(Ordering::Relaxed) {
@@ -166,11 +166,6 @@ pub fn surface_layers(
     let range = quantile(&kept, 0.999) - quantile(&kept, 0.001);
     let range = if range.is_finite() { range } else { 0.0 };
     Ok(total.layers(size, taking_part, range, views, pictures))
-}
-
-/// The level at which a camera has at most so many pixels.
-fn level_of(camera: &Camera, most_pixels: usize) -> usize {
-    (0..12).find(|level| (camera.width >> level) * (camera.height >> level) <= most_pixels).unwrap_or(12)
 }
 
 fn error_of_view(scene: &Scene, target: &Target, says: &[PixelSays]) -> (ViewError, LayerPictures) {

@@ -1,7 +1,7 @@
 //! Work beside the window: reading, preparing, saving. Each task has threads of its own; it can be stopped, it tells how
 //! far it is, and a panic in it is an error like any other.
 
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::{Error, ErrorKind, Result, text_of_panic};
 use crate::job::background;
 use crossbeam_channel::{Receiver, bounded};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -140,8 +140,7 @@ impl<T> Drop for Tasks<T> {
 }
 
 fn panicked(panic: &(dyn std::any::Any + Send)) -> Error {
-    let text = panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
-    Error::new(ErrorKind::Internal, format!("a task ended unexpectedly: {}", text.unwrap_or("no message")))
+    Error::new(ErrorKind::Internal, format!("a task ended unexpectedly: {}", text_of_panic(panic)))
         .remedy("a defect of this program; what was saved before is whole")
 }
 

@@ -171,8 +171,7 @@ fn render(model: &mut Model, memory: &mut PhotoMemory, view: usize) {
             }
         }
         let camera = &scene.views[view].camera;
-        let level = (0..12).find(|level| (camera.width >> level) * (camera.height >> level) <= MOST_PIXELS);
-        let camera = camera.shrunk(1 << level.unwrap_or(12));
+        let camera = camera.shrunk(1 << camera.level_within(MOST_PIXELS));
         let Some(parameters) = model.run_parameters() else { return };
         memory.key += 1;
         let request = PreviewRequest {

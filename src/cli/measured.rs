@@ -1,0 +1,289 @@
+//! `patina measured`: tables of measured reflectance.
+
+use super::fit::stop_on_interrupt;
+use crate::error::{Error, ErrorKind, Place, Result};
+use crate::files::write_bytes;
+use crate::image::file;
+use crate::insight::material_pictures::{self as pictures, ShowLight};
+use crate::job::rivals::{DATA_STATEMENT, RivalOptions};
+use crate::light::Environment;
+use crate::measured::analytic::OwnLobe;
+use crate::measured::fit_model::ModelFitSettings;
+use crate::measured::fits::{NeuralFits, PublishedFits};
+use crate::measured::rivals::Rival;
+use crate::measured::sphere::{self, EnvironmentLevels};
+use crate::measured::{Category, MeasuredBrdf};
+use clap::{Args, Subcommand};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// What to do with measured reflectance.
+#[derive(Debug, Subcommand)]
+pub enum MeasuredTask {
+    /// List the materials of a library folder of neural fits.
+    List(ListOptions),
+    /// Draw a material: its sphere, its lobes as curves and as numbers.
+    Show(ShowOptions),
+    /// Draw the spheres of all materials of a library on one sheet.
+    Thumbnails(ThumbnailOptions),
+    /// Write a material as a table in MERL's `.binary` layout.
+    Convert(ConvertOptions),
+    /// Fit a model of few parameters to a material.
+    Fit(MeasuredFitOptions),
+    /// Fit all such models to all materials of a library and compare their errors.
+    Rivals(RivalsOptions),
+    /// What concerns the neural model.
+    #[command(flatten)]
+    Neural(super::neural::NeuralTask),
+}
+
+/// Options of `patina measured list`.
+#[derive(Debug, Args)]
+pub struct ListOptions {
+    /// Folder of the neural fits.
+    pub library: PathBuf,
+}
+
+/// Where a material comes from.
+#[derive(Debug, Args)]
+pub struct Source {
+    /// A `.binary` file, or the name of a material in the library or in the published fits.
+    pub material: String,
+    /// Folder of the neural fits.
+    #[arg(long)]
+    pub library: Option<PathBuf>,
+    /// A file of published parameters, `.fit`, to take the material from.
+    #[arg(long, conflicts_with = "library")]
+    pub published: Option<PathBuf>,
+}
+
+/// Options of `patina measured show`.
+#[derive(Debug, Args)]
+pub struct ShowOptions {
+    /// The material.
+    #[command(flatten)]
+    pub source: Source,
+    /// Light the sphere by this environment in place of three lamps.
+    #[arg(long)]
+    pub env: Option<PathBuf>,
+    /// Side of the picture in pixels.
+    #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(8..=4096))]
+    pub size: u32,
+    /// Folder of the pictures.
+    #[arg(short, long)]
+    pub output: PathBuf,
+}
+
+/// Options of `patina measured thumbnails`.
+#[derive(Debug, Args)]
+pub struct ThumbnailOptions {
+    /// Folder of the neural fits.
+    pub library: PathBuf,
+    /// Light the spheres by this environment in place of three lamps.
+    #[arg(long)]
+    pub env: Option<PathBuf>,
+    /// Side of a sphere in pixels.
+    #[arg(long, default_value_t = 104, value_parser = clap::value_parser!(u32).range(8..=512))]
+    pub size: u32,
+    /// The sheet, a PNG file.
+    #[arg(short, long)]
+    pub output: PathBuf,
+}
+
+/// Options of `patina measured convert`.
+#[derive(Debug, Args)]
+pub struct ConvertOptions {
+    /// The material.
+    #[command(flatten)]
+    pub source: Source,
+    /// The `.binary` file to write.
+    #[arg(short, long)]
+    pub output: PathBuf,
+}
+
+/// Options of `patina measured fit`.
+#[derive(Debug, Args)]
+pub struct MeasuredFitOptions {
+    /// The material.
+    #[command(flatten)]
+    pub source: Source,
+    /// cook-torrance, cook-torrance-two, ggx, ward, dsbrdf, bivariate, or maps: diffuse, specular and roughness.
+    #[arg(long)]
+    pub model: String,
+    /// Folder of the fit: `fit.json`, `fit.binary`, spheres and lobes side by side.
+    #[arg(short, long)]
+    pub output: PathBuf,
+}
+
+/// Options of `patina measured rivals`.
+#[derive(Debug, Args)]
+pub struct RivalsOptions {
+    /// Folder of the neural fits.
+    pub library: PathBuf,
+    /// Only these materials.
+    #[arg(long, value_delimiter = ',')]
+    pub materials: Vec<String>,
+    /// Only these models.
+    #[arg(long, value_delimiter = ',')]
+    pub models: Vec<String>,
+    /// Every eighth material only.
+    #[arg(long)]
+    pub quick: bool,
+    /// Folder of the tables; a study that was stopped goes on there.
+    #[arg(short, long, default_value = "patina-rivals")]
+    pub output: PathBuf,
+}
+
+/// Does what was asked.
+pub fn run(task: &MeasuredTask, json: bool) -> Result<()> {
+    match task {
+        MeasuredTask::List(options) => list(options, json),
+        MeasuredTask::Show(options) => show(options),
+        MeasuredTask::Thumbnails(options) => thumbnails(options),
+        MeasuredTask::Convert(options) => convert(options),
+        MeasuredTask::Fit(options) => fit(options, json),
+        MeasuredTask::Rivals(options) => rivals(options, json),
+        MeasuredTask::Neural(task) => super::neural::run(task, json),
+    }
+}
+
+/// The table of a source, and its name.
+fn table_of(source: &Source) -> Result<(MeasuredBrdf, String)> {
+    let path = Path::new(&source.material);
+    if let Some(published) = &source.published {
+        let fits = PublishedFits::read(published)?;
+        let fit = fits.find(&source.material).ok_or_else(|| {
+            Error::new(ErrorKind::Missing, format!("no material is called {}", source.material))
+                .at(Place::File(published.clone()))
+        })?;
+        return Ok((fit.table()?, source.material.clone()));
+    }
+    match &source.library {
+        Some(library) => Ok((NeuralFits::read(library)?.find(&source.material)?.table(), source.material.clone())),
+        None if path.extension().is_some() || path.exists() => {
+            let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            Ok((MeasuredBrdf::read(path)?, name))
+        }
+        None => Err(Error::new(ErrorKind::Missing, format!("{} is not a file", source.material))
+            .remedy("give a .binary file, or a material's name with --library FOLDER")),
+    }
+}
+
+fn light_of(env: Option<&PathBuf>) -> Result<ShowLight> {
+    let Some(path) = env else { return Ok(ShowLight::Lamps(sphere::showing_lamps())) };
+    let (environment, findings) = Environment::read(path)?;
+    findings.iter().for_each(|finding| eprintln!("{finding}"));
+    Ok(ShowLight::Environment(EnvironmentLevels::new(&environment)))
+}
+
+fn list(options: &ListOptions, json: bool) -> Result<()> {
+    let fits = NeuralFits::read(&options.library)?;
+    for fit in &fits.materials {
+        let kind = Category::of(&fit.name);
+        match json {
+            true => println!("{}", serde_json::json!({"event": "material", "name": fit.name, "kind": kind})),
+            false => println!("{:<26} {}", fit.name, kind.label()),
+        }
+    }
+    if !json {
+        println!("{} materials. {DATA_STATEMENT}", fits.materials.len());
+    }
+    Ok(())
+}
+
+fn show(options: &ShowOptions) -> Result<()> {
+    let (table, name) = table_of(&options.source)?;
+    let light = light_of(options.env.as_ref())?;
+    let value = |at| table.lookup(at).unwrap_or_default();
+    let picture = pictures::sphere_of(&value, options.size as usize, &light);
+    file::write_png_srgb8(&options.output.join("sphere.png"), &picture)?;
+    write_bytes(&options.output.join("lobes.svg"), pictures::lobes_svg(&[(&name, &value)]).as_bytes())?;
+    write_bytes(&options.output.join("lobes.csv"), pictures::lobes_csv(&value).as_bytes())?;
+    println!("{name}: {} cells measured: {}", table.counted_cells().len(), options.output.display());
+    Ok(())
+}
+
+fn thumbnails(options: &ThumbnailOptions) -> Result<()> {
+    let fits = NeuralFits::read(&options.library)?;
+    let light = light_of(options.env.as_ref())?;
+    let tiles: Vec<_> = fits
+        .materials
+        .iter()
+        .map(|fit| {
+            let table = fit.table();
+            let value = |at| table.lookup(at).unwrap_or_default();
+            (fit.name.clone(), pictures::sphere_of(&value, options.size as usize, &light))
+        })
+        .collect();
+    file::write_png_srgb8(&options.output, &pictures::sheet(&tiles, None))?;
+    println!("{} materials: {}", tiles.len(), options.output.display());
+    Ok(())
+}
+
+fn convert(options: &ConvertOptions) -> Result<()> {
+    let (table, name) = table_of(&options.source)?;
+    table.write(&options.output)?;
+    println!("{name}: {}", options.output.display());
+    Ok(())
+}
+
+fn fit(options: &MeasuredFitOptions, json: bool) -> Result<()> {
+    let rival = Rival::of_key(&options.model).map_err(|error| error.at(Place::Setting("model".into())))?;
+    let (table, name) = table_of(&options.source)?;
+    let fit = rival.fit(&table, &ModelFitSettings::default())?;
+    let fitted = fit.table();
+    let maps = (rival == Rival::OwnLobe).then(|| OwnLobe::map_values(&fit.parameters));
+    let report = serde_json::json!({
+        "event": "measured-fit", "material": name, "model": rival.name(), "error": fit.error, "maps": maps,
+        "parameters": fit.parameters,
+    });
+    write_bytes(&options.output.join("fit.json"), format!("{report:#}\n").as_bytes())?;
+    fitted.write(&options.output.join("fit.binary"))?;
+
+    let value = |at| table.lookup(at).unwrap_or_default();
+    let fitted_value = |at| fitted.lookup(at).unwrap_or_default();
+    let lamps = sphere::showing_lamps();
+    let truth = sphere::render_table(256, &table, &lamps);
+    let estimate = sphere::render_table(256, &fitted, &lamps);
+    let exposure = sphere::display_exposure(&truth, &sphere::sphere_mask(256));
+    let tiles = [
+        (name.clone(), pictures::shown_sphere_at(&truth, exposure)),
+        (rival.name().to_string(), pictures::shown_sphere_at(&estimate, exposure)),
+    ];
+    file::write_png_srgb8(&options.output.join("spheres.png"), &pictures::sheet(&tiles, Some(2)))?;
+    let svg = pictures::lobes_svg(&[("", &value), ("fit", &fitted_value)]);
+    write_bytes(&options.output.join("lobes.svg"), svg.as_bytes())?;
+    let psnr = sphere::displayed_scores(&estimate, &truth)?.psnr;
+    if json {
+        println!("{report}");
+    } else {
+        println!("{name}, {}: log-RMSE {:.4}, sphere {psnr:.1} dB", rival.name(), fit.error.log_rmse);
+        if let Some(maps) = maps {
+            println!("diffuse {:.4?}, specular {:.4?}, roughness {:.5}", maps.diffuse, maps.specular, maps.roughness);
+        }
+        println!("{}", options.output.display());
+    }
+    Ok(())
+}
+
+fn rivals(options: &RivalsOptions, json: bool) -> Result<()> {
+    let stop = Arc::new(AtomicBool::new(false));
+    stop_on_interrupt(Arc::clone(&stop));
+    let models = options.models.iter().map(|key| Rival::of_key(key)).collect::<Result<Vec<Rival>>>()?;
+    let study = RivalOptions {
+        library: options.library.clone(),
+        materials: options.materials.clone(),
+        models,
+        quick: options.quick,
+        output: options.output.clone(),
+    };
+    let table = crate::job::rivals::run(&study, &stop, &|row| match json {
+        true => println!("{}", serde_json::json!({"event": "rival", "row": row})),
+        false => eprintln!("{:<26} {:<22} log-RMSE {:.4}", row.material, row.model, row.error.log_rmse),
+    })?;
+    if !json {
+        println!("{}", table.to_markdown());
+    }
+    Ok(())
+}

@@ -1,0 +1,230 @@
+//! `patina object`: light and reflectance from photos of one object.
+
+use super::fit::stop_on_interrupt;
+use crate::error::Result;
+use crate::light::Environment;
+use crate::object::joint::{Known, estimate};
+use crate::object::prior::LightPriorKind;
+use crate::object::progress::ObjectEvent;
+use crate::object::read::{ObjectFiles, read_views};
+use crate::object::settings::{LightMethod, ObjectSettings};
+use crate::object::starts::{ModelKind, StartedModel};
+use crate::object::{result_folder, split, study};
+use crate::scene::settings::{PixelCentre, Up};
+use clap::Args;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// Options of `patina object`.
+#[derive(Debug, Args)]
+#[command(group(clap::ArgGroup::new("shape").required(true).args(["mesh", "sphere"])))]
+pub struct ObjectOptions {
+    /// One photo or several of the same object under the same light: EXR, HDR, PFM, PNG or JPEG.
+    #[arg(required = true)]
+    pub photos: Vec<PathBuf>,
+    /// The mesh of the object: OBJ or PLY.
+    #[arg(long, requires = "camera")]
+    pub mesh: Option<PathBuf>,
+    /// The object is a sphere that fills the shorter side of the photo, seen from infinitely far along -z.
+    #[arg(long)]
+    pub sphere: bool,
+    /// Cameras: a cameras.json that lists the photos, or one BlendedMVS camera file a photo.
+    #[arg(long, num_args = 1..)]
+    pub camera: Vec<PathBuf>,
+    /// Masks, one a photo: white is object.
+    #[arg(long, num_args = 1..)]
+    pub mask: Vec<PathBuf>,
+    /// The light is known: only the reflectance is estimated.
+    #[arg(long)]
+    pub env: Option<PathBuf>,
+    /// Model of the reflectance.
+    #[arg(long, value_enum, default_value_t = ModelKind::default())]
+    pub model: ModelKind,
+    /// Weights of the neural model; those that come with the program when not given.
+    #[arg(long)]
+    pub weights: Option<PathBuf>,
+    /// Lobes of the neural model.
+    #[arg(long, default_value_t = 2)]
+    pub lobes: usize,
+    /// Prior of the light.
+    #[arg(long, value_enum)]
+    pub prior: Option<LightPriorKind>,
+    /// How the light is improved.
+    #[arg(long, value_enum)]
+    pub method: Option<LightMethod>,
+    /// A coarse light, few pixels and few rounds.
+    #[arg(long)]
+    pub quick: bool,
+    /// The schedule released with the paper, in place of the program's own.
+    #[arg(long, conflicts_with = "quick")]
+    pub released: bool,
+    /// Rows of the estimated light: 16, 32, 64 or 128.
+    #[arg(long)]
+    pub light_height: Option<usize>,
+    /// Pixels that are used.
+    #[arg(long)]
+    pub pixels: Option<usize>,
+    /// Leave shadows out.
+    #[arg(long)]
+    pub no_shadows: bool,
+    /// Lights to show the object under.
+    #[arg(long, num_args = 1..)]
+    pub relight: Vec<PathBuf>,
+    /// Which axis of mesh and cameras points up: auto, or one of +x -x +y -y +z -z.
+    #[arg(long, allow_hyphen_values = true)]
+    pub up: Option<Up>,
+    /// Where the cameras put pixel centres: auto, integer or half.
+    #[arg(long)]
+    pub pixel_centre: Option<PixelCentre>,
+    /// Seed of pixels and net.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// The result folder.
+    #[arg(short, long)]
+    pub output: PathBuf,
+}
+
+impl ObjectOptions {
+    fn settings(&self) -> ObjectSettings {
+        let mut settings = match (self.quick, self.released) {
+            (true, _) => ObjectSettings::quick(),
+            (_, true) => ObjectSettings::released(),
+            _ => ObjectSettings::default(),
+        };
+        settings.seed = self.seed;
+        settings.shadows = !self.no_shadows;
+        settings.prior = self.prior.unwrap_or(settings.prior);
+        settings.method = self.method.unwrap_or(settings.method);
+        settings.light_height = self.light_height.unwrap_or(settings.light_height);
+        settings.pixels = self.pixels.unwrap_or(settings.pixels);
+        settings
+    }
+}
+
+/// Estimates and writes the result folder.
+pub fn object(options: &ObjectOptions, json: bool) -> Result<()> {
+    let stop = Arc::new(AtomicBool::new(false));
+    stop_on_interrupt(Arc::clone(&stop));
+    let settings = options.settings();
+    settings.validate()?;
+    result_folder::prepare(&options.output)?;
+    let files = ObjectFiles {
+        photos: options.photos.clone(),
+        masks: options.mask.clone(),
+        mesh: options.mesh.clone(),
+        cameras: options.camera.clone(),
+        up: options.up.unwrap_or_default(),
+        pixel_centre: options.pixel_centre.unwrap_or_default(),
+    };
+    let (views, mut findings) = read_views(&files)?;
+    let mut known = Known::default();
+    if let Some(path) = &options.env {
+        let (light, mut noticed) = Environment::read(path)?;
+        findings.append(&mut noticed);
+        known.light = Some(light);
+    }
+    let mut relights = Vec::new();
+    for path in &options.relight {
+        let (light, mut noticed) = Environment::read(path)?;
+        findings.append(&mut noticed);
+        relights.push((path.file_stem().unwrap_or_default().to_string_lossy().into_owned(), light));
+    }
+    let model = StartedModel::of(options.model, options.weights.as_deref(), options.lobes, &settings)?;
+    let watch = |event: ObjectEvent| match (event, json) {
+        (ObjectEvent::Stage(stage), false) => eprintln!("{stage}"),
+        (ObjectEvent::Stage(stage), true) => println!("{}", serde_json::json!({"event": "stage", "name": stage})),
+        (ObjectEvent::Row(row), false) => eprintln!(
+            "{:6.1} s  round {:2}  {:11}  objective {:.5} = picture {:.5} + light {:.5} + codes {:.5}",
+            row.seconds,
+            row.round,
+            row.kind.label(),
+            row.total(),
+            row.data,
+            row.light_prior,
+            row.code_prior
+        ),
+        (ObjectEvent::Row(row), true) => println!("{}", serde_json::json!({"event": "step", "row": row})),
+        (ObjectEvent::State { .. }, _) => {}
+    };
+    let mut found = estimate(&views, &model, &known, &settings, &stop, &watch)?;
+    found.findings.splice(0..0, findings);
+    result_folder::write(&options.output, &views, &model, &found, &settings, &relights)?;
+    if json {
+        let line = serde_json::json!({
+            "event": "finished", "run": options.output, "start": found.start, "seconds": found.seconds,
+            "picture_log_rmse": found.picture_log_rmse, "findings": found.findings,
+        });
+        println!("{line}");
+    } else {
+        found.findings.iter().for_each(|finding| println!("{finding}"));
+        let spread = split::SplitSpread::of(&found.candidates);
+        println!(
+            "began as {}; picture within {:.3} in logarithms; {} starts explain it as well; {:.1} s: {}",
+            found.start,
+            found.picture_log_rmse,
+            spread.starts.len(),
+            found.seconds,
+            options.output.display()
+        );
+    }
+    Ok(())
+}
+
+/// Options of `patina study ibrdf`.
+#[derive(Debug, Args)]
+pub struct StudyIbrdfOptions {
+    /// Folder of the neural fits of the MERL materials.
+    pub library: PathBuf,
+    /// Folder of latitude-longitude environments.
+    pub envmaps: PathBuf,
+    /// Mesh of an object that shadows itself.
+    #[arg(long)]
+    pub mesh: Option<PathBuf>,
+    /// Weights of the neural model; without them only the rivals are studied.
+    #[arg(long)]
+    pub weights: Option<PathBuf>,
+    /// Models of the reflectance; the neural one, if it has weights, and Cook-Torrance when not given.
+    #[arg(long, value_enum, value_delimiter = ',')]
+    pub models: Vec<ModelKind>,
+    /// A few small cases, some minutes.
+    #[arg(long)]
+    pub quick: bool,
+    /// Seed of pixels, noise and nets.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Folder of results, tables and page; results that stand there are not made again.
+    #[arg(short, long)]
+    pub output: PathBuf,
+}
+
+/// Studies what one photo tells.
+pub fn study(options: &StudyIbrdfOptions, json: bool) -> Result<()> {
+    let stop = Arc::new(AtomicBool::new(false));
+    stop_on_interrupt(Arc::clone(&stop));
+    let models = match (options.models.is_empty(), options.weights.is_some()) {
+        (false, _) => options.models.clone(),
+        (true, true) => vec![ModelKind::Ibrdf, ModelKind::CookTorrance],
+        (true, false) => vec![ModelKind::CookTorrance],
+    };
+    let asked = study::StudyOptions {
+        library: options.library.clone(),
+        envmaps: options.envmaps.clone(),
+        mesh: options.mesh.clone(),
+        weights: options.weights.clone(),
+        models,
+        quick: options.quick,
+        seed: options.seed,
+        output: options.output.clone(),
+    };
+    let tell = |text: &str| match json {
+        true => println!("{}", serde_json::json!({"event": "study", "message": text})),
+        false => eprintln!("{text}"),
+    };
+    let tables = study::run(&asked, &stop, &tell)?;
+    if !json {
+        println!("{tables}");
+    }
+    tell(&format!("tables and page: {}", options.output.display()));
+    Ok(())
+}

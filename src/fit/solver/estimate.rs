@@ -1,0 +1,110 @@
+//! What the solver changes: maps, light and gains, and how sure it is of the maps.
+
+use crate::image::Image;
+use crate::light::Environment;
+use crate::material::MaterialMaps;
+use crate::material::texels::{Texel, maps_from_texels};
+use glam::Vec3;
+
+/// The unknowns. They live in the state of a fit between two steps.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// Texels of square maps.
+    pub texels: Vec<Texel<f32>>,
+    /// Variance of each number of a texel given the light, 0 where it is not known yet. The eighth is at least 1 where the
+    /// texel's own pixels, or those of its block, were solved for: the number of texels that share its lobe once maps are
+    /// made. It is 0 where a texel took over what others have.
+    pub variances: Vec<Texel<f32>>,
+    /// Radiance of the light's texels.
+    pub light: Vec<[f32; 3]>,
+    /// Logarithm of each view's gain, in the order of [`super::SolverScene::views`].
+    pub log_gains: Vec<f32>,
+}
+
+/// Standard deviations of a texel's numbers when nothing is known of it.
+const UNKNOWN_DEVIATION: [f32; 8] = [0.3, 0.3, 0.3, 0.2, 0.2, 0.2, 0.5, 0.0];
+
+/// What is known of a texel before anything was solved.
+pub const START_TEXEL: Texel<f32> = [0.4, 0.4, 0.4, 0.08, 0.08, 0.08, -0.7, 0.0];
+
+impl Estimate {
+    /// Start values with this light.
+    pub fn start(map_size: usize, light: &Environment, views: usize) -> Self {
+        Estimate {
+            texels: vec![START_TEXEL; map_size * map_size],
+            variances: vec![[0.0; 8]; map_size * map_size],
+            light: light.radiance.pixels().iter().map(|pixel| pixel.to_array()).collect(),
+            log_gains: vec![0.0; views],
+        }
+    }
+
+    /// Whether a texel was solved for.
+    #[inline]
+    pub fn is_solved(&self, texel: usize) -> bool {
+        self.variances[texel][7] > 0.0
+    }
+
+    /// Sets a texel that was solved for; `variance` is 0 where it is not known, its last the number of texels that share
+    /// the lobe.
+    pub fn set(&mut self, texel: usize, diffuse: [f32; 3], specular: [f32; 3], log_width: f32, variance: Texel<f32>) {
+        let [a, b, c] = diffuse;
+        let [d, e, f] = specular;
+        self.texels[texel] = [a, b, c, d, e, f, log_width, 0.0];
+        self.variances[texel] = variance;
+        self.variances[texel][7] = variance[7].max(1.0);
+    }
+
+    /// Texels that no block has reached yet take the mean of those that one has.
+    pub fn fill_with_mean(&mut self) {
+        let mut sum = [0.0f64; 8];
+        let mut count = 0.0f64;
+        for (texel, _) in self.texels.iter().zip(&self.variances).filter(|(_, variance)| variance[7] > 0.0) {
+            for (sum, &value) in sum.iter_mut().zip(texel) {
+                *sum += f64::from(value);
+            }
+            count += 1.0;
+        }
+        if count > 0.0 {
+            let mean = sum.map(|value| (value / count) as f32);
+            for (texel, _) in self.texels.iter_mut().zip(&self.variances).filter(|(_, variance)| variance[7] == 0.0) {
+                *texel = mean;
+            }
+        }
+    }
+
+    /// Standard deviations of the maps' values, of this size: how far a value may be off given the light that was found.
+    /// A texel that was not solved for has those of what is believed of any surface.
+    pub fn deviations(&self, map_size: usize) -> MaterialMaps {
+        let deviation = |texel: usize, number: usize| {
+            let own = self.variances[texel];
+            if own[7] > 0.0 && own[number] > 0.0 { own[number].sqrt() } else { UNKNOWN_DEVIATION[number] }
+        };
+        let colour = |first: usize| {
+            Image::from_fn(map_size, map_size, |row, column| {
+                Vec3::from_array([0, 1, 2].map(|c| deviation(row * map_size + column, first + c)))
+            })
+        };
+        MaterialMaps {
+            diffuse: colour(0),
+            specular: colour(3),
+            // r = a^2, so dr = 2 r d(ln a).
+            roughness: Image::from_fn(map_size, map_size, |row, column| {
+                let texel = row * map_size + column;
+                2.0 * (2.0 * self.texels[texel][6]).exp() * deviation(texel, 6)
+            }),
+        }
+    }
+
+    /// The maps, of this size.
+    pub fn maps(&self, map_size: usize) -> MaterialMaps {
+        maps_from_texels(&self.texels, map_size, map_size)
+    }
+
+    /// The light, of this size; one of another size is cut or filled with darkness.
+    pub fn environment(&self, (width, height): (usize, usize)) -> Environment {
+        let mut pixels: Vec<Vec3> =
+            self.light.iter().map(|&radiance| Vec3::from_array(radiance).max(Vec3::ZERO)).collect();
+        pixels.resize(width * height, Vec3::ZERO);
+        Environment { radiance: Image::from_pixels(width, height, pixels) }
+    }
+}

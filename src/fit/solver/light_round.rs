@@ -1,0 +1,204 @@
+//! A round on the light: some blocks are solved under the light as it is, and their rows move it.
+
+use super::block::BlockPrior;
+use super::eliminate::BlockRows;
+use super::estimate::Estimate;
+use super::light_shape::{LightShape, bright_texels};
+use super::light_step::{Gauge, LightPrior, NormalEquations, solve_channel};
+use super::plan;
+use super::report::{ErrorSums, StepReport, median};
+use super::round::{BlockWork, Round, open_prior};
+use super::scene::SolverScene;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Noise of a background pixel, relative to its radiance and to the mean of the surface's.
+const BACKGROUND_NOISE: f64 = 0.03;
+/// A block with fewer observations says nothing of the light.
+const LEAST_OBSERVATIONS: usize = 16;
+/// Parts in which normal matrices are added up; fixed, so that results do not depend on the number of threads.
+const PARTS: usize = 4;
+
+type Solved = Vec<(usize, BlockWork)>;
+
+impl SolverScene {
+    /// One round; `number` counts them from 0 and sets which blocks take part and how far lobes are let go. `None` when
+    /// `stop` was raised: nothing was changed then.
+    pub fn light_round(&self, estimate: &mut Estimate, number: usize, stop: &AtomicBool) -> Option<StepReport> {
+        let shape = self.shape_of_round(estimate, number);
+        let planes = self.transport.basis.planes(&estimate.light);
+        let at_points = self.point_light(estimate, &planes);
+        let round = self.round(estimate, &planes, &at_points);
+        let openness = if self.settings.fixed_light { 1.0 } else { self.openness(number) };
+        let prior = open_prior(self.observations.mean, openness);
+        let (mut equations, done) = self.equations(&round, &shape, &prior, number, stop)?;
+
+        let light = if self.settings.fixed_light {
+            None
+        } else {
+            self.add_background(&mut equations, &shape, &estimate.log_gains);
+            Some(self.solve_light(&equations, &shape, estimate, stop)?)
+        };
+        let gains = self.settings.exposure.then(|| gain_ratios(&round, &done, self.views.len()));
+        let mut errors = ErrorSums::new(self.views.len());
+        for (_, work) in &done {
+            errors.add_block(&round, work);
+        }
+        let mut residuals: Vec<f32> = done.iter().map(|(_, work)| work.solution.residual).collect();
+
+        // Nothing is dropped from here on.
+        if let Some(light) = light {
+            estimate.light = light;
+        }
+        for (index, work) in &done {
+            let solution = &work.solution;
+            for &(texel, cell) in &self.round_blocks[*index].texels {
+                let diffuse = solution.cells[usize::from(cell)];
+                estimate.set(texel as usize, diffuse, solution.specular, solution.log_width, [0.0; 8]);
+            }
+        }
+        estimate.fill_with_mean();
+        if let Some(gains) = gains {
+            estimate.log_gains = gains;
+        }
+        Some(StepReport {
+            residual: median(&mut residuals),
+            squared_error: errors.mean(),
+            blocks: done.len(),
+            light_unknowns: if self.settings.fixed_light { 0 } else { shape.count() },
+            view_errors: errors.of_views(&self.views),
+        })
+    }
+
+    /// How far lobes are let go in a round, in [0, 1].
+    fn openness(&self, number: usize) -> f64 {
+        let last = (self.settings.coarse_rounds + self.settings.fine_rounds).max(2) - 1;
+        number as f64 / last as f64
+    }
+
+    fn shape_of_round(&self, estimate: &Estimate, number: usize) -> LightShape {
+        let size = self.settings.light_size;
+        if number < self.settings.coarse_rounds {
+            return LightShape::new(size, Vec::new());
+        }
+        LightShape::new(size, bright_texels(&estimate.light, size, self.settings.narrow_hats))
+    }
+
+    /// Solves the blocks of a round and adds up their rows over the light.
+    fn equations(
+        &self,
+        round: &Round,
+        shape: &LightShape,
+        prior: &BlockPrior,
+        number: usize,
+        stop: &AtomicBool,
+    ) -> Option<([NormalEquations; 3], Solved)> {
+        let blocks = &self.round_blocks;
+        let chosen = plan::choose(blocks, self.settings.blocks, LEAST_OBSERVATIONS, self.settings.seed, number);
+        let part = chosen.len().div_ceil(PARTS).max(1);
+        let parts: Vec<([NormalEquations; 3], Solved)> = chosen
+            .par_chunks(part)
+            .map(|chosen| {
+                let mut equations = [(); 3].map(|()| NormalEquations::new(shape.count()));
+                let mut done = Vec::with_capacity(chosen.len());
+                let mut rows = [(); 3].map(|()| BlockRows::default());
+                for &index in chosen {
+                    if stop.load(Ordering::Relaxed) {
+                        break;
+                    }
+                    let mut work = BlockWork::default();
+                    round.gather(&blocks[index], self.settings.observations, &mut work);
+                    if !round.solve(&blocks[index], prior, &mut work) {
+                        continue;
+                    }
+                    if !self.settings.fixed_light {
+                        round.rows(&blocks[index], &work, shape, &mut rows);
+                        for (equations, rows) in equations.iter_mut().zip(&rows) {
+                            equations.add(rows);
+                        }
+                    }
+                    done.push((index, work));
+                }
+                equations.iter_mut().for_each(NormalEquations::flush);
+                (equations, done)
+            })
+            .collect();
+        let mut total = [(); 3].map(|()| NormalEquations::new(shape.count()));
+        let mut done = Vec::new();
+        for (equations, part) in parts {
+            for (total, equations) in total.iter_mut().zip(&equations) {
+                total.merge(equations);
+            }
+            done.extend(part);
+        }
+        (!stop.load(Ordering::Relaxed)).then_some((total, done))
+    }
+
+    /// Background pixels as rows of few entries.
+    fn add_background(&self, total: &mut [NormalEquations; 3], shape: &LightShape, log_gains: &[f32]) {
+        let noise = BACKGROUND_NOISE * f64::from(self.observations.mean);
+        for (view, tap, radiance) in &self.background {
+            let entries: Vec<(u32, f32)> = tap.index.into_iter().zip(tap.weight).collect();
+            let row = shape.reduce_sparse(&entries);
+            let gain = f64::from((-log_gains[*view]).exp());
+            // Bright places are known to a share of their radiance.
+            for (c, total) in total.iter_mut().enumerate() {
+                let scale = 1.0 / (noise + BACKGROUND_NOISE * f64::from(radiance[c].max(0.0)));
+                let scaled: Vec<(u32, f64)> = row.iter().map(|&(index, value)| (index, value * scale)).collect();
+                total.add_sparse(&scaled, f64::from(radiance[c]) * gain * scale);
+            }
+        }
+    }
+
+    fn solve_light(
+        &self,
+        equations: &[NormalEquations; 3],
+        shape: &LightShape,
+        estimate: &Estimate,
+        stop: &AtomicBool,
+    ) -> Option<Vec<[f32; 3]>> {
+        let prior = LightPrior {
+            variation: self.settings.light_variation,
+            independence: self.settings.independence,
+            // Where the background shows, it fixes the scale.
+            gauge_slack: if self.background.is_empty() { self.settings.gauge_slack } else { 10.0 },
+        };
+        let channels: Vec<Vec<f32>> = (0..3usize)
+            .into_par_iter()
+            .map(|c| {
+                let own: Vec<f32> = estimate.light.iter().map(|radiance| radiance[c]).collect();
+                let mut x = shape.coefficients_of(&own);
+                let gauge = Gauge { row: &self.gauge.0, mean: self.gauge.1[c] };
+                solve_channel(&equations[c], shape, &prior, &gauge, &mut x);
+                shape.expand(&x)
+            })
+            .collect();
+        let light = (0..estimate.light.len()).map(|texel| [0, 1, 2].map(|c| channels[c][texel])).collect();
+        (!stop.load(Ordering::Relaxed)).then_some(light)
+    }
+}
+
+/// Logarithms of gains that bring the model to the photos, with mean zero.
+fn gain_ratios(round: &Round, done: &[(usize, BlockWork)], views: usize) -> Vec<f32> {
+    let mut sums = vec![(0.0f64, 0.0f64); views];
+    for (_, work) in done {
+        for (term, &used) in work.terms.iter().zip(&work.used) {
+            let model = round.model(work, term);
+            let sums = &mut sums[round.observations.list[used as usize].view as usize];
+            for c in 0..3 {
+                sums.0 += f64::from(term.weight * model[c] * term.radiance[c]);
+                sums.1 += f64::from(term.weight * model[c] * model[c]);
+            }
+        }
+    }
+    let moved: Vec<f32> = sums
+        .iter()
+        .zip(round.log_gains)
+        .map(|(&(product, power), &old)| {
+            let ratio = product / power;
+            old + if ratio.is_finite() && ratio > 0.0 { ratio.ln() as f32 } else { 0.0 }
+        })
+        .collect();
+    let mean = moved.iter().sum::<f32>() / views.max(1) as f32;
+    moved.iter().map(|value| value - mean).collect()
+}

@@ -1,0 +1,191 @@
+//! The light, given the surface's rows: non-negative least squares with a weak wish for a smooth sky.
+
+use super::eliminate::BlockRows;
+use super::light_shape::LightShape;
+use super::non_negative::solve_non_negative;
+use crate::math::sphere::solid_angle_of_texel;
+use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+use faer::{Accum, MatMut, MatRef, Par};
+
+/// Rows that are added to a normal matrix at once.
+const ROWS_AT_ONCE: usize = 512;
+
+/// Normal equations of one channel, added up from rows.
+#[derive(Clone, Debug)]
+pub struct NormalEquations {
+    count: usize,
+    /// Lower triangle, row after row.
+    matrix: Vec<f64>,
+    right: Vec<f64>,
+    /// Rows that wait, row after row.
+    rows: Vec<f32>,
+    sides: Vec<f32>,
+    product: Vec<f32>,
+}
+
+impl NormalEquations {
+    /// Equations of so many coefficients; everything is zero.
+    pub fn new(count: usize) -> Self {
+        NormalEquations {
+            count,
+            matrix: vec![0.0; count * count],
+            right: vec![0.0; count],
+            rows: Vec::new(),
+            sides: Vec::new(),
+            product: Vec::new(),
+        }
+    }
+
+    /// Adds the rows of a block.
+    pub fn add(&mut self, rows: &BlockRows) {
+        self.rows.extend_from_slice(&rows.rows);
+        self.sides.extend(rows.right.iter().map(|&value| value as f32));
+        if self.sides.len() >= ROWS_AT_ONCE {
+            self.flush();
+        }
+    }
+
+    /// Adds one row of few entries (coefficient, value): a background pixel.
+    pub fn add_sparse(&mut self, entries: &[(u32, f64)], side: f64) {
+        for &(row, value) in entries {
+            self.right[row as usize] += value * side;
+            for &(column, other) in entries {
+                if column <= row {
+                    self.matrix[row as usize * self.count + column as usize] += value * other;
+                }
+            }
+        }
+    }
+
+    /// Adds the rows that wait.
+    pub fn flush(&mut self) {
+        let (count, rows) = (self.count, self.sides.len());
+        if rows == 0 {
+            return;
+        }
+        for (row, &side) in self.rows.chunks_exact(count).zip(&self.sides) {
+            for (total, &entry) in self.right.iter_mut().zip(row) {
+                *total += f64::from(entry * side);
+            }
+        }
+        self.product.resize(count * count, 0.0);
+        let transposed = MatRef::from_column_major_slice(&self.rows, count, rows);
+        matmul(
+            MatMut::from_column_major_slice_mut(&mut self.product, count, count),
+            BlockStructure::TriangularUpper,
+            Accum::Replace,
+            transposed,
+            BlockStructure::Rectangular,
+            transposed.transpose(),
+            BlockStructure::Rectangular,
+            1.0f32,
+            Par::Seq,
+        );
+        // The upper triangle in columns is the lower one in rows.
+        for row in 0..count {
+            let range = row * count..row * count + row + 1;
+            for (total, &value) in self.matrix[range.clone()].iter_mut().zip(&self.product[range]) {
+                *total += f64::from(value);
+            }
+        }
+        self.rows.clear();
+        self.sides.clear();
+    }
+
+    /// Adds equations of the same size.
+    pub fn merge(&mut self, other: &NormalEquations) {
+        for (total, value) in self.matrix.iter_mut().zip(&other.matrix) {
+            *total += value;
+        }
+        for (total, value) in self.right.iter_mut().zip(&other.right) {
+            *total += value;
+        }
+    }
+}
+
+/// What is believed of the light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightPrior {
+    /// By how much neighbouring wide hats differ, relative to their radiance.
+    pub variation: f64,
+    /// Factor on the evidence of the rows.
+    pub independence: f64,
+    /// By how much the mean light on the surface may differ from the gauge's, relative.
+    pub gauge_slack: f64,
+}
+
+/// What fixes the scale between reflectance and light in one channel: the mean light on the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gauge<'a> {
+    /// Row over texels whose product with the light is the mean arriving light (irradiance over pi).
+    pub row: &'a [f32],
+    /// What that mean is held to.
+    pub mean: f64,
+}
+
+/// Solves one channel: coefficients start at `x` and end there. Returns the number of sweeps.
+pub fn solve_channel(
+    equations: &NormalEquations,
+    shape: &LightShape,
+    prior: &LightPrior,
+    gauge: &Gauge,
+    x: &mut [f32],
+) -> usize {
+    let count = equations.count;
+    let mut matrix = vec![0.0f64; count * count];
+    for row in 0..count {
+        for column in 0..=row {
+            let value = equations.matrix[row * count + column] * prior.independence;
+            matrix[row * count + column] = value;
+            matrix[column * count + row] = value;
+        }
+    }
+    let mut right: Vec<f64> = equations.right.iter().map(|value| value * prior.independence).collect();
+    let coarse = shape.coarse.0 * shape.coarse.1;
+    let solid: Vec<f64> = mean_weights(shape);
+    let mean: f64 = solid.iter().zip(x.iter()).map(|(weight, &value)| weight * f64::from(value)).sum::<f64>();
+    let mean = mean.max(1e-9);
+    // Relative differences: scales are those of the light before the step, and bright places are not held down.
+    for (a, b) in shape.neighbours() {
+        let scale = 0.5 * f64::from(x[a] + x[b]) + 0.3 * mean;
+        let weight = 1.0 / (prior.variation * scale).powi(2);
+        matrix[a * count + a] += weight;
+        matrix[b * count + b] += weight;
+        matrix[a * count + b] -= weight;
+        matrix[b * count + a] -= weight;
+    }
+    for (place, &texel) in shape.fine.iter().enumerate() {
+        let index = coarse + place;
+        let entries = shape.expand_at(texel as usize, x);
+        let scale = 3.0 * (f64::from(entries) + mean);
+        matrix[index * count + index] += 1.0 / (scale * scale);
+    }
+    // The freedom between reflectance and light is held by the mean light on the surface.
+    let mut held = vec![0.0f32; count];
+    shape.reduce(gauge.row, &mut held);
+    let weight = 1.0 / (prior.gauge_slack * gauge.mean.max(1e-9)).powi(2);
+    for row in 0..count {
+        let own = weight * f64::from(held[row]);
+        for column in 0..count {
+            matrix[row * count + column] += own * f64::from(held[column]);
+        }
+        right[row] += own * gauge.mean;
+    }
+    let mut solution: Vec<f64> = x.iter().map(|&value| f64::from(value)).collect();
+    let sweeps = solve_non_negative(&matrix, &right, &mut solution, 300, 1e-5);
+    for (x, value) in x.iter_mut().zip(solution) {
+        *x = value as f32;
+    }
+    sweeps
+}
+
+/// Weights with which coefficients make up the mean radiance over the sphere.
+fn mean_weights(shape: &LightShape) -> Vec<f64> {
+    let (width, height) = shape.size;
+    let solid: Vec<f32> = (0..width * height)
+        .map(|texel| (solid_angle_of_texel(texel / width, width, height) / (4.0 * std::f64::consts::PI)) as f32)
+        .collect();
+    let mut reduced = vec![0.0; shape.count()];
+    shape.reduce(&solid, &mut reduced);
+    reduced.into_iter().map(f64::from).collect()
+}

@@ -1,0 +1,168 @@
+//! How likely pixels are if they share one lobe, whatever its F0 and width, and what is then believed of both.
+//!
+//! A surface is a dielectric, a metal, or neither: kinds that differ in F0 and in what lies under the lobe. A metal has
+//! next to no diffuse reflectance; F0 of all others is grey. Without that knowledge a wide lobe of a high F0 stands in
+//! for diffuse reflectance wherever the light is a little wrong, in the complementary colour where it is too much.
+//! The logarithm of the width is normal for all kinds.
+
+use super::block::MOST_NODES;
+use glam::{DMat3, DVec3};
+
+/// Kinds of surface.
+pub const KINDS: usize = 3;
+
+/// Sums of a texel, or of a group, with diffuse reflectance integrated out: per kind, width and channel `∑ S S`,
+/// `∑ S y` and `∑ y y`, in units of the noise.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LobeSumsOfGroup(pub [[[[f64; 3]; 3]; MOST_NODES]; KINDS]);
+
+impl Default for LobeSumsOfGroup {
+    fn default() -> Self {
+        LobeSumsOfGroup([[[[0.0; 3]; 3]; MOST_NODES]; KINDS])
+    }
+}
+
+impl LobeSumsOfGroup {
+    /// Adds another's.
+    pub fn add(&mut self, other: &LobeSumsOfGroup) {
+        let others = other.0.iter().flatten().flatten().flatten();
+        for (own, other) in self.0.iter_mut().flatten().flatten().flatten().zip(others) {
+            *own += other;
+        }
+    }
+}
+
+/// What is believed of a kind of surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LobeKind {
+    /// Mean of F0, standard deviation of what its channels have in common, and of what they do not.
+    pub specular: (f64, f64, f64),
+    /// Mean and standard deviation of diffuse reflectance; `None` for the mean of what lies around.
+    pub diffuse: (Option<f64>, f64),
+    /// Share of all surface.
+    pub share: f64,
+}
+
+impl LobeKind {
+    /// Inverse covariance of F0, and the logarithm of the covariance's determinant.
+    fn precision(&self) -> (DMat3, f64) {
+        let (common, own) = (self.specular.1.powi(2), self.specular.2.powi(2));
+        let share = common / (own + 3.0 * common);
+        let precision = (DMat3::IDENTITY - DMat3::from_cols_array(&[share; 9])) * (1.0 / own);
+        (precision, 2.0 * own.ln() + (own + 3.0 * common).ln())
+    }
+}
+
+/// What is believed of lobes before looking.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LobePrior {
+    /// Dielectrics, metals, and what is neither.
+    pub kinds: [LobeKind; KINDS],
+    /// Mean and standard deviation of the logarithm of the width.
+    pub log_width: (f64, f64),
+    /// Probability that a group that could be cut shares one lobe.
+    pub keep: f64,
+}
+
+impl Default for LobePrior {
+    fn default() -> Self {
+        let dielectric = LobeKind { specular: (0.05, 0.025, 0.005), diffuse: (None, 0.35), share: 0.8 };
+        let metal = LobeKind { specular: (0.55, 0.2, 0.15), diffuse: (Some(0.05), 0.1), share: 0.17 };
+        let other = LobeKind { specular: (0.12, 0.08, 0.01), diffuse: (None, 0.35), share: 0.03 };
+        LobePrior { kinds: [dielectric, metal, other], log_width: (-0.6, 0.5), keep: 0.5 }
+    }
+}
+
+/// Means and variances of F0 and the logarithm of the width.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LobeBelief {
+    /// Mean of F0 per channel, of the logarithm of the width last.
+    pub mean: [f64; 4],
+    /// Second moments about zero while beliefs are mixed, variances at the end.
+    pub square: [f64; 4],
+    /// Mean number of texels that share the lobe.
+    pub shared: f64,
+}
+
+/// Points between two widths where the posterior is looked at.
+const FINE: usize = 6;
+/// Logarithm of the evidence that a group shares one lobe, and what is then believed of it.
+pub fn shared_lobe(sums: &LobeSumsOfGroup, log_widths: &[f64; MOST_NODES], prior: &LobePrior) -> (f64, LobeBelief) {
+    // Per width: logarithm of the evidence, mean and square of F0.
+    let mut log_at = [0.0f64; MOST_NODES];
+    let mut specular = [[[0.0f64; 2]; 3]; MOST_NODES];
+    for node in 0..MOST_NODES {
+        let mut kinds = [(0.0f64, [(0.0f64, 0.0f64); 3]); KINDS];
+        for ((own, kind), sums) in kinds.iter_mut().zip(&prior.kinds).zip(&sums.0) {
+            let (precision, log_volume) = kind.precision();
+            let (mut total, mut side) = (precision, precision * DVec3::splat(kind.specular.0));
+            let mut cost = kind.specular.0 * side.element_sum();
+            for (channel, &[ss, sy, yy]) in sums[node].iter().enumerate() {
+                total.col_mut(channel)[channel] += ss;
+                side[channel] += sy;
+                cost += yy;
+            }
+            let inverse = total.inverse();
+            let best = inverse * side;
+            own.0 = kind.share.ln() - 0.5 * (cost - side.dot(best) + total.determinant().ln() + log_volume);
+            own.1 = [0, 1, 2].map(|c| (best[c].clamp(0.0, 1.0), inverse.col(c)[c].max(0.0)));
+        }
+        log_at[node] = log_sum(kinds.iter().map(|kind| kind.0));
+        for (log_kind, of_channels) in kinds {
+            let weight = (log_kind - log_at[node]).exp();
+            for (channel, (mean, variance)) in of_channels.into_iter().enumerate() {
+                specular[node][channel][0] += weight * mean;
+                specular[node][channel][1] += weight * (variance + mean * mean);
+            }
+        }
+    }
+    // Between widths the logarithm of the evidence is a parabola, as that of a normal distribution is.
+    let mut points = [(0.0f64, 0usize, 0.0f64, 0.0f64); (MOST_NODES - 1) * FINE + 1];
+    for (index, point) in points.iter_mut().enumerate() {
+        let (node, part) = ((index / FINE).min(MOST_NODES - 2), index);
+        let share = (part - node * FINE) as f64 / FINE as f64;
+        let x = log_widths[node] * (1.0 - share) + log_widths[node + 1] * share;
+        let step = (log_widths[node + 1] - log_widths[node]) / FINE as f64;
+        let log = between(log_widths, &log_at, node, x) - 0.5 * ((x - prior.log_width.0) / prior.log_width.1).powi(2);
+        *point = (log + step.ln(), node, share, x);
+    }
+    let norm = (prior.log_width.1 * (2.0 * std::f64::consts::PI).sqrt()).ln();
+    let total = log_sum(points.iter().map(|point| point.0));
+    let mut belief = LobeBelief::default();
+    for (log, node, share, x) in points {
+        let weight = (log - total).exp();
+        if weight < 1e-9 {
+            continue;
+        }
+        for c in 0..3 {
+            let mixed = |k: usize| specular[node][c][k] * (1.0 - share) + specular[node + 1][c][k] * share;
+            belief.mean[c] += weight * mixed(0);
+            belief.square[c] += weight * mixed(1);
+        }
+        belief.mean[3] += weight * x;
+        belief.square[3] += weight * x * x;
+    }
+    (total - norm, belief)
+}
+
+/// Between two nodes: the straight line, and the smaller of the curvatures at both ends where they have one sign. For a
+/// parabola that is the parabola; beside a kink it does not overshoot.
+fn between(x: &[f64; MOST_NODES], y: &[f64; MOST_NODES], node: usize, at: f64) -> f64 {
+    let slope = |k: usize| (y[k + 1] - y[k]) / (x[k + 1] - x[k]);
+    let curvature = |middle: usize| {
+        let middle = middle.clamp(1, MOST_NODES - 2);
+        (slope(middle) - slope(middle - 1)) / (x[middle + 1] - x[middle - 1])
+    };
+    let (left, right) = (curvature(node), curvature(node + 1));
+    let bent = if left * right <= 0.0 { 0.0 } else { left.signum() * left.abs().min(right.abs()) };
+    y[node] + (at - x[node]) * (slope(node) + bent * (at - x[node + 1]))
+}
+
+/// Logarithm of a sum of exponentials.
+pub fn log_sum(logs: impl Iterator<Item = f64> + Clone) -> f64 {
+    let largest = logs.clone().fold(f64::NEG_INFINITY, f64::max);
+    if !largest.is_finite() {
+        return largest;
+    }
+    largest + logs.map(|log| (log - largest).exp()).sum::<f64>().ln()
+}

@@ -1,0 +1,255 @@
+//! Which texels share a lobe: a tree of hypotheses over a tile, weighed by their evidence.
+//!
+//! Given F0 and a width, diffuse reflectances of texels are independent of each other, so each can be integrated out,
+//! and what is left of a texel is three sums per channel and width. Sums of texels add up: any group of texels can be
+//! asked how likely its pixels are if it shares one lobe, by a closed integral over F0 and a sum over widths.
+//!
+//! A group shares a lobe, or is cut into quarters, or into two by colour, each part with the same choice: Bayesian model
+//! averaging over all prunings of a tree (Willems, Shtarkov and Tjalkens 1995, context-tree weighting). What comes out
+//! is a mean and a variance per texel: where pixels say little, a texel leans on all that look alike around it.
+//!
+//! [`super::lobe_evidence`] asks one group; here groups are made and weighed.
+
+use super::block::MOST_NODES;
+use super::lobe_evidence::{LobeBelief, LobePrior, LobeSumsOfGroup, log_sum, shared_lobe};
+
+/// A texel of a tile: where it lies and what tells it from others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TreeTexel {
+    /// Row in the tile.
+    pub row: u16,
+    /// Column in the tile.
+    pub column: u16,
+    /// Diffuse reflectance.
+    pub colour: [f32; 3],
+}
+
+/// A group smaller than this is not cut by colour.
+const LEAST_TO_CLUSTER: usize = 12;
+/// Nor a square of fewer texels along its side.
+const LEAST_SIDE_TO_CLUSTER: usize = 8;
+/// Texels along the side of the smallest squares that a cluster of one colour is cut into.
+const SMALLEST_IN_CLUSTER: usize = 2;
+
+struct Node {
+    texels: Vec<u32>,
+    leaf: LobeBelief,
+    log_leaf: f64,
+    /// Cuts, each with its parts.
+    cuts: Vec<Vec<Node>>,
+    log_evidence: f64,
+}
+
+/// The beliefs of all texels of a tile of `side` texels (a power of two).
+pub fn beliefs(
+    texels: &[TreeTexel],
+    sums: &[LobeSumsOfGroup],
+    side: usize,
+    log_widths: &[f64; MOST_NODES],
+    prior: &LobePrior,
+) -> Vec<LobeBelief> {
+    let alone = sums.iter().map(|sums| shared_lobe(sums, log_widths, prior)).collect();
+    let tree = Tree { texels, sums, alone, log_widths, prior };
+    let root = tree.grow((0..texels.len() as u32).collect(), (0, 0), side, true);
+    let mut made = vec![LobeBelief::default(); texels.len()];
+    tree.spread(&root, 1.0, &mut made);
+    for belief in &mut made {
+        for k in 0..4 {
+            belief.square[k] = (belief.square[k] - belief.mean[k] * belief.mean[k]).max(0.0);
+        }
+    }
+    made
+}
+
+struct Tree<'a> {
+    texels: &'a [TreeTexel],
+    sums: &'a [LobeSumsOfGroup],
+    /// Evidence and belief of each texel alone.
+    alone: Vec<(f64, LobeBelief)>,
+    log_widths: &'a [f64; MOST_NODES],
+    prior: &'a LobePrior,
+}
+
+impl Tree<'_> {
+    fn grow(&self, texels: Vec<u32>, corner: (u16, u16), side: usize, by_colour: bool) -> Node {
+        let (log_leaf, leaf) = match texels.as_slice() {
+            &[texel] => self.alone[texel as usize],
+            _ => {
+                let mut sums = LobeSumsOfGroup::default();
+                for &texel in &texels {
+                    sums.add(&self.sums[texel as usize]);
+                }
+                shared_lobe(&sums, self.log_widths, self.prior)
+            }
+        };
+        let mut cuts = Vec::new();
+        // A cluster of one colour is cut into quarters, but not into crumbs.
+        let smallest = if by_colour { 1 } else { SMALLEST_IN_CLUSTER };
+        if side > smallest && texels.len() > 1 {
+            let half = (side / 2) as u16;
+            let mut quarters: [Vec<u32>; 4] = Default::default();
+            for &texel in &texels {
+                let own = &self.texels[texel as usize];
+                let which = usize::from(own.row >= corner.0 + half) * 2 + usize::from(own.column >= corner.1 + half);
+                quarters[which].push(texel);
+            }
+            let parts: Vec<Node> = quarters
+                .into_iter()
+                .enumerate()
+                .filter(|(_, quarter)| !quarter.is_empty())
+                .map(|(which, quarter)| {
+                    let corner = (corner.0 + half * (which / 2) as u16, corner.1 + half * (which % 2) as u16);
+                    self.grow(quarter, corner, side / 2, by_colour)
+                })
+                .collect();
+            cuts.push(parts);
+            if by_colour
+                && side >= LEAST_SIDE_TO_CLUSTER
+                && texels.len() >= LEAST_TO_CLUSTER
+                && let Some(clusters) = self.two_colours(&texels)
+            {
+                cuts.push(clusters.into_iter().map(|cluster| self.grow(cluster, corner, side, false)).collect());
+            }
+        }
+        let log_evidence = if cuts.is_empty() {
+            log_leaf
+        } else {
+            let cut = ((1.0 - self.prior.keep) / cuts.len() as f64).ln();
+            let of_cuts = cuts.iter().map(|parts| cut + parts.iter().map(|part| part.log_evidence).sum::<f64>());
+            log_sum(of_cuts.chain([self.prior.keep.ln() + log_leaf]))
+        };
+        Node { texels, leaf, log_leaf, cuts, log_evidence }
+    }
+
+    /// Mixes the beliefs of a node and of what lies below it into those of its texels.
+    fn spread(&self, node: &Node, weight: f64, made: &mut [LobeBelief]) {
+        if weight < 1e-4 {
+            return;
+        }
+        let keep = if node.cuts.is_empty() {
+            weight
+        } else {
+            weight * (self.prior.keep.ln() + node.log_leaf - node.log_evidence).exp()
+        };
+        for &texel in &node.texels {
+            let belief = &mut made[texel as usize];
+            for k in 0..4 {
+                belief.mean[k] += keep * node.leaf.mean[k];
+                belief.square[k] += keep * node.leaf.square[k];
+            }
+            belief.shared += keep * node.texels.len() as f64;
+        }
+        let cut = ((1.0 - self.prior.keep) / node.cuts.len().max(1) as f64).ln();
+        for parts in &node.cuts {
+            let log_cut = cut + parts.iter().map(|part| part.log_evidence).sum::<f64>();
+            let weight = weight * (log_cut - node.log_evidence).exp();
+            for part in parts {
+                self.spread(part, weight, made);
+            }
+        }
+    }
+
+    /// Two clusters by colour (Lloyd's two means, started at the extremes along the brightest difference); `None` when
+    /// one is nearly empty or they hardly differ.
+    fn two_colours(&self, texels: &[u32]) -> Option<[Vec<u32>; 2]> {
+        let colour = |texel: u32| self.texels[texel as usize].colour;
+        let distance = |a: [f32; 3], b: [f32; 3]| (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f32>();
+        let first = colour(*texels.first()?);
+        let far = |from: [f32; 3]| {
+            texels.iter().map(|&t| colour(t)).max_by(|&a, &b| distance(a, from).total_cmp(&distance(b, from)))
+        };
+        let one = far(first)?;
+        let mut centres = [one, far(one)?];
+        let nearer = |colour: [f32; 3], centres: &[[f32; 3]; 2]| {
+            usize::from(distance(colour, centres[1]) < distance(colour, centres[0]))
+        };
+        for _ in 0..6 {
+            let mut sums = [[0.0f32; 4]; 2];
+            for &texel in texels {
+                let own = colour(texel);
+                let sum = &mut sums[nearer(own, &centres)];
+                for c in 0..3 {
+                    sum[c] += own[c];
+                }
+                sum[3] += 1.0;
+            }
+            for (centre, sum) in centres.iter_mut().zip(sums) {
+                if sum[3] > 0.0 {
+                    *centre = [0, 1, 2].map(|c| sum[c] / sum[3]);
+                }
+            }
+        }
+        let mut clusters: [Vec<u32>; 2] = Default::default();
+        for &texel in texels {
+            clusters[nearer(colour(texel), &centres)].push(texel);
+        }
+        let smallest = clusters[0].len().min(clusters[1].len());
+        (smallest * 16 >= texels.len() && distance(centres[0], centres[1]) > 0.03f32.powi(2)).then_some(clusters)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::lobe_evidence::KINDS;
+    use super::*;
+
+    const WIDTHS: [f64; MOST_NODES] = [-3.9, -3.2, -2.6, -2.1, -1.7, -1.35, -1.0, -0.65, -0.3, 0.0];
+
+    /// Sums of a texel whose pixels say F0 with this precision at a width, and that other widths are worse.
+    fn sums(specular: f64, log_width: f64, precision: f64) -> LobeSumsOfGroup {
+        LobeSumsOfGroup(
+            [WIDTHS.map(|x| {
+                let misfit = precision * 0.5 * (x - log_width).powi(2);
+                [[precision, precision * specular, precision * specular * specular + misfit]; 3]
+            }); KINDS],
+        )
+    }
+
+    fn tile(of: impl Fn(usize, usize) -> (f64, f64, [f32; 3]), precision: f64) -> Vec<LobeBelief> {
+        let mut texels = Vec::new();
+        let mut all = Vec::new();
+        for row in 0..8 {
+            for column in 0..8 {
+                let (specular, log_width, colour) = of(row, column);
+                texels.push(TreeTexel { row: row as u16, column: column as u16, colour });
+                all.push(sums(specular, log_width, precision));
+            }
+        }
+        beliefs(&texels, &all, 8, &WIDTHS, &LobePrior::default())
+    }
+
+    #[test]
+    fn texels_that_agree_share_a_lobe_and_are_surer_together() {
+        let beliefs = tile(|_, _| (0.3, -1.2, [0.5; 3]), 20.0);
+        for belief in &beliefs {
+            assert!(belief.shared > 50.0, "{belief:?}");
+            assert!((belief.mean[0] - 0.3).abs() < 0.02 && (belief.mean[3] + 1.2).abs() < 0.05, "{belief:?}");
+            // Alone a texel would know F0 to 1 / sqrt(20).
+            assert!(belief.square[0].sqrt() < 0.06, "{belief:?}");
+        }
+    }
+
+    #[test]
+    fn a_border_of_colour_that_no_quarter_follows_is_found() {
+        let stripe = |row: usize, column: usize| (row + column).is_multiple_of(3);
+        let of = |row, column| if stripe(row, column) { (0.7, -0.5, [0.1; 3]) } else { (0.05, -2.0, [0.6; 3]) };
+        let beliefs = tile(of, 60.0);
+        for (index, belief) in beliefs.iter().enumerate() {
+            let (specular, log_width, _) = of(index / 8, index % 8);
+            assert!((belief.mean[0] - specular).abs() < 0.05, "{index}: {belief:?}");
+            assert!((belief.mean[3] - log_width).abs() < 0.1, "{index}: {belief:?}");
+        }
+    }
+
+    #[test]
+    fn without_evidence_what_is_believed_comes_back() {
+        let prior = LobePrior::default();
+        let beliefs = tile(|_, _| (0.3, -1.2, [0.5; 3]), 0.0);
+        for belief in beliefs {
+            // The normal distribution of the width, cut off at widths over 1: mean -0.6 - 0.5 phi(1.2) / Phi(1.2).
+            assert!((belief.mean[3] + 0.7097).abs() < 0.02 && belief.square[3].sqrt() > 0.3, "{belief:?}");
+            let mean: f64 = prior.kinds.iter().map(|kind| kind.specular.0 * kind.share).sum();
+            assert!((belief.mean[0] - mean).abs() < 0.02, "{belief:?}");
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! Maps under the light that was found: blocks, then tiles of blocks with their lobes, then all reflectances together.
+
+use super::diffuse::{self, DiffuseRow, Leaning};
+use super::estimate::Estimate;
+use super::lobe_evidence::LobePrior;
+use super::plan::Block;
+use super::report::{ErrorSums, StepReport, median};
+use super::round::{BlockWork, Round, open_prior};
+use super::scene::SolverScene;
+use super::tile::{TILE, Tile};
+use crate::atlas::{dilate, nearest_covered};
+use crate::image::Image;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Most observations of a block.
+const MOST_OBSERVATIONS: usize = 256;
+/// What reflectances lean on where all are solved together.
+const LEANING: Leaning = Leaning { start: 0.01, neighbours: 0.02 };
+/// Iterations of conjugate gradients.
+const ITERATIONS: usize = 20;
+
+/// What a tile leaves.
+struct TileResult {
+    tile: Tile,
+    residuals: Vec<f32>,
+}
+
+impl SolverScene {
+    /// Makes all maps. `None` when `stop` was raised: nothing was changed then.
+    pub fn make_maps(&self, estimate: &mut Estimate, stop: &AtomicBool) -> Option<StepReport> {
+        let planes = self.transport.basis.planes(&estimate.light);
+        let at_points = self.point_light(estimate, &planes);
+        let round = self.round(estimate, &planes, &at_points);
+        let mut rows = vec![DiffuseRow::default(); self.observations.list.len()];
+        let mut residuals = Vec::new();
+        let mut made: Vec<Tile> = Vec::new();
+        // Few tiles at a time: their terms are large.
+        let tiles = self.tiles();
+        for group in tiles.chunks(16) {
+            let results: Vec<TileResult> =
+                group.par_iter().map(|(first, blocks)| self.solve_tile(&round, *first, blocks, stop)).collect();
+            if stop.load(Ordering::Relaxed) {
+                return None;
+            }
+            for mut result in results {
+                residuals.extend(result.residuals);
+                for (index, lobe, weight, _) in result.tile.pixels() {
+                    let observation = &self.observations.list[index as usize];
+                    let gain = (-estimate.log_gains[observation.view as usize]).exp();
+                    rows[index as usize] = DiffuseRow {
+                        arriving: self.interpolate(&at_points.arriving, index as usize),
+                        radiance: [0, 1, 2].map(|c| observation.radiance[c] * gain - lobe[c]),
+                        weight,
+                    };
+                }
+                result.tile.drop_pixels();
+                made.push(result.tile);
+            }
+        }
+        let mut rho: Vec<[f32; 3]> = estimate.texels.iter().map(|texel| [texel[0], texel[1], texel[2]]).collect();
+        for tile in &made {
+            for (&texel, own) in tile.texels.iter().zip(&tile.rho) {
+                rho[texel as usize] = *own;
+            }
+        }
+        if !diffuse::solve(&self.footprints, &self.observations, &rows, &mut rho, LEANING, ITERATIONS, stop) {
+            return None;
+        }
+        let errors = self.errors_of(&rows, &rho);
+
+        // Nothing is dropped from here on.
+        estimate.variances.fill([0.0; 8]);
+        for tile in &made {
+            for (index, &texel) in tile.texels.iter().enumerate() {
+                let (lobe, [a, b, c]) = (&tile.lobes[index], tile.variance[index]);
+                let [d, e, f, g] = lobe.square.map(|value| value as f32);
+                let specular = [0, 1, 2].map(|c| (lobe.mean[c] as f32).clamp(0.0, 1.0));
+                let texel = texel as usize;
+                let shared = (lobe.shared as f32).max(1.0);
+                estimate.set(texel, rho[texel], specular, lobe.mean[3].min(0.0) as f32, [a, b, c, d, e, f, g, shared]);
+            }
+        }
+        self.fill_from_neighbours(estimate);
+        Some(StepReport {
+            residual: median(&mut residuals),
+            squared_error: errors.mean(),
+            blocks: residuals.len(),
+            light_unknowns: 0,
+            view_errors: errors.of_views(&self.views),
+        })
+    }
+
+    /// Blocks by the tile they begin in, with the tile's corner.
+    fn tiles(&self) -> Vec<((usize, usize), Vec<&Block>)> {
+        let size = self.settings.map_size;
+        let mut tiles: std::collections::BTreeMap<(usize, usize), Vec<&Block>> = Default::default();
+        for block in &self.map_blocks {
+            let Some(&(texel, _)) = block.texels.first() else { continue };
+            let corner = (texel as usize / size / TILE * TILE, texel as usize % size / TILE * TILE);
+            tiles.entry(corner).or_default().push(block);
+        }
+        tiles.into_iter().collect()
+    }
+
+    fn solve_tile(&self, round: &Round, first: (usize, usize), blocks: &[&Block], stop: &AtomicBool) -> TileResult {
+        let prior = open_prior(self.observations.mean, 1.0);
+        let mut solved = Vec::with_capacity(blocks.len());
+        for &block in blocks {
+            let mut work = BlockWork::default();
+            if stop.load(Ordering::Relaxed) {
+                break;
+            }
+            round.gather(block, MOST_OBSERVATIONS, &mut work);
+            if round.solve(block, &prior, &mut work) {
+                solved.push((block, work));
+            }
+        }
+        let residuals = solved.iter().map(|(_, work)| work.solution.residual).collect();
+        let mut tile = Tile::new(round, first, self.settings.map_size, solved);
+        tile.solve(self.settings.map_size, self.observations.mean, self.settings.independence, &LobePrior::default());
+        TileResult { tile, residuals }
+    }
+
+    /// Squared errors of the pixels that tiles used.
+    fn errors_of(&self, rows: &[DiffuseRow], rho: &[[f32; 3]]) -> ErrorSums {
+        let mut errors = ErrorSums::new(self.views.len());
+        for (observation, row) in self.observations.list.iter().zip(rows) {
+            if row.weight > 0.0 && !observation.clipped {
+                let model = diffuse::model(&self.footprints, observation, row, rho);
+                let squared = (0..3).map(|c| f64::from(row.radiance[c] - model[c]).powi(2)).sum::<f64>() / 3.0;
+                errors.add(observation.view as usize, squared);
+            }
+        }
+        errors
+    }
+
+    /// Texels without observations take the values of the nearest that has some.
+    fn fill_from_neighbours(&self, estimate: &mut Estimate) {
+        let size = self.settings.map_size;
+        let solved: Vec<bool> = estimate.variances.iter().map(|variance| variance[7] > 0.0).collect();
+        if !solved.contains(&true) {
+            return;
+        }
+        let nearest = nearest_covered(&Image::from_pixels(size, size, solved));
+        let texels = Image::from_pixels(size, size, std::mem::take(&mut estimate.texels));
+        estimate.texels = dilate(&texels, &nearest).into_pixels();
+    }
+}

@@ -1,0 +1,282 @@
+//! What a round does with a block: light at its pixels, its unknowns, and its rows for the light.
+
+use super::block::{BlockPrior, BlockSolution, MOST_NODES, PixelTerms, solve_block};
+use super::eliminate::BlockRows;
+use super::light_shape::LightShape;
+use super::observations::{Observation, Observations};
+use super::plan::Block;
+use crate::render::cached::irradiance::add_irradiance_row;
+use crate::render::cached::lobe_sum::{LobeSums, add_lobe_row, lobe_sums, lobe_with_derivative, wide_from};
+use crate::render::cached::{CachedTransport, PointLight, ShadingPoint, ViewFootprints};
+
+/// Widths that are looked at: evenly in the logarithm, closer where lobes are wide.
+pub const WIDTHS: [f32; MOST_NODES] = [0.02, 0.04, 0.075, 0.12, 0.18, 0.26, 0.37, 0.52, 0.73, 1.0];
+
+/// What all blocks of a round share.
+pub struct Round<'a> {
+    /// The cache.
+    pub transport: &'a CachedTransport,
+    /// Footprints of the views.
+    pub footprints: &'a [ViewFootprints],
+    /// The observations.
+    pub observations: &'a Observations,
+    /// Logarithm of each view's gain.
+    pub log_gains: &'a [f32],
+    /// The light in planes.
+    pub light: &'a [Vec<f32>; 3],
+    /// The light at the points of the grid.
+    pub at_points: &'a PointLight,
+    /// Whether there is a lobe.
+    pub has_lobe: bool,
+}
+
+/// A block at work.
+#[derive(Clone, Debug, Default)]
+pub struct BlockWork {
+    /// Indices of the observations that are used.
+    pub used: Vec<u32>,
+    /// Their terms.
+    pub terms: Vec<PixelTerms>,
+    /// Nodes of the widths whose terms are set.
+    pub nodes: std::ops::Range<usize>,
+    /// What was found.
+    pub solution: BlockSolution,
+    /// What was believed, with the noise and spread that were found.
+    pub prior: Option<BlockPrior>,
+}
+
+/// What is believed of any block before looking. `openness` in [0, 1] says how far the light can be trusted: under a
+/// light that is not known yet, a lobe that is free takes what the light should explain (left free from the start, the
+/// light grew tenfold and lobes went wide until they stood in for diffuse reflectance), so it begins near a dielectric's
+/// and is let go round by round.
+pub fn open_prior(mean_radiance: f32, openness: f64) -> BlockPrior {
+    let between = |closed: f64, open: f64| closed * (open / closed).powf(openness.clamp(0.0, 1.0));
+    BlockPrior {
+        specular: ([0.07; 3], between(0.02, 0.3)),
+        log_width: (-0.6, between(0.15, 0.6)),
+        diffuse: ([0.4; 3], f64::INFINITY),
+        // Black photos have no mean to measure noise by.
+        noise: 0.05 * f64::from(mean_radiance).max(1e-6),
+        spread: 0.1,
+    }
+}
+
+/// Logarithms of [`WIDTHS`].
+pub fn log_widths() -> [f64; MOST_NODES] {
+    WIDTHS.map(|width| f64::from(width).ln())
+}
+
+impl Round<'_> {
+    fn point(&self, observation: &Observation) -> &ShadingPoint {
+        &self.footprints[observation.view as usize].points[observation.point as usize]
+    }
+
+    /// Mean over an observation's footprint of what the points of the grid hold.
+    fn interpolate(&self, values: &[[f32; 3]], observation: &Observation) -> [f32; 3] {
+        CachedTransport::interpolate(values, &self.footprints[observation.view as usize], self.point(observation))
+    }
+
+    /// Takes up to `most` observations of a block, spread evenly over its texels and views.
+    pub fn gather(&self, block: &Block, most: usize, work: &mut BlockWork) {
+        work.used.clear();
+        work.terms.clear();
+        let step = (block.observations as f64 / most as f64).max(1.0);
+        let mut next = 0.0;
+        let mut seen = 0usize;
+        for &(texel, cell) in &block.texels {
+            for index in self.observations.range(texel as usize) {
+                if seen as f64 >= next {
+                    next += step;
+                    let observation = &self.observations.list[index];
+                    let gain = (-self.log_gains[observation.view as usize]).exp();
+                    work.used.push(index as u32);
+                    work.terms.push(PixelTerms {
+                        radiance: observation.radiance.map(|value| value * gain),
+                        cell,
+                        // A clipped pixel says nothing until the model is darker than it.
+                        weight: if observation.clipped { 0.0 } else { 1.0 },
+                        arriving: self.interpolate(&self.at_points.arriving, observation),
+                        ..PixelTerms::default()
+                    });
+                }
+                seen += 1;
+            }
+        }
+        work.nodes = 0..0;
+    }
+
+    /// Fills in the lobe's integrals at these nodes.
+    fn fill(&self, work: &mut BlockWork, nodes: std::ops::Range<usize>) {
+        let mut sums = [LobeSums::default(); MOST_NODES];
+        for (&used, term) in work.used.iter().zip(&mut work.terms) {
+            let point = self.point(&self.observations.list[used as usize]);
+            let place = self.transport.lobe_place(point);
+            let around = self.transport.lobe_surroundings(self.at_points, point);
+            let widths = &WIDTHS[nodes.clone()];
+            lobe_sums(&self.transport.basis, &place, self.light, widths, &mut sums[..widths.len()]);
+            for (node, sums) in nodes.clone().zip(&sums) {
+                for c in 0..3 {
+                    term.base[node][c] = sums.base[c] + sums.hidden[0] * around[c];
+                    term.grazing[node][c] = sums.grazing[c] + sums.hidden[1] * around[c];
+                }
+            }
+        }
+        work.nodes = if work.nodes.is_empty() {
+            nodes
+        } else {
+            work.nodes.start.min(nodes.start)..work.nodes.end.max(nodes.end)
+        };
+    }
+
+    /// Solves a block: all wide lobes, and narrow ones only when the narrowest of those was the best. Weights are set
+    /// by how well pixels fit (Cauchy), noise and spread by what is left.
+    pub fn solve(&self, block: &Block, prior: &BlockPrior, work: &mut BlockWork) -> bool {
+        let log_widths = log_widths();
+        let first_wide = WIDTHS.partition_point(|&width| width < wide_from(&self.transport.basis)).min(MOST_NODES - 1);
+        let mut prior = *prior;
+        if self.has_lobe {
+            self.fill(work, first_wide..MOST_NODES);
+        } else {
+            work.nodes = MOST_NODES - 1..MOST_NODES;
+            prior.specular = ([0.0; 3], 1e-3);
+        }
+        let floor = 0.25 * prior.noise;
+        for pass in 0..4 {
+            let nodes = work.nodes.clone();
+            let Some(solution) = solve_block(&work.terms, block.cell_count, &log_widths, nodes, &prior) else {
+                return false;
+            };
+            work.solution = solution;
+            if self.has_lobe && work.nodes.start > 0 && work.solution.best_node == work.nodes.start {
+                let start = work.nodes.start;
+                self.fill(work, start.saturating_sub(if start == first_wide { 2 } else { 3 })..start);
+                continue;
+            }
+            if pass == 3 {
+                break;
+            }
+            self.reweigh(work);
+            let unknowns = 3.0 + 0.5 * block.cell_count as f64;
+            let count: f64 = work.terms.iter().map(|term| f64::from(term.weight)).sum();
+            let freedom = (count / (count - unknowns).max(0.25 * count)).sqrt();
+            prior.noise = (f64::from(work.solution.residual) * freedom).max(floor);
+            let deviations: f64 = work
+                .solution
+                .cells
+                .iter()
+                .flat_map(|cell| (0..3).map(|c| f64::from(cell[c] - work.solution.diffuse[c]).powi(2)))
+                .sum::<f64>()
+                / (3 * block.cell_count) as f64;
+            prior.spread = (deviations + 0.01f64.powi(2)).sqrt();
+        }
+        work.prior = Some(prior);
+        true
+    }
+
+    /// Model radiance of a term with the block's solution.
+    pub fn model(&self, work: &BlockWork, term: &PixelTerms) -> [f32; 3] {
+        let solution = &work.solution;
+        let weights =
+            super::block::interpolation(&log_widths(), &work.nodes, solution.best_node, f64::from(solution.log_width));
+        [0, 1, 2].map(|c| {
+            let mut value = solution.cells[usize::from(term.cell)][c] * term.arriving[c];
+            for &(node, weight) in &weights {
+                value += weight * (solution.specular[c] * term.base[node][c] + term.grazing[node][c]);
+            }
+            value
+        })
+    }
+
+    fn reweigh(&self, work: &mut BlockWork) {
+        let models: Vec<[f32; 3]> = work.terms.iter().map(|term| self.model(work, term)).collect();
+        let squared = |term: &PixelTerms, model: &[f32; 3]| {
+            (0..3).map(|c| (term.radiance[c] - model[c]).powi(2)).sum::<f32>() / 3.0
+        };
+        let mut errors: Vec<f32> = work.terms.iter().zip(&models).map(|(term, model)| squared(term, model)).collect();
+        let middle = errors.len() / 2;
+        let median = *errors.select_nth_unstable_by(middle, f32::total_cmp).1;
+        let scale = 6.0 * median + 1e-12;
+        for ((term, model), &used) in work.terms.iter_mut().zip(&models).zip(&work.used) {
+            let clipped = self.observations.list[used as usize].clipped;
+            let darker = (0..3).all(|c| model[c] < term.radiance[c]);
+            term.weight = if clipped && !darker { 0.0 } else { 1.0 / (1.0 + squared(term, model) / scale) };
+        }
+    }
+
+    /// The rows of a solved block over the light, with the block's unknowns eliminated, for each channel. Rows are in
+    /// units of the block's noise.
+    pub fn rows(&self, block: &Block, work: &BlockWork, shape: &LightShape, made: &mut [BlockRows; 3]) {
+        let Some(prior) = work.prior else { return };
+        let used: Vec<usize> = (0..work.used.len()).filter(|&index| work.terms[index].weight > 0.02).collect();
+        let cells = block.cell_count;
+        let unknowns = cells + 3;
+        let count = shape.count();
+        for rows in made.iter_mut() {
+            rows.reset(count, used.len(), unknowns);
+        }
+        let basis = &self.transport.basis;
+        let solution = &work.solution;
+        let width = solution.log_width.exp();
+        let mut full = vec![0.0f32; basis.padded()];
+        let mut reduced = [(); 3].map(|()| vec![0.0f32; count]);
+        for (row, &index) in used.iter().enumerate() {
+            let term = &work.terms[index];
+            let observation = &self.observations.list[work.used[index] as usize];
+            let point = self.point(observation);
+            for row in &mut reduced {
+                row.fill(0.0);
+            }
+            full.fill(0.0);
+            for &(at, weight) in self.footprints[observation.view as usize].lit_of(point) {
+                let normal = self.transport.grid.points[at as usize].shading_normal;
+                add_irradiance_row(basis, normal, self.transport.visibility.of(at as usize), weight, &mut full);
+            }
+            shape.reduce(&full, &mut reduced[0]);
+            let place = self.transport.lobe_place(point);
+            let mut sums = LobeSums::default();
+            if self.has_lobe {
+                for (which, scales) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
+                    full.fill(0.0);
+                    add_lobe_row(basis, &place, width, scales, &mut full);
+                    shape.reduce(&full, &mut reduced[1 + which]);
+                }
+                sums = lobe_with_derivative(basis, &place, self.light, width);
+            }
+            let around = self.transport.lobe_surroundings(self.at_points, point);
+            let direct = self.interpolate(&self.at_points.direct, observation);
+            let scale = f64::from(term.weight.sqrt()) / prior.noise;
+            for (c, rows) in made.iter_mut().enumerate() {
+                let rho = solution.cells[usize::from(term.cell)][c];
+                let specular = solution.specular[c];
+                let base = sums.base[c] + sums.hidden[0] * around[c];
+                let d_width = specular * (sums.d_base[c] + sums.d_hidden[0] * around[c])
+                    + sums.d_grazing[c]
+                    + sums.d_hidden[1] * around[c];
+                let known =
+                    rho * (term.arriving[c] - direct[c]) + (specular * sums.hidden[0] + sums.hidden[1]) * around[c];
+                rows.right[row] = scale * f64::from(term.radiance[c] - known);
+                let scale32 = scale as f32;
+                for ((entry, &d), (&b, &g)) in
+                    rows.row_mut(row).iter_mut().zip(&reduced[0]).zip(reduced[1].iter().zip(&reduced[2]))
+                {
+                    *entry = scale32 * (rho * d + specular * b + g);
+                }
+                let arriving = f64::from(term.arriving[c]);
+                rows.set_unknown(row, 0, scale * arriving);
+                rows.set_unknown(row, 1 + usize::from(term.cell), scale * arriving);
+                rows.set_unknown(row, 1 + cells, scale * f64::from(base));
+                rows.set_unknown(row, 2 + cells, scale * f64::from(d_width));
+            }
+        }
+        for (c, rows) in made.iter_mut().enumerate() {
+            for (cell, value) in solution.cells.iter().enumerate() {
+                rows.set_prior(1 + cell, 1.0 / prior.spread, -f64::from(value[c] - solution.diffuse[c]));
+            }
+            let (mean, deviation) = prior.specular;
+            rows.set_prior(1 + cells, 1.0 / deviation, mean[c] - f64::from(solution.specular[c]));
+            let (mean, deviation) = prior.log_width;
+            rows.set_prior(2 + cells, 1.0 / deviation, mean - f64::from(solution.log_width));
+            rows.eliminate();
+        }
+    }
+}

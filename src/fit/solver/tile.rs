@@ -1,0 +1,333 @@
+//! A tile of the maps: blocks that were solved one by one, put right together.
+//!
+//! Blocks book a pixel at the one texel it covers most. Here diffuse reflectance is solved with the footprints inside the
+//! tile, pixels are relieved of what they cover of the neighbours, and what is left tells of lobes ([`super::lobe_tree`]).
+
+use super::block::{MOST_NODES, PixelTerms};
+use super::lobe_evidence::{LobeBelief, LobePrior, LobeSumsOfGroup};
+use super::lobe_tree::{TreeTexel, beliefs};
+use super::round::{BlockWork, Round, log_widths};
+
+/// Texels along a tile's side.
+pub const TILE: usize = 32;
+/// Times that reflectance and lobes are solved in turn.
+const PASSES: usize = 2;
+/// Sweeps of Gauss and Seidel over the reflectances of a tile.
+const SWEEPS: usize = 8;
+/// What is believed of diffuse reflectance: the tile's mean, and this standard deviation.
+const DIFFUSE_SPREAD: f64 = 0.35;
+/// Residuals of bright pixels are forgiven: half of the noise goes with the radiance.
+const RELATIVE_NOISE: f32 = 1.0;
+/// Least noise, relative to the mean of the photos.
+const LEAST_NOISE: f64 = 0.005;
+/// By how much a width that was not looked at counts as worse, per unit of its logarithm.
+const UNSEEN_WIDTH: f64 = 20.0;
+
+/// A pixel of a tile.
+struct TilePixel {
+    terms: PixelTerms,
+    /// First and last but one width whose terms are set.
+    nodes: (usize, usize),
+    texel: usize,
+    observation: u32,
+    clipped: bool,
+    /// Where its taps lie.
+    taps: std::ops::Range<usize>,
+    /// What its lobe sends.
+    lobe: [f32; 3],
+}
+
+/// A tile at work.
+#[derive(Default)]
+pub struct Tile {
+    /// Row-major texels of the maps.
+    pub texels: Vec<u32>,
+    /// Diffuse reflectance of the texels.
+    pub rho: Vec<[f32; 3]>,
+    /// What is believed of their lobes.
+    pub lobes: Vec<LobeBelief>,
+    /// Variance of diffuse reflectance.
+    pub variance: Vec<[f32; 3]>,
+    pixels: Vec<TilePixel>,
+    taps: Vec<(u32, f32)>,
+    /// Place of each texel of the square in `texels`, or `u32::MAX`.
+    local: Vec<u32>,
+    noise: f64,
+}
+
+impl Tile {
+    /// A tile of solved blocks. `first` is the row and column of its corner in maps of `map_size` texels.
+    pub fn new(
+        round: &Round,
+        first: (usize, usize),
+        map_size: usize,
+        blocks: Vec<(&super::plan::Block, BlockWork)>,
+    ) -> Self {
+        let mut tile = Tile { local: vec![u32::MAX; TILE * TILE], ..Tile::default() };
+        let place = |texel: usize| {
+            let (row, column) = ((texel / map_size).wrapping_sub(first.0), (texel % map_size).wrapping_sub(first.1));
+            (row < TILE && column < TILE).then(|| row * TILE + column)
+        };
+        for (block, work) in &blocks {
+            for &(texel, cell) in &block.texels {
+                let Some(place) = place(texel as usize) else { continue };
+                tile.local[place] = tile.texels.len() as u32;
+                tile.texels.push(texel);
+                tile.rho.push(work.solution.cells[usize::from(cell)]);
+                let [a, b, c] = work.solution.specular.map(f64::from);
+                let mean = [a, b, c, f64::from(work.solution.log_width)];
+                tile.lobes.push(LobeBelief { mean, ..LobeBelief::default() });
+            }
+        }
+        for (_, work) in blocks {
+            for (terms, &used) in work.terms.iter().zip(&work.used) {
+                let observation = &round.observations.list[used as usize];
+                let Some(own) = place(observation.texel as usize).map(|place| tile.local[place]) else { continue };
+                if own == u32::MAX {
+                    continue;
+                }
+                let start = tile.taps.len();
+                let view = &round.footprints[observation.view as usize];
+                for &(texel, weight) in view.texels_of(&view.points[observation.point as usize]) {
+                    // What lies outside counts as what the pixel covers most. What no pixel covers most begins as the
+                    // texel beside it: maps may be finer than photos.
+                    let inside = place(texel as usize).map_or(u32::MAX, |place| {
+                        if tile.local[place] == u32::MAX {
+                            tile.local[place] = tile.texels.len() as u32;
+                            tile.texels.push(texel);
+                            tile.rho.push(tile.rho[own as usize]);
+                            tile.lobes.push(tile.lobes[own as usize]);
+                        }
+                        tile.local[place]
+                    });
+                    tile.taps.push((if inside == u32::MAX { own } else { inside }, weight));
+                }
+                tile.pixels.push(TilePixel {
+                    terms: *terms,
+                    nodes: (work.nodes.start, work.nodes.end),
+                    texel: own as usize,
+                    observation: used,
+                    clipped: observation.clipped,
+                    taps: start..tile.taps.len(),
+                    lobe: [0.0; 3],
+                });
+            }
+        }
+        tile.variance = vec![[0.0; 3]; tile.texels.len()];
+        tile
+    }
+
+    /// Solves reflectances and lobes in turn. `independence` is the share of pixels that count as independent evidence.
+    pub fn solve(&mut self, map_size: usize, mean_radiance: f32, independence: f64, prior: &LobePrior) {
+        if self.pixels.is_empty() {
+            return;
+        }
+        for _ in 0..PASSES {
+            self.set_lobes();
+            self.solve_diffuse();
+            self.weigh(mean_radiance);
+            self.solve_lobes(map_size, independence, prior);
+        }
+        self.set_lobes();
+        self.solve_diffuse();
+    }
+
+    /// The pixels: observation, what the lobe sends, weight, squared error.
+    pub fn pixels(&self) -> impl Iterator<Item = (u32, [f32; 3], f32, f64)> + '_ {
+        self.pixels.iter().map(|pixel| {
+            let error = self.residual(pixel).map(|e| f64::from(e).powi(2)).iter().sum::<f64>() / 3.0;
+            (pixel.observation, pixel.lobe, pixel.terms.weight, error)
+        })
+    }
+
+    /// Frees the pixels, which are large.
+    pub fn drop_pixels(&mut self) {
+        self.pixels = Vec::new();
+        self.taps = Vec::new();
+    }
+
+    fn set_lobes(&mut self) {
+        let widths = log_widths();
+        for pixel in &mut self.pixels {
+            let mean = &self.lobes[pixel.texel].mean;
+            let x = mean[3].clamp(widths[pixel.nodes.0], widths[pixel.nodes.1 - 1]);
+            let mut node = pixel.nodes.0;
+            while node + 2 < pixel.nodes.1 && widths[node + 1] < x {
+                node += 1;
+            }
+            let next = (node + 1).min(pixel.nodes.1 - 1);
+            let share = if next > node { ((x - widths[node]) / (widths[next] - widths[node])) as f32 } else { 0.0 };
+            let terms = &pixel.terms;
+            pixel.lobe = [0, 1, 2].map(|c| {
+                let at = |node: usize| mean[c] as f32 * terms.base[node][c] + terms.grazing[node][c];
+                at(node) * (1.0 - share) + at(next) * share
+            });
+        }
+    }
+
+    /// Mean reflectance under a pixel.
+    fn under(&self, pixel: &TilePixel, c: usize) -> f32 {
+        self.taps[pixel.taps.clone()].iter().map(|&(texel, weight)| weight * self.rho[texel as usize][c]).sum()
+    }
+
+    fn residual(&self, pixel: &TilePixel) -> [f32; 3] {
+        [0, 1, 2].map(|c| pixel.terms.radiance[c] - pixel.lobe[c] - pixel.terms.arriving[c] * self.under(pixel, c))
+    }
+
+    /// Gauss and Seidel over the texels, leaning weakly on what they were.
+    fn solve_diffuse(&mut self) {
+        let mut of_texel: Vec<Vec<(u32, f32)>> = vec![Vec::new(); self.texels.len()];
+        for (index, pixel) in self.pixels.iter().enumerate() {
+            for &(texel, weight) in &self.taps[pixel.taps.clone()] {
+                match of_texel[texel as usize].last_mut() {
+                    Some(last) if last.0 == index as u32 => last.1 += weight,
+                    _ => of_texel[texel as usize].push((index as u32, weight)),
+                }
+            }
+        }
+        for c in 0..3 {
+            let mut left: Vec<f32> = self.pixels.iter().map(|pixel| self.residual(pixel)[c]).collect();
+            let power = |pixel: &TilePixel| pixel.terms.weight * pixel.terms.arriving[c] * pixel.terms.arriving[c];
+            let lean = 0.02 * self.pixels.iter().map(power).sum::<f32>() / self.texels.len().max(1) as f32 + 1e-12;
+            let start: Vec<f32> = self.rho.iter().map(|rho| rho[c]).collect();
+            for _ in 0..SWEEPS {
+                for (texel, pixels) in of_texel.iter().enumerate() {
+                    let old = self.rho[texel][c];
+                    let (mut ee, mut er) = (lean, lean * (start[texel] - old));
+                    for &(index, weight) in pixels {
+                        let terms = &self.pixels[index as usize].terms;
+                        let e = weight * terms.arriving[c];
+                        ee += terms.weight * e * e;
+                        er += terms.weight * e * left[index as usize];
+                    }
+                    let new = (old + er / ee).clamp(0.0, 1.0);
+                    self.rho[texel][c] = new;
+                    for &(index, weight) in pixels {
+                        left[index as usize] -= (new - old) * weight * self.pixels[index as usize].terms.arriving[c];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Weights of the pixels by how well they fit (Cauchy), and the noise.
+    fn weigh(&mut self, mean_radiance: f32) {
+        let scale_of = |terms: &PixelTerms| {
+            let bright = RELATIVE_NOISE * (terms.radiance[0] + terms.radiance[1] + terms.radiance[2]) / 3.0;
+            let mean = mean_radiance.max(1e-6);
+            mean * mean / (mean * mean + bright * bright)
+        };
+        let squared: Vec<f32> = self
+            .pixels
+            .iter()
+            .map(|pixel| {
+                let e = self.residual(pixel);
+                scale_of(&pixel.terms) * (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]) / 3.0
+            })
+            .collect();
+        let mut sorted = squared.clone();
+        let middle = sorted.len() / 2;
+        let median = *sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
+        let least = (LEAST_NOISE * f64::from(mean_radiance).max(1e-6)).powi(2);
+        let (mut sum, mut count) = (0.0f64, 0.0f64);
+        for index in 0..self.pixels.len() {
+            let darker = self.residual(&self.pixels[index]).iter().all(|&e| e > 0.0);
+            let pixel = &mut self.pixels[index];
+            let robust = 1.0 / (1.0 + squared[index] / (6.0 * median + least as f32));
+            // A clipped pixel says nothing until the model is darker than it.
+            pixel.terms.weight = if pixel.clipped && !darker { 0.0 } else { robust * scale_of(&pixel.terms) };
+            if !pixel.clipped {
+                sum += f64::from(robust * squared[index]);
+                count += f64::from(robust);
+            }
+        }
+        // Each texel has taken a share of the pixels' freedom.
+        let freedom = (count - self.texels.len() as f64).max(0.25 * count);
+        self.noise = (sum / freedom.max(1e-9)).max(least);
+    }
+
+    fn solve_lobes(&mut self, map_size: usize, independence: f64, prior: &LobePrior) {
+        let scale = independence / self.noise;
+        let count = self.texels.len();
+        let mut mean = [0.0f64; 3];
+        for rho in &self.rho {
+            for c in 0..3 {
+                mean[c] += f64::from(rho[c]) / count as f64;
+            }
+        }
+        let widths = log_widths();
+        // Per texel, width and channel: E E, E S, S S, E y, S y, y y.
+        let mut raw = vec![[[[0.0f64; 6]; 3]; MOST_NODES]; count];
+        for pixel in &self.pixels {
+            let weight = scale * f64::from(pixel.terms.weight);
+            if weight == 0.0 {
+                continue;
+            }
+            let own = &mut raw[pixel.texel];
+            for c in 0..3 {
+                let e = f64::from(pixel.terms.arriving[c]);
+                let neighbours = self.under(pixel, c) - self.rho[pixel.texel][c];
+                let radiance = f64::from(pixel.terms.radiance[c] - pixel.terms.arriving[c] * neighbours);
+                for node in 0..MOST_NODES {
+                    // A width that was not looked at is the narrowest that was, and worse.
+                    let known = node.clamp(pixel.nodes.0, pixel.nodes.1 - 1);
+                    let s = f64::from(pixel.terms.base[known][c]);
+                    let y = radiance - f64::from(pixel.terms.grazing[known][c]);
+                    for (sum, value) in own[node][c].iter_mut().zip([e * e, e * s, s * s, e * y, s * y, y * y]) {
+                        *sum += weight * value;
+                    }
+                }
+            }
+        }
+        let first = self.pixels.iter().fold(vec![0usize; count], |mut first, pixel| {
+            first[pixel.texel] = first[pixel.texel].max(pixel.nodes.0);
+            first
+        });
+        let sums: Vec<LobeSumsOfGroup> = raw
+            .iter()
+            .zip(&first)
+            .map(|(raw, &first)| {
+                let mut made = LobeSumsOfGroup::default();
+                // The volume of what diffuse reflectance could be is left out: neighbours are alike, so a texel each would
+                // count it far too often, in favour of the kind that believes the most (toys: all of it metal).
+                for (kind, made) in prior.kinds.iter().zip(&mut made.0) {
+                    let ridge = 1.0 / (kind.diffuse.1 * kind.diffuse.1);
+                    for node in 0..MOST_NODES {
+                        let unseen = UNSEEN_WIDTH * (widths[first] - widths[node]).max(0.0);
+                        for c in 0..3 {
+                            let [ee, es, ss, ey, sy, yy] = raw[node][c];
+                            let believed = kind.diffuse.0.unwrap_or(mean[c]);
+                            let keep = 1.0 / (ee + ridge);
+                            let side = ey + ridge * believed;
+                            made[node][c] = [
+                                ss - es * es * keep,
+                                sy - es * side * keep,
+                                yy + ridge * believed * believed - side * side * keep + unseen / 3.0,
+                            ];
+                        }
+                    }
+                }
+                made
+            })
+            .collect();
+        let texels: Vec<TreeTexel> = self
+            .texels
+            .iter()
+            .zip(&self.rho)
+            .map(|(&texel, &colour)| TreeTexel {
+                row: (texel as usize / map_size % TILE) as u16,
+                column: (texel as usize % map_size % TILE) as u16,
+                colour,
+            })
+            .collect();
+        self.lobes = beliefs(&texels, &sums, TILE, &widths, prior);
+        let ridge = 1.0 / (DIFFUSE_SPREAD * DIFFUSE_SPREAD);
+        for (texel, lobe) in self.lobes.iter().enumerate() {
+            let node = widths.partition_point(|&width| width < lobe.mean[3]).min(MOST_NODES - 1);
+            self.variance[texel] = [0, 1, 2].map(|c| {
+                let [ee, es, ..] = raw[texel][node][c];
+                (1.0 / (ee + ridge) + (es / (ee + ridge)).powi(2) * lobe.square[c]) as f32
+            });
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! The solver's steps as steps of a fit: same state, same history, same checkpoint.
+//!
+//! A step is a round on the light, or all maps. What it needs and no checkpoint holds, the traced cache, is made before
+//! the first step, and again after a resume. Nothing is random but by the seed, so a fit that is taken up goes on bit
+//! for bit.
+
+use super::fitter::{Fitter, StepOutcome};
+use super::schedule::{Stage, StageKind};
+use super::settings::Method;
+use super::solver::{Estimate, SolverScene, SolverSettings, SolverStep, StepReport, TransportError};
+use super::state::LossRow;
+use crate::error::Result;
+use crate::image::{GreyImage, Image};
+use crate::material::MaterialMaps;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+impl Fitter {
+    /// Does one step of the solver. A step that is stopped changes nothing.
+    pub(super) fn solver_step(&mut self, stage: &Stage, stop: &AtomicBool) -> Result<StepOutcome> {
+        let began = Instant::now();
+        let settings = SolverSettings::of(&self.settings);
+        if self.solver.is_none() {
+            let (scene, surface) = (&self.scene, &self.surface);
+            self.solver = SolverScene::build(scene, surface, &self.training, &self.held_out, settings, stop)?;
+        }
+        let Some(solver) = self.solver.take() else { return Ok(StepOutcome::Interrupted) };
+        let step = match stage.kind {
+            StageKind::Maps => SolverStep::Maps,
+            StageKind::NarrowLight => SolverStep::Light(settings.coarse_rounds + self.state.step_in_stage),
+            StageKind::WideLight | StageKind::Diffuse | StageKind::All => SolverStep::Light(self.state.step_in_stage),
+        };
+        let mut estimate = self.lend_estimate(&solver);
+        let report = solver.step(step, &mut estimate, stop);
+        let held_out = report.as_ref().map(|_| solver.held_out_rmse(&self.scene, &estimate));
+        self.take_estimate(&solver, estimate);
+        self.solver = Some(solver);
+        let (Some(report), Some((held_out_rmse, of_views))) = (report, held_out) else {
+            return Ok(StepOutcome::Interrupted);
+        };
+        self.figures.keep_errors(&report.view_errors);
+        self.figures.keep_errors(&of_views);
+        self.state.seconds += began.elapsed().as_secs_f64();
+        Ok(StepOutcome::Stepped(self.note(stage, &report, held_out_rmse)))
+    }
+
+    /// Standard deviations of the maps' values given the light, as maps: only the solver knows them, and only at its end.
+    pub fn deviations(&self) -> Option<MaterialMaps> {
+        self.knows_deviations().then(|| {
+            let estimate = Estimate {
+                texels: self.state.texels.clone(),
+                variances: self.state.moments.second.clone(),
+                ..Estimate::default()
+            };
+            estimate.deviations(self.state.map_size)
+        })
+    }
+
+    fn knows_deviations(&self) -> bool {
+        self.settings.method == Method::Solver
+            && self.stage().is_none_or(|stage| stage.kind == StageKind::Maps && self.state.step_in_stage >= stage.steps)
+    }
+
+    /// How far the solver's model is from the path tracer's with what was found. `None` under Adam, before the first step
+    /// of a session, or when `stop` was raised.
+    pub fn transport_error(&self, stop: &AtomicBool) -> Option<TransportError> {
+        let solver = self.solver.as_ref()?;
+        let estimate =
+            Estimate { texels: self.state.texels.clone(), light: self.state.light.clone(), ..Estimate::default() };
+        solver.transport_error(&self.scene, &self.surface, &estimate, stop)
+    }
+
+    /// Number of texels that share a texel's lobe, as an image: the mean over all ways to cut the surface into regions,
+    /// weighed by their evidence; 0 where a texel took over what its neighbours have. `None` as for [`Self::deviations`].
+    pub fn lobe_sharing(&self) -> Option<GreyImage> {
+        let size = self.state.map_size;
+        self.knows_deviations()
+            .then(|| Image::from_fn(size, size, |row, column| self.state.moments.second[row * size + column][7]))
+    }
+
+    /// Moves the unknowns out of the state, so that none is held twice.
+    fn lend_estimate(&mut self, solver: &SolverScene) -> Estimate {
+        let state = &mut self.state;
+        let mut estimate = Estimate {
+            texels: std::mem::take(&mut state.texels),
+            variances: std::mem::take(&mut state.moments.second),
+            light: std::mem::take(&mut state.light),
+            log_gains: solver.views.iter().map(|&view| state.log_gains[view]).collect(),
+        };
+        // The paper's start is black: nothing could be told apart under it.
+        if estimate.light.iter().all(|radiance| *radiance == [0.0; 3]) {
+            let light = solver.constant_light();
+            estimate.light = light.radiance.pixels().iter().map(|pixel| pixel.to_array()).collect();
+        }
+        estimate
+    }
+
+    fn take_estimate(&mut self, solver: &SolverScene, estimate: Estimate) {
+        let state = &mut self.state;
+        state.texels = estimate.texels;
+        state.moments.second = estimate.variances;
+        state.light = estimate.light;
+        for (&view, gain) in solver.views.iter().zip(estimate.log_gains) {
+            state.log_gains[view] = gain;
+        }
+    }
+
+    /// Writes a step into the history.
+    fn note(&mut self, stage: &Stage, report: &StepReport, held_out_rmse: Option<f64>) -> LossRow {
+        let state = &mut self.state;
+        state.step += 1;
+        state.step_in_stage += 1;
+        let row = LossRow {
+            step: state.step,
+            stage: stage.name(),
+            seconds: state.seconds,
+            loss: report.residual * report.residual,
+            image_loss: report.squared_error,
+            consistency: 0.0,
+            surface_rmse: None,
+            held_out_rmse,
+        };
+        state.losses.push(row.clone());
+        row
+    }
+}

@@ -1,0 +1,318 @@
+//! Starts the processes of a contest one after the other, and has what they wrote judged.
+
+use super::clock;
+use super::contestant::Contestant;
+use super::entry::base_settings;
+use super::judge::Judge;
+use super::snapshot::{self, Snapshot};
+use super::tables::{Contest, SceneResults};
+use crate::error::{Error, ErrorKind, Place, Result};
+use crate::fit::{FitSettings, Fitter};
+use crate::job::against_truth::resampled;
+use crate::job::demo::photograph;
+use crate::render::Surface;
+use crate::scene::demo::{self, DemoSettings};
+use crate::scene::{ReadSettings, Scene};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// What is compared.
+#[derive(Clone, Debug)]
+pub struct ContestOptions {
+    /// Exchange folders with their truth; when empty, the demo is made in code and written as one.
+    pub scenes: Vec<PathBuf>,
+    /// How they are read; views it holds out are kept from every method.
+    pub read: ReadSettings,
+    /// The methods, in this order.
+    pub methods: Vec<Contestant>,
+    /// Seconds that each fit may take.
+    pub seconds: f64,
+    /// Seconds at which each shows what it has; when empty, ten and its doublings below `seconds`.
+    pub at: Vec<f64>,
+    /// Seeds 1 to this number; at least 1.
+    pub seeds: usize,
+    /// A tiny demo when no scene is named.
+    pub quick: bool,
+    /// Judge what an earlier contest left in the output folder, and run only what it lacks.
+    pub reuse: bool,
+    /// Threads of every method; all processors when not given.
+    pub threads: Option<usize>,
+    /// Paths a pixel in pictures that are judged.
+    pub samples: usize,
+    /// Pictures of each kind that are judged, at most.
+    pub most_views: usize,
+    /// A TOML file of settings of this program's methods that differ from the defaults.
+    pub settings: Option<PathBuf>,
+    /// This program.
+    pub program: PathBuf,
+    /// The Python that has Mitsuba.
+    pub python: PathBuf,
+    /// The folder of `fit_exchange.py`.
+    pub scripts: PathBuf,
+    /// Folder of the tables, plots and snapshots.
+    pub output: PathBuf,
+}
+
+impl ContestOptions {
+    /// Seconds at which snapshots are due.
+    pub fn due(&self) -> Vec<f64> {
+        if !self.at.is_empty() {
+            return self.at.clone();
+        }
+        let first = if self.seconds > 20.0 { 10.0 } else { self.seconds / 8.0 };
+        (0..40)
+            .map(|power| first * f64::from(1u32 << power.min(30)))
+            .take_while(|due| *due < 0.99 * self.seconds)
+            .collect()
+    }
+}
+
+/// Runs every method on every scene with every seed and writes tables and plots, anew after each fit. `tell` hears of
+/// each.
+///
+/// # Errors
+/// A scene without truth, an output folder that cannot be written, no method at all; `Stopped` when `stop` is raised. A
+/// method that cannot run is no error: it is noted in the tables.
+pub fn run(options: &ContestOptions, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Result<Contest> {
+    let wrong =
+        |name: &str, message: &str| Err(Error::new(ErrorKind::InvalidSetting, message).at(Place::Setting(name.into())));
+    if options.seeds == 0 {
+        return wrong("seeds", "must be at least 1");
+    }
+    if options.methods.is_empty() {
+        return wrong("methods", "must name at least one");
+    }
+    if !(options.seconds.is_finite() && options.seconds > 0.0) {
+        return wrong("seconds", "must be more than 0");
+    }
+    let output = std::path::absolute(&options.output).unwrap_or_else(|_| options.output.clone());
+    let options = &ContestOptions { output, ..options.clone() };
+    std::fs::create_dir_all(&options.output).map_err(|source| Error::writing(&options.output, source))?;
+    let mut contest = Contest::new(options);
+    let mut scenes = options.scenes.clone();
+    if scenes.is_empty() {
+        tell("photographing the demo");
+        scenes.push(built_in(options, stop)?);
+    }
+    let methods = able(options, &mut contest, tell);
+    for path in &scenes {
+        let path = std::path::absolute(path).unwrap_or_else(|_| path.clone());
+        tell(&format!("reading {}", path.display()));
+        let scene = crate::scene::read(&path, &options.read)?;
+        let base = base_settings(&scene, options.settings.as_deref(), 1)?;
+        let judge = Judge::new(scene, options.samples, options.most_views)?;
+        let name = contest.unused_name(&judge.scene().name);
+        let folder = options.output.join(&name);
+        let start = write_start(judge.scene(), &base, &folder)?;
+        let mut results = SceneResults::new(name, &judge, &base);
+        if let Some(truth) = &judge.scene().truth {
+            results.truth = judge.scores(&truth.maps, &truth.environment, 0, stop)?;
+        }
+        let (maps, light) = snapshot::read_maps(&start)?;
+        results.start = judge.scores(&maps, &light, 0, stop)?;
+        contest.scenes.push(results);
+        for seed in 1..=options.seeds as u64 {
+            for &method in &methods {
+                let place = folder.join(format!("{}-{seed}", method.name()));
+                let race = Race { options, scene: &path, judge: &judge, start: &start, place: &place, seed };
+                race.run(method, &mut contest, stop, tell)?;
+                contest.write(&options.output)?;
+            }
+        }
+    }
+    contest.write(&options.output)?;
+    Ok(contest)
+}
+
+/// The methods that can run here; the others are noted.
+fn able(options: &ContestOptions, contest: &mut Contest, tell: &dyn Fn(&str)) -> Vec<Contestant> {
+    let mut able = Vec::new();
+    for &method in &options.methods {
+        let trouble = match method {
+            Contestant::Mitsuba => mitsuba_trouble(options),
+            own => own.settings(&FitSettings::default()).is_none().then(|| "this build has no such method".to_string()),
+        };
+        match trouble {
+            None if !able.contains(&method) => able.push(method),
+            None => {}
+            Some(why) => {
+                let note = format!("`{}` was left out: {why}.", method.name());
+                tell(&note);
+                contest.notes.push(note);
+            }
+        }
+    }
+    able
+}
+
+/// Why Mitsuba cannot run, if so.
+fn mitsuba_trouble(options: &ContestOptions) -> Option<String> {
+    if options.read.shrink > 1 {
+        return Some("it reads photos at their full size".into());
+    }
+    let script = options.scripts.join("fit_exchange.py");
+    if !script.is_file() {
+        return Some(format!("there is no {}", script.display()));
+    }
+    let asked = "import mitsuba; mitsuba.set_variant('llvm_ad_rgb'); import drjit; drjit.eval(mitsuba.Float([1]) + 1)";
+    let outcome = Command::new(&options.python).args(["-c", asked]).stdin(Stdio::null()).output();
+    match outcome {
+        Err(error) => Some(format!("{} cannot be started ({error})", options.python.display())),
+        Ok(output) if output.status.success() => None,
+        Ok(output) => {
+            let text = String::from_utf8_lossy(&output.stderr);
+            let last = text.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("no message");
+            Some(format!("{} has no working Mitsuba ({})", options.python.display(), last.trim()))
+        }
+    }
+}
+
+/// The demo as an exchange folder.
+fn built_in(options: &ContestOptions, stop: &AtomicBool) -> Result<PathBuf> {
+    let settings = if options.quick {
+        DemoSettings { views: 6, held_out: 2, width: 32, height: 24, map_size: 64, seed: 1 }
+    } else {
+        DemoSettings::default()
+    };
+    let built = demo::build(&settings)?;
+    let (covered, mut scene) = (built.covered, built.scene);
+    photograph(&mut scene, if options.quick { 16 } else { 128 }, settings.seed, 1.0, stop, &|_| {})?;
+    let folder = options.output.join("scene-demo");
+    if let Some(truth) = &scene.truth {
+        let exchange = crate::export::exchange::ExchangeOptions {
+            covered: Some(&covered),
+            with_photos: true,
+            ..Default::default()
+        };
+        crate::export::exchange::write(&scene, truth, &exchange, &folder)?;
+    }
+    Ok(folder)
+}
+
+/// Writes what every method begins from, at full size.
+fn write_start(scene: &Scene, base: &FitSettings, folder: &Path) -> Result<PathBuf> {
+    let settings = Contestant::Adam.settings(base).unwrap_or_else(|| base.clone());
+    let surface = Arc::new(Surface::new(scene.mesh.clone())?);
+    let fitter = Fitter::new(Arc::new(scene.clone()), surface, settings, None)?;
+    let maps = resampled(&fitter.maps(), (base.map_size, base.map_size));
+    let start = folder.join("start");
+    snapshot::write_maps(&start, &maps, &fitter.environment())?;
+    Ok(start)
+}
+
+struct Race<'a> {
+    options: &'a ContestOptions,
+    scene: &'a Path,
+    judge: &'a Judge,
+    start: &'a Path,
+    place: &'a Path,
+    seed: u64,
+}
+
+impl Race<'_> {
+    /// Runs a method and judges its snapshots; the scores go to the last scene of the contest.
+    fn run(&self, method: Contestant, contest: &mut Contest, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Result<()> {
+        let scene = &self.judge.scene().name;
+        let ended = |snapshots: &[Snapshot]| snapshots.last().is_some_and(|last| last.due.is_none());
+        if self.options.reuse && ended(&snapshot::list(self.place).unwrap_or_default()) {
+            tell(&format!("{scene}, seed {}: {} as it was", self.seed, method.name()));
+            let note = format!("`{}` on {scene}, seed {}, is that of an earlier contest.", method.name(), self.seed);
+            contest.notes.push(note);
+            return self.judge(method, contest, stop, tell);
+        }
+        tell(&format!("{scene}, seed {}: {} for {} s", self.seed, method.name(), self.options.seconds));
+        let mut command = match method {
+            Contestant::Mitsuba => self.script(),
+            own => self.program(own),
+        };
+        // A process that fails at once must not leave the list of an earlier one.
+        let _ = std::fs::remove_file(self.place.join("snapshots.jsonl"));
+        let trouble = wait(&mut command, stop)?;
+        if let Some(trouble) = trouble {
+            let note = format!("`{}` on {scene}, seed {}: {trouble}.", method.name(), self.seed);
+            tell(&note);
+            contest.notes.push(note);
+        }
+        self.judge(method, contest, stop, tell)
+    }
+
+    /// Judges what a method wrote.
+    fn judge(&self, method: Contestant, contest: &mut Contest, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Result<()> {
+        let snapshots = snapshot::list(self.place)?;
+        tell(&format!("judging {} snapshots", snapshots.len()));
+        for snapshot in snapshots {
+            let (maps, light) = snapshot.read(self.place)?;
+            let scores = self.judge.scores(&maps, &light, snapshot.non_finite, stop)?;
+            if let Some(results) = contest.scenes.last_mut() {
+                results.add(method, self.seed, snapshot, scores);
+            }
+        }
+        Ok(())
+    }
+
+    fn times(&self) -> String {
+        self.options.due().iter().map(|due| due.to_string()).collect::<Vec<_>>().join(",")
+    }
+
+    fn program(&self, method: Contestant) -> Command {
+        let mut command = Command::new(&self.options.program);
+        if let Some(threads) = self.options.threads {
+            command.arg("--threads").arg(threads.to_string());
+        }
+        command.args(["bench", "entry"]).arg(self.scene).args(["--method", method.name()]);
+        command.args(["--hold-out-every", &self.options.read.hold_out_every.to_string()]);
+        command.args(["--shrink", &self.options.read.shrink.to_string()]);
+        command.args(["--max-views", &self.options.read.max_views.to_string()]);
+        if let Some(settings) = &self.options.settings {
+            command.arg("--settings").arg(settings);
+        }
+        command.args(["--seconds", &self.options.seconds.to_string()]);
+        command.args(["--at", &self.times(), "--seed", &self.seed.to_string()]).arg("-o").arg(self.place);
+        command.args(["--began", &clock::now().to_string()]);
+        command
+    }
+
+    fn script(&self) -> Command {
+        let mut command = Command::new(&self.options.python);
+        command.arg(self.options.scripts.join("fit_exchange.py")).arg(self.scene);
+        if let Some(threads) = self.options.threads {
+            command.arg("--threads").arg(threads.to_string());
+        }
+        let views = self.judge.scene().views.iter().filter(|view| !view.held_out);
+        let names: Vec<&str> = views.map(|view| view.name.as_str()).collect();
+        command.arg("--start").arg(self.start).args(["--names", &names.join(",")]);
+        command.args(["--seconds", &self.options.seconds.to_string()]);
+        command.args(["--at", &self.times(), "--seed", &self.seed.to_string()]).arg("--out").arg(self.place);
+        command.args(["--began", &clock::now().to_string()]);
+        command
+    }
+}
+
+/// Runs a process to its end; says what went wrong, if anything.
+///
+/// # Errors
+/// `Stopped` when `stop` is raised; the process is ended then.
+fn wait(command: &mut Command, stop: &AtomicBool) -> Result<Option<String>> {
+    let mut child = match command.stdin(Stdio::null()).stdout(Stdio::null()).spawn() {
+        Ok(child) => child,
+        Err(error) => return Ok(Some(format!("cannot be started ({error})"))),
+    };
+    loop {
+        match child.try_wait() {
+            Ok(Some(status)) if status.success() => return Ok(None),
+            Ok(Some(status)) => return Ok(Some(format!("ended with {status}"))),
+            Ok(None) => {}
+            Err(error) => return Ok(Some(format!("was lost ({error})"))),
+        }
+        if stop.load(Ordering::Relaxed) {
+            let _ = child.kill();
+            let _ = child.wait();
+            return Err(Error::new(ErrorKind::Stopped, "the contest was stopped")
+                .remedy("tables of the fits that were done are written"));
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}

@@ -1,0 +1,348 @@
+//! Nets of dense layers with skips, forward and backward on a batch.
+//!
+//! Rows of a batch come in groups that share a code: the code's part of the first layer is computed once a group. A
+//! layer may see the output of an earlier one beside that of the one before it (concatenation, as in a U-Net).
+//! Weights of all layers lie in one slice that the caller owns: per layer a matrix `[inputs][outputs]`, then the bias.
+
+use super::product::{Rows, multiply};
+use crate::math::random::SequentialRandom;
+
+/// What stands behind every layer but the last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Activation {
+    /// `max(x, 0)`, as in the paper.
+    Rectifier,
+    /// `(x + sqrt(x^2 + 1/4)) / 2` (Barron 2021, "Squareplus"): a rectifier with a derivative everywhere.
+    Squareplus,
+}
+
+/// Squareplus bends over about this width, squared.
+const BEND: f32 = 0.25;
+
+impl Activation {
+    fn apply(self, values: &mut [f32]) {
+        match self {
+            Activation::Rectifier => values.iter_mut().for_each(|x| *x = x.max(0.0)),
+            Activation::Squareplus => values.iter_mut().for_each(|x| *x = 0.5 * (*x + (*x * *x + BEND).sqrt())),
+        }
+    }
+
+    /// Multiplies an adjoint by the derivative, given the output.
+    fn pull_back(self, outputs: &[f32], adjoint: &mut [f32]) {
+        match self {
+            Activation::Rectifier => {
+                for (adjoint, &y) in adjoint.iter_mut().zip(outputs) {
+                    *adjoint = if y > 0.0 { *adjoint } else { 0.0 };
+                }
+            }
+            // y (y - x) = BEND / 4, so dy/dx = y / (2 y - x) = y^2 / (y^2 + BEND / 4).
+            Activation::Squareplus => {
+                for (adjoint, &y) in adjoint.iter_mut().zip(outputs) {
+                    *adjoint *= y * y / (y * y + 0.25 * BEND);
+                }
+            }
+        }
+    }
+}
+
+/// One layer: how many outputs, and which earlier layer's output it sees beside its predecessor's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Layer {
+    /// Numbers that come out.
+    pub outputs: usize,
+    /// Index of the layer whose output is appended to the input.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beside: Option<usize>,
+}
+
+/// The shape of a net; its weights live elsewhere.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DenseNet {
+    features: usize,
+    code: usize,
+    layers: Vec<Layer>,
+    activation: Activation,
+    /// Where the matrix of each layer begins; one more entry at the end.
+    offsets: Vec<usize>,
+}
+
+/// What a forward pass leaves for the backward pass. Reused from batch to batch.
+#[derive(Clone, Debug, Default)]
+pub struct Tape {
+    features: Vec<f32>,
+    codes: Vec<f32>,
+    rows_per_group: usize,
+    outputs: Vec<Vec<f32>>,
+    adjoints: Vec<Vec<f32>>,
+}
+
+impl Tape {
+    /// What the last layer gave, row by row.
+    pub fn result(&self) -> &[f32] {
+        self.outputs.last().map_or(&[], |last| last.as_slice())
+    }
+}
+
+impl DenseNet {
+    /// A net of these layers over `features` numbers a row and `code` numbers a group. Panics when a layer looks beside
+    /// itself at a layer that does not come before it: a defect of the caller.
+    pub fn new(features: usize, code: usize, layers: Vec<Layer>, activation: Activation) -> Self {
+        let mut net = DenseNet { features, code, layers, activation, offsets: vec![0] };
+        for index in 0..net.layers.len() {
+            assert!(net.layers[index].beside.is_none_or(|beside| index > 0 && beside < index));
+            let size = (net.inputs(index) + 1) * net.layers[index].outputs;
+            net.offsets.push(net.offsets[index] + size);
+        }
+        net
+    }
+
+    /// The paper's conditioner, a U-Net without convolutions: 256, 128, 64, 32, 16, and back with skips.
+    pub fn unet(features: usize, code: usize, outputs: usize) -> Self {
+        let plain = |outputs| Layer { outputs, beside: None };
+        let beside = |outputs, index| Layer { outputs, beside: Some(index) };
+        let down = [256, 128, 64, 32, 16].map(plain);
+        let up = [plain(32), beside(64, 3), beside(128, 2), beside(256, 1), plain(outputs)];
+        DenseNet::new(features, code, down.into_iter().chain(up).collect(), Activation::Rectifier)
+    }
+
+    /// The layers.
+    pub fn layers(&self) -> &[Layer] {
+        &self.layers
+    }
+
+    /// How many weights there are.
+    pub fn weight_count(&self) -> usize {
+        self.offsets.last().copied().unwrap_or(0)
+    }
+
+    /// Multiplications of one row, the code's part not counted.
+    pub fn multiplications(&self) -> usize {
+        (0..self.layers.len())
+            .map(|index| (self.inputs(index) - if index == 0 { self.code } else { 0 }) * self.layers[index].outputs)
+            .sum()
+    }
+
+    /// Numbers that come out of the last layer.
+    pub fn outputs(&self) -> usize {
+        self.layers.last().map_or(0, |layer| layer.outputs)
+    }
+
+    fn inputs(&self, index: usize) -> usize {
+        if index == 0 { self.features + self.code } else { self.previous(index) + self.appended(index) }
+    }
+
+    fn previous(&self, index: usize) -> usize {
+        self.layers[index - 1].outputs
+    }
+
+    fn appended(&self, index: usize) -> usize {
+        self.layers[index].beside.map_or(0, |beside| self.layers[beside].outputs)
+    }
+
+    /// Writes weights to start from: uniform by fan-in (He et al. 2015), the last layer at a tenth of that.
+    pub fn start(&self, weights: &mut [f32], random: &mut SequentialRandom) {
+        for index in 0..self.layers.len() {
+            let outputs = self.layers[index].outputs;
+            let last = index + 1 == self.layers.len();
+            let bound = (6.0 / self.inputs(index) as f32).sqrt() * if last { 0.1 } else { 1.0 };
+            let own = &mut weights[self.offsets[index]..self.offsets[index + 1]];
+            let (matrix, bias) = own.split_at_mut(self.inputs(index) * outputs);
+            matrix.iter_mut().for_each(|weight| *weight = bound * (2.0 * random.next_number() - 1.0));
+            let bias_bound = if last { 0.0 } else { 0.2 };
+            bias.iter_mut().for_each(|weight| *weight = bias_bound * (2.0 * random.next_number() - 1.0));
+        }
+    }
+
+    /// Evaluates rows of `features`, in groups of `rows_per_group` that share a row of `codes`. The result is on the
+    /// tape: see [`Tape::result`].
+    pub fn forward(&self, weights: &[f32], features: &[f32], codes: &[f32], rows_per_group: usize, tape: &mut Tape) {
+        let groups = codes.len().checked_div(self.code).unwrap_or(1);
+        let rows = features.len().checked_div(self.features).unwrap_or(groups * rows_per_group);
+        assert_eq!(rows, groups * rows_per_group, "rows of a batch come in whole groups");
+        tape.features.clear();
+        tape.features.extend_from_slice(features);
+        tape.codes.clear();
+        tape.codes.extend_from_slice(codes);
+        tape.rows_per_group = rows_per_group;
+        tape.outputs.resize_with(self.layers.len(), Vec::new);
+        for index in 0..self.layers.len() {
+            let width = self.layers[index].outputs;
+            let own = &weights[self.offsets[index]..self.offsets[index + 1]];
+            let (matrix, bias) = own.split_at(self.inputs(index) * width);
+            let (before, rest) = tape.outputs.split_at_mut(index);
+            let into = &mut rest[0];
+            into.resize(rows * width, 0.0);
+            if index == 0 {
+                let (of_features, of_code) = matrix.split_at(self.features * width);
+                let mut base: Vec<f32> = bias.repeat(groups);
+                if self.code > 0 {
+                    let codes = Rows::new(&tape.codes, groups, self.code);
+                    multiply(codes, Rows::new(of_code, self.code, width), &mut base, true);
+                }
+                if rows > 0 {
+                    for (block, base) in into.chunks_exact_mut(rows_per_group * width).zip(base.chunks_exact(width)) {
+                        block.chunks_exact_mut(width).for_each(|row| row.copy_from_slice(base));
+                    }
+                }
+                let features = Rows::new(&tape.features, rows, self.features);
+                multiply(features, Rows::new(of_features, self.features, width), into, true);
+            } else {
+                into.chunks_exact_mut(width).for_each(|row| row.copy_from_slice(bias));
+                let (of_previous, of_beside) = matrix.split_at(self.previous(index) * width);
+                let previous = Rows::new(&before[index - 1], rows, self.previous(index));
+                multiply(previous, Rows::new(of_previous, self.previous(index), width), into, true);
+                if let Some(beside) = self.layers[index].beside {
+                    let appended = self.appended(index);
+                    multiply(
+                        Rows::new(&before[beside], rows, appended),
+                        Rows::new(of_beside, appended, width),
+                        into,
+                        true,
+                    );
+                }
+            }
+            if index + 1 < self.layers.len() {
+                self.activation.apply(into);
+            }
+        }
+    }
+
+    /// Pulls the adjoint of the result back. Adds to `d_weights`, of the shape of the weights, and to `d_codes`, of the
+    /// shape of the codes; writes `d_features` when asked for. An empty `d_weights` leaves the weights out.
+    pub fn backward(
+        &self,
+        weights: &[f32],
+        tape: &mut Tape,
+        d_result: &[f32],
+        d_weights: &mut [f32],
+        d_codes: &mut [f32],
+        d_features: Option<&mut [f32]>,
+    ) {
+        let count = self.layers.len();
+        let rows = tape.outputs[0].len() / self.layers[0].outputs;
+        let mut adjoints = std::mem::take(&mut tape.adjoints);
+        adjoints.resize_with(count, Vec::new);
+        for (index, adjoint) in adjoints.iter_mut().enumerate() {
+            adjoint.clear();
+            adjoint.resize(rows * self.layers[index].outputs, 0.0);
+        }
+        adjoints[count - 1].copy_from_slice(d_result);
+        for index in (1..count).rev() {
+            let width = self.layers[index].outputs;
+            let (lower, upper) = adjoints.split_at_mut(index);
+            let own = &mut upper[0];
+            if index + 1 < count {
+                self.activation.pull_back(&tape.outputs[index], own);
+            }
+            let own = Rows::new(own, rows, width);
+            let span = self.offsets[index]..self.offsets[index + 1];
+            let matrix = &weights[span.clone()];
+            let mut row_of = 0;
+            let sources = [Some(index - 1), self.layers[index].beside];
+            for source in sources.into_iter().flatten() {
+                let size = self.layers[source].outputs;
+                let part = row_of * width..(row_of + size) * width;
+                let input = Rows::new(&tape.outputs[source], rows, size);
+                if !d_weights.is_empty() {
+                    let d_matrix = &mut d_weights[span.clone()];
+                    multiply(input.transpose(), own, &mut d_matrix[part.clone()], true);
+                }
+                multiply(own, Rows::new(&matrix[part], size, width).transpose(), &mut lower[source], true);
+                row_of += size;
+            }
+            if !d_weights.is_empty() {
+                let bias = span.start + row_of * width..span.end;
+                add_rows(own.values, &mut d_weights[bias]);
+            }
+        }
+        let width = self.layers[0].outputs;
+        if count > 1 {
+            self.activation.pull_back(&tape.outputs[0], &mut adjoints[0]);
+        }
+        let first = Rows::new(&adjoints[0], rows, width);
+        let matrix = &weights[..self.offsets[1]];
+        let groups = tape.codes.len().checked_div(self.code).unwrap_or(1);
+        let mut by_group = vec![0.0f32; groups * width];
+        for (block, sum) in
+            first.values.chunks(tape.rows_per_group.max(1) * width).zip(by_group.chunks_exact_mut(width))
+        {
+            add_rows(block, sum);
+        }
+        let code_part = self.features * width..(self.features + self.code) * width;
+        let by_group = Rows::new(&by_group, groups, width);
+        if !d_weights.is_empty() {
+            let features = Rows::new(&tape.features, rows, self.features);
+            multiply(features.transpose(), first, &mut d_weights[..self.features * width], true);
+            if self.code > 0 {
+                let codes = Rows::new(&tape.codes, groups, self.code);
+                multiply(codes.transpose(), by_group, &mut d_weights[code_part.clone()], true);
+            }
+            add_rows(by_group.values, &mut d_weights[code_part.end..self.offsets[1]]);
+        }
+        if self.code > 0 {
+            multiply(by_group, Rows::new(&matrix[code_part], self.code, width).transpose(), d_codes, true);
+        }
+        if let Some(d_features) = d_features {
+            let of_features = Rows::new(&matrix[..self.features * width], self.features, width);
+            multiply(first, of_features.transpose(), d_features, false);
+        }
+        tape.adjoints = adjoints;
+    }
+}
+
+/// Adds every row to `sum`.
+fn add_rows(rows: &[f32], sum: &mut [f32]) {
+    for row in rows.chunks_exact(sum.len()) {
+        sum.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gradients_of_weights_codes_and_features_equal_finite_differences() {
+        let layers = vec![
+            Layer { outputs: 9, beside: None },
+            Layer { outputs: 6, beside: None },
+            Layer { outputs: 8, beside: Some(0) },
+            Layer { outputs: 3, beside: None },
+        ];
+        let net = DenseNet::new(2, 4, layers, Activation::Squareplus);
+        let mut random = SequentialRandom::new(5);
+        let mut numbers = |count: usize| -> Vec<f32> { (0..count).map(|_| random.next_number() - 0.5).collect() };
+        let (features, codes, adjoint) = (numbers(6 * 2), numbers(3 * 4), numbers(6 * 3));
+        let weights = numbers(net.weight_count());
+        let objective = |weights: &[f32], features: &[f32], codes: &[f32]| -> f64 {
+            let mut tape = Tape::default();
+            net.forward(weights, features, codes, 2, &mut tape);
+            tape.result().iter().zip(&adjoint).map(|(a, b)| f64::from(a * b)).sum()
+        };
+        let mut tape = Tape::default();
+        net.forward(&weights, &features, &codes, 2, &mut tape);
+        let (mut d_weights, mut d_codes, mut d_features) =
+            (vec![0.0; weights.len()], vec![0.0; codes.len()], vec![0.0; features.len()]);
+        net.backward(&weights, &mut tape, &adjoint, &mut d_weights, &mut d_codes, Some(&mut d_features));
+        let step = 1e-2;
+        let check = |values: &[f32], derivative: &[f32], value: &dyn Fn(&[f32]) -> f64| {
+            for index in 0..values.len() {
+                let (mut up, mut down) = (values.to_vec(), values.to_vec());
+                up[index] += step;
+                down[index] -= step;
+                let difference = (value(&up) - value(&down)) / (2.0 * f64::from(step));
+                assert!((difference - f64::from(derivative[index])).abs() < 2e-3, "{index}: {difference}");
+            }
+        };
+        check(&weights, &d_weights, &|weights| objective(weights, &features, &codes));
+        check(&codes, &d_codes, &|codes| objective(&weights, &features, codes));
+        check(&features, &d_features, &|features| objective(&weights, features, &codes));
+    }
+
+    #[test]
+    fn the_papers_conditioner_has_the_papers_size() {
+        assert_eq!(6 * DenseNet::unet(2, 0, 17).weight_count(), 815_430);
+        assert_eq!(6 * DenseNet::unet(2, 16, 17).weight_count(), 840_006);
+    }
+}

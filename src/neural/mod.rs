@@ -1,0 +1,65 @@
+//! The invertible neural model of reflectance, trained and evaluated on the CPU.
+//!
+//! Source: Chen, Nobuhara and Nishino 2020, "Invertible Neural BRDF for Object Inverse Rendering". A normalising flow
+//! carries a density over the three angles of isotropic reflectance to the uniform one; a code of sixteen numbers bends
+//! it from material to material.
+//!
+//! Read [`warp`] first (what the unit cube stands for), then [`architecture`] (what a flow is made of) and [`flow`] (what
+//! it does). Below them are [`spline`], the transform of one coordinate, and [`dense`], the nets that choose it, on
+//! matrix products of [`product`]. [`columns`] is the fast path that training and fitting take, [`pass`] chooses it.
+//! * Training: [`library`] and [`target`] (what is learned), [`batch`] (the gradient of one step), [`train`], [`adam`],
+//!   [`run`] (a sitting, with checkpoints), [`weights`] (the file).
+//! * Use: [`model`] (reflectance from codes and colours, through [`lobes`], read between [`nodes`]), [`fit`] (to a table), [`sampler`] (for a
+//!   path tracer), [`embedding`] (the map of codes), [`speed`].
+//!
+//! What is not claimed: a flow is reciprocal by the folded `phi_difference`, and the compact one has no seam there;
+//! neither keeps energy by construction, so albedo is measured ([`sampler::HalfVectorSampler::albedos`]), not promised.
+//! What ships was learned from "MERL via neural fits", not from MERL.
+
+pub mod adam;
+pub mod architecture;
+pub mod batch;
+pub mod columns;
+pub mod dense;
+pub mod embedding;
+pub mod fit;
+pub mod flow;
+pub mod library;
+pub mod lobes;
+pub mod model;
+pub mod nodes;
+pub mod pass;
+pub mod product;
+pub mod run;
+pub mod sampler;
+pub mod speed;
+pub mod spline;
+pub mod target;
+pub mod train;
+pub mod warp;
+pub mod weights;
+
+pub use model::FlowModel;
+pub use weights::Trained;
+
+/// The weights that ship: the compact flow, trained on all 88 materials of "MERL via neural fits".
+const SHIPPED: &[u8] = include_bytes!("../../assets/ibrdf_compact.safetensors");
+
+/// Reads the weights that ship.
+///
+/// Errors: none unless the program was built with a damaged file.
+pub fn shipped() -> crate::error::Result<Trained> {
+    Trained::parse(SHIPPED)
+}
+
+/// The weights for studies of what a flow does on materials it never saw: trained on 62 of the 88, 80 % of those left
+/// when ten are kept out together ([`weights::Account::left_out`] names them). The paper leaves materials out one by
+/// one, with a training for each: ten at once is harder on the flow, and one training instead of ten.
+const SHIPPED_LEAVE_OUT: &[u8] = include_bytes!("../../assets/ibrdf_compact_80.safetensors");
+
+/// Reads the weights that ship for studies of materials left out.
+///
+/// Errors: none unless the program was built with a damaged file.
+pub fn shipped_leave_out() -> crate::error::Result<Trained> {
+    Trained::parse(SHIPPED_LEAVE_OUT)
+}

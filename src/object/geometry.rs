@@ -1,0 +1,277 @@
+//! What each pixel sees: a normal, the direction to the eye, and which texels of the environment light it.
+
+use crate::error::{Error, ErrorKind, Result};
+use crate::image::Image;
+use crate::math::sphere;
+use crate::scene::{Camera, Mesh};
+use crate::trace::{Bvh, Ray};
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Pixels that see the surface more obliquely than this cosine are left out: models and meshes are worst there.
+pub const LEAST_EYE_COSINE: f32 = 0.08;
+/// Pixels a task; results do not depend on it.
+const CHUNK: usize = 64;
+
+/// What one pixel sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ObjectPixel {
+    /// Row in the photo.
+    pub row: u32,
+    /// Column in the photo.
+    pub column: u32,
+    /// Unit shading normal in the world.
+    pub normal: Vec3,
+    /// Unit direction to the eye in the world.
+    pub to_eye: Vec3,
+    /// Where shadow rays start, in the world; only with a mesh.
+    pub origin: Vec3,
+    /// Unit geometric normal on the side of the eye.
+    pub geometric_normal: Vec3,
+}
+
+/// The pixels of one photo that show the object, and the mesh that shadows them.
+#[derive(Clone, Debug)]
+pub struct ObjectGeometry {
+    /// Width of the photo in pixels.
+    pub width: usize,
+    /// Height of the photo in pixels.
+    pub height: usize,
+    /// The pixels, in row-major order.
+    pub pixels: Vec<ObjectPixel>,
+    /// The mesh for shadow rays; `None` for a convex object, which shadows nothing but its own back.
+    pub bvh: Option<Arc<Bvh>>,
+}
+
+impl ObjectGeometry {
+    /// A sphere seen from infinitely far along -z, with +y up: the set-up of the paper's experiments.
+    ///
+    /// The centre lies in the middle of the photo; `radius_pixels` is usually half its shorter side.
+    pub fn sphere(width: usize, height: usize, radius_pixels: f32) -> Self {
+        let centre = Vec2::new(0.5 * width as f32, 0.5 * height as f32);
+        let mut pixels = Vec::new();
+        for row in 0..height {
+            for column in 0..width {
+                let place = (Vec2::new(column as f32 + 0.5, row as f32 + 0.5) - centre) / radius_pixels;
+                let squared = place.length_squared();
+                if squared >= 1.0 {
+                    continue;
+                }
+                let normal = Vec3::new(place.x, -place.y, (1.0 - squared).sqrt());
+                if normal.z >= LEAST_EYE_COSINE {
+                    pixels.push(ObjectPixel {
+                        row: row as u32,
+                        column: column as u32,
+                        normal,
+                        to_eye: Vec3::Z,
+                        origin: normal,
+                        geometric_normal: normal,
+                    });
+                }
+            }
+        }
+        ObjectGeometry { width, height, pixels, bvh: None }
+    }
+
+    /// The pixels of a camera whose centre and four corners all meet the mesh: a pixel across the outline mixes.
+    ///
+    /// # Errors
+    /// Those of [`Mesh::validate`], [`Camera::validate`] and [`Bvh::build`].
+    pub fn of_mesh(mesh: &Mesh, camera: &Camera) -> Result<Self> {
+        mesh.validate()?;
+        camera.validate(1e-2)?;
+        let bvh = Arc::new(Bvh::build(&mesh.positions, &mesh.triangles)?);
+        Ok(Self::of_mesh_with(mesh, bvh, camera))
+    }
+
+    /// [`ObjectGeometry::of_mesh`] with the hierarchy at hand; mesh and camera are valid.
+    pub fn of_mesh_with(mesh: &Mesh, bvh: Arc<Bvh>, camera: &Camera) -> Self {
+        let with_normals;
+        let mesh = if mesh.normals.len() == mesh.positions.len() {
+            mesh
+        } else {
+            with_normals = {
+                let mut copy = mesh.clone();
+                copy.compute_normals();
+                copy
+            };
+            &with_normals
+        };
+        let rows: Vec<Vec<ObjectPixel>> = (0..camera.height)
+            .into_par_iter()
+            .map(|row| (0..camera.width).filter_map(|column| seen(mesh, &bvh, camera, row, column)).collect())
+            .collect();
+        ObjectGeometry {
+            width: camera.width,
+            height: camera.height,
+            pixels: rows.into_iter().flatten().collect(),
+            bvh: Some(bvh),
+        }
+    }
+
+    /// Pixels of given normals (unit length or zero for none, in the world), all seen along one direction.
+    ///
+    /// # Errors
+    /// `NonFinite` when a normal is not finite.
+    pub fn of_normals(normals: &Image<Vec3>, to_eye: Vec3) -> Result<Self> {
+        let to_eye = to_eye.try_normalize().unwrap_or(Vec3::Z);
+        let mut pixels = Vec::new();
+        for row in 0..normals.height() {
+            for column in 0..normals.width() {
+                let normal = normals[(row, column)];
+                if !normal.is_finite() {
+                    let message = format!("the normal at row {row} column {column} is not finite");
+                    return Err(Error::new(ErrorKind::NonFinite, message).remedy("export the normals again"));
+                }
+                let Some(normal) = normal.try_normalize() else { continue };
+                if normal.dot(to_eye) >= LEAST_EYE_COSINE {
+                    let (row, column) = (row as u32, column as u32);
+                    pixels.push(ObjectPixel { row, column, normal, to_eye, origin: normal, geometric_normal: normal });
+                }
+            }
+        }
+        Ok(ObjectGeometry { width: normals.width(), height: normals.height(), pixels, bvh: None })
+    }
+
+    /// Which texels of a `width x height` environment are seen from each of `pixels`; `None` when nothing shadows.
+    pub fn visibility(&self, pixels: &[ObjectPixel], width: usize, height: usize) -> Option<Visibility> {
+        let bvh = self.bvh.as_ref()?;
+        let directions: Vec<Vec3> = (0..width * height)
+            .map(|texel| sphere::direction_of_texel(texel / width, texel % width, width, height))
+            .collect();
+        let words = directions.len().div_ceil(64);
+        let mut bits = vec![0u64; words * pixels.len()];
+        bits.par_chunks_mut(words * CHUNK).zip(pixels.par_chunks(CHUNK)).for_each(|(bits, pixels)| {
+            for (bits, pixel) in bits.chunks_mut(words).zip(pixels) {
+                for (texel, &direction) in directions.iter().enumerate() {
+                    if pixel.normal.dot(direction) <= 0.0 || pixel.geometric_normal.dot(direction) <= 0.0 {
+                        continue;
+                    }
+                    let origin = bvh.offset_origin(pixel.origin, pixel.geometric_normal, direction);
+                    if !bvh.is_occluded(&Ray { origin, direction, t_max: f32::INFINITY }) {
+                        bits[texel / 64] |= 1 << (texel % 64);
+                    }
+                }
+            }
+        });
+        Some(Visibility { words, bits })
+    }
+}
+
+fn seen(mesh: &Mesh, bvh: &Bvh, camera: &Camera, row: usize, column: usize) -> Option<ObjectPixel> {
+    let corner = Vec2::new(column as f32, row as f32);
+    let ray = camera.ray_through(corner + Vec2::splat(0.5));
+    let hit = bvh.closest_hit(&ray)?;
+    for offset in [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE] {
+        bvh.closest_hit(&camera.ray_through(corner + offset))?;
+    }
+    let triangle = mesh.triangles[hit.triangle as usize].map(|vertex| vertex as usize);
+    let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
+    let blend = |values: &[Vec3]| (0..3).map(|corner| values[triangle[corner]] * weights[corner]).sum::<Vec3>();
+    let to_eye = -ray.direction;
+    let facing = |normal: Vec3| if normal.dot(to_eye) < 0.0 { -normal } else { normal };
+    let geometric_normal = facing(mesh.area_vector(hit.triangle as usize).try_normalize()?);
+    let shading = blend(&mesh.normals).try_normalize().unwrap_or(geometric_normal);
+    let normal = if shading.dot(geometric_normal) < 0.0 { -shading } else { shading };
+    (normal.dot(to_eye) >= LEAST_EYE_COSINE).then(|| ObjectPixel {
+        row: row as u32,
+        column: column as u32,
+        normal,
+        to_eye,
+        origin: blend(&mesh.positions),
+        geometric_normal,
+    })
+}
+
+/// One bit a pixel and texel: whether light arrives.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Visibility {
+    words: usize,
+    bits: Vec<u64>,
+}
+
+impl Visibility {
+    /// Whether light from a texel arrives at a pixel, both by their index at making.
+    #[inline]
+    pub fn is_visible(&self, pixel: usize, texel: usize) -> bool {
+        self.bits[pixel * self.words + texel / 64] >> (texel % 64) & 1 == 1
+    }
+
+    /// The rows of some pixels, in their order.
+    pub fn of(&self, pixels: &[usize]) -> Self {
+        let rows = pixels.iter().flat_map(|&pixel| &self.bits[pixel * self.words..(pixel + 1) * self.words]);
+        Visibility { words: self.words, bits: rows.copied().collect() }
+    }
+
+    /// Joins the rows of several photos of the same environment size.
+    pub fn joined(parts: Vec<Visibility>) -> Option<Self> {
+        let words = parts.first()?.words;
+        Some(Visibility { words, bits: parts.into_iter().flat_map(|part| part.bits).collect() })
+    }
+
+    /// All texels seen from all pixels: for photos without a mesh beside photos with one.
+    pub fn open(pixels: usize, texels: usize) -> Self {
+        let words = texels.div_ceil(64);
+        Visibility { words, bits: vec![u64::MAX; words * pixels] }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A floor of two triangles and a wall at x = 1 that hides the light from +x.
+    fn corner() -> Mesh {
+        let positions = vec![
+            Vec3::new(-4.0, 0.0, -4.0),
+            Vec3::new(1.0, 0.0, -4.0),
+            Vec3::new(1.0, 0.0, 4.0),
+            Vec3::new(-4.0, 0.0, 4.0),
+            Vec3::new(1.0, 50.0, -4.0),
+            Vec3::new(1.0, 50.0, 4.0),
+            Vec3::new(1.0, 0.0, -4.0),
+            Vec3::new(1.0, 0.0, 4.0),
+        ];
+        Mesh { positions, triangles: vec![[0, 2, 1], [0, 3, 2], [6, 7, 5], [6, 5, 4]], ..Default::default() }
+    }
+
+    #[test]
+    fn a_wall_hides_the_light_behind_it_and_nothing_else() {
+        let mesh = corner();
+        let camera = Camera::looking_at(Vec3::new(-1.0, 6.0, 0.0), Vec3::new(-0.9, 0.0, 0.0), 9, 9, 0.2);
+        let geometry = ObjectGeometry::of_mesh(&mesh, &camera).unwrap();
+        assert_eq!(geometry.pixels.len(), 81);
+        assert!(geometry.pixels.iter().all(|pixel| pixel.normal.y > 0.99 && pixel.to_eye.y > 0.9));
+        let (width, height) = (32, 16);
+        let visibility = geometry.visibility(&geometry.pixels, width, height).unwrap();
+        let mut counts = [0, 0];
+        for texel in 0..width * height {
+            let direction = sphere::direction_of_texel(texel / width, texel % width, width, height);
+            if direction.y <= 0.0 {
+                assert!(!visibility.is_visible(40, texel));
+                continue;
+            }
+            // The wall spans z in -4..4 and rises to 50 at distance 2.
+            let expected = {
+                let t = (1.0 - geometry.pixels[40].origin.x) / direction.x;
+                let hit = geometry.pixels[40].origin + t * direction;
+                !(direction.x > 0.0 && hit.z.abs() < 4.0 && hit.y < 50.0)
+            };
+            assert_eq!(visibility.is_visible(40, texel), expected, "{direction}");
+            counts[usize::from(expected)] += 1;
+        }
+        assert!(counts[0] > 20 && counts[1] > 100, "{counts:?}");
+    }
+
+    #[test]
+    fn a_sphere_shows_its_front_with_up_at_the_top() {
+        let geometry = ObjectGeometry::sphere(64, 64, 32.0);
+        assert!(geometry.bvh.is_none());
+        let share = geometry.pixels.len() as f32 / 4096.0;
+        assert!((share - std::f32::consts::FRAC_PI_4).abs() < 0.02, "{share}");
+        let first = geometry.pixels[0];
+        assert!(first.normal.y > 0.9 && first.row < 3);
+        assert!(geometry.pixels.iter().all(|pixel| (pixel.normal.length() - 1.0).abs() < 1e-5));
+    }
+}

@@ -1,0 +1,285 @@
+//! The points of half and difference space at which a reflectance is tabulated for one fit.
+//!
+//! A model with a network behind it costs thousands of multiplications a value, and an image asks for millions of
+//! values; between a few thousand nodes that lie close where highlights are, the value is linear.
+
+use crate::measured::coordinates::HalfDifference;
+use crate::measured::model::ReflectanceModel;
+use glam::Vec3;
+use std::f32::consts::{FRAC_PI_2, PI};
+
+/// A node whose directions would lie below the surface stands for the one above it at this share of the way.
+const SHARE_OF_HORIZON: f64 = 0.985;
+
+/// A grid over half and difference angles, fine near the mirror direction.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NodeGrid {
+    counts: [usize; 3],
+    points: Vec<HalfDifference>,
+}
+
+/// Where a pair of directions lies in the grid: the first node of its cell, and how far to the next along each axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NodePlace {
+    /// Index of the cell's first node.
+    pub cell: u16,
+    /// Fractions along the half, the difference and the azimuth axis, in [0, 1].
+    pub fraction: [f32; 3],
+}
+
+impl NodeGrid {
+    /// A grid of so many nodes along theta_half, theta_difference and phi_difference; at least 3, 3 and 2, and at most
+    /// 65 536 in all (counts are lowered until they fit).
+    pub fn new(counts: [usize; 3]) -> Self {
+        let mut counts = [counts[0].max(3), counts[1].max(3), counts[2].max(2)];
+        while counts.iter().product::<usize>() > 1 << 16 {
+            counts = counts.map(|count| (count * 15 / 16).max(3));
+        }
+        let mut points = Vec::with_capacity(counts.iter().product());
+        for half in 0..counts[0] {
+            for difference in 0..counts[1] {
+                for azimuth in 0..counts[2] {
+                    let theta_half = f64::from(half_angle(half as f32 / (counts[0] - 1) as f32));
+                    let theta_difference = f64::from(difference_angle(difference as f32 / (counts[1] - 1) as f32));
+                    let phi_difference = std::f64::consts::PI * azimuth as f64 / counts[2] as f64;
+                    points.push(above_surface(HalfDifference { theta_half, theta_difference, phi_difference }));
+                }
+            }
+        }
+        NodeGrid { counts, points }
+    }
+
+    /// The grid of a careful fit: 17 280 nodes.
+    pub fn fine() -> Self {
+        Self::new([48, 24, 15])
+    }
+
+    /// A grid for quick looks: 3 360 nodes.
+    pub fn coarse() -> Self {
+        Self::new([28, 15, 8])
+    }
+
+    /// Number of nodes.
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Whether there is none; never so.
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// Where each node lies.
+    pub fn points(&self) -> &[HalfDifference] {
+        &self.points
+    }
+
+    /// The cell of three angles in radians.
+    #[inline]
+    pub fn place(&self, theta_half: f32, theta_difference: f32, phi_difference: f32) -> NodePlace {
+        let along = |place: f32, last: usize| {
+            let place = place.clamp(0.0, 1.0) * last as f32;
+            let cell = (place as usize).min(last - 1);
+            (cell, place - cell as f32)
+        };
+        let (half, half_fraction) = along(half_coordinate(theta_half), self.counts[0] - 1);
+        let (difference, difference_fraction) = along(difference_coordinate(theta_difference), self.counts[1] - 1);
+        let around = phi_difference * (self.counts[2] as f32 / PI);
+        let azimuth = (around as usize).min(self.counts[2] - 1);
+        NodePlace {
+            cell: ((half * self.counts[1] + difference) * self.counts[2] + azimuth) as u16,
+            fraction: [half_fraction, difference_fraction, (around - azimuth as f32).clamp(0.0, 1.0)],
+        }
+    }
+
+    /// The eight nodes of a cell, in the order of [`weights`].
+    #[inline]
+    pub fn corners(&self, cell: u16) -> [usize; 8] {
+        let cell = usize::from(cell);
+        let [_, differences, azimuths] = self.counts;
+        // The azimuth is periodic: reciprocity makes phi and phi + pi one.
+        let next = if cell % azimuths + 1 == azimuths { cell + 1 - azimuths } else { cell + 1 };
+        let (down, across) = (differences * azimuths, azimuths);
+        [cell, next, cell + across, next + across, cell + down, next + down, cell + down + across, next + down + across]
+    }
+
+    /// The values of a model at all nodes. What is negative or not finite becomes 0, the latter counted.
+    pub fn tabulate(&self, model: &dyn ReflectanceModel, parameters: &[f64]) -> NodeTable {
+        let mut values = vec![[0.0; 3]; self.len()];
+        model.evaluate(parameters, &self.points, &mut values);
+        let mut not_finite = 0;
+        let values = values
+            .into_iter()
+            .map(|value| {
+                value.map(|channel| {
+                    let is_finite = channel.is_finite() && channel < 1e12;
+                    not_finite += usize::from(!is_finite);
+                    if is_finite { channel.max(0.0) as f32 } else { 0.0 }
+                })
+            })
+            .collect();
+        NodeTable { values, not_finite }
+    }
+
+    /// The gradient by a model's parameters, of the gradient by the node values.
+    ///
+    /// The model is asked once: one with a net behind it goes back through it once, not chunk by chunk.
+    pub fn pull_back(&self, model: &dyn ReflectanceModel, parameters: &[f64], adjoint: &[[f64; 3]]) -> Vec<f64> {
+        let touched = |channels: &[f64; 3]| channels.iter().any(|value| *value != 0.0);
+        let (points, adjoint): (Vec<HalfDifference>, Vec<[f64; 3]>) =
+            self.points.iter().zip(adjoint).filter(|(_, channels)| touched(channels)).unzip();
+        let mut gradient = vec![0.0; parameters.len()];
+        if !points.is_empty() {
+            model.pull_back(parameters, &points, &adjoint, &mut gradient);
+        }
+        gradient
+    }
+}
+
+/// Values of a reflectance at the nodes of a grid, in 1/sr.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NodeTable {
+    /// One RGB value a node.
+    pub values: Vec<[f32; 3]>,
+    /// How many values of the model were not finite and count as 0.
+    pub not_finite: usize,
+}
+
+impl NodeTable {
+    /// A reflectance of one value at all nodes.
+    pub fn constant(grid: &NodeGrid, value: [f32; 3]) -> Self {
+        NodeTable { values: vec![value; grid.len()], not_finite: 0 }
+    }
+
+    /// The table times a factor per channel.
+    pub fn scaled(&self, factor: [f64; 3]) -> Self {
+        let scale = |value: &[f32; 3]| [0, 1, 2].map(|c| (f64::from(value[c]) * factor[c]) as f32);
+        NodeTable { values: self.values.iter().map(scale).collect(), not_finite: self.not_finite }
+    }
+}
+
+/// The trilinear weights of a cell's eight corners.
+#[inline]
+pub fn weights(fraction: [f32; 3]) -> [f32; 8] {
+    let [half, difference, azimuth] = fraction;
+    let (low, high) = ((1.0 - half) * (1.0 - difference), (1.0 - half) * difference);
+    let (low_far, high_far) = (half * (1.0 - difference), half * difference);
+    let rest = 1.0 - azimuth;
+    [
+        low * rest,
+        low * azimuth,
+        high * rest,
+        high * azimuth,
+        low_far * rest,
+        low_far * azimuth,
+        high_far * rest,
+        high_far * azimuth,
+    ]
+}
+
+/// theta_half at a place in [0, 1] along its axis: squared, as the tables of MERL are.
+fn half_angle(place: f32) -> f32 {
+    FRAC_PI_2 * place * place
+}
+
+fn half_coordinate(angle: f32) -> f32 {
+    (angle.max(0.0) / FRAC_PI_2).sqrt()
+}
+
+/// theta_difference at a place in [0, 1]: closer towards grazing, where Fresnel's term rises.
+fn difference_angle(place: f32) -> f32 {
+    FRAC_PI_2 * (1.0 - (1.0 - place) * (1.0 - 0.35 * place))
+}
+
+fn difference_coordinate(angle: f32) -> f32 {
+    // The inverse of `difference_angle`: 1 - a = (1 - p)(1 - 0.35 p), a quadratic in p.
+    let remaining = 1.0 - (angle / FRAC_PI_2).clamp(0.0, 1.0);
+    (1.35 - (1.35f32 * 1.35 - 1.4 * (1.0 - remaining)).max(0.0).sqrt()) / 0.7
+}
+
+/// Lowers theta_difference until both directions lie above the surface.
+fn above_surface(point: HalfDifference) -> HalfDifference {
+    let steep = point.theta_half.tan() * point.phi_difference.cos().abs();
+    let limit = if steep > 1e-12 { (1.0 / steep).atan() } else { std::f64::consts::FRAC_PI_2 };
+    HalfDifference { theta_difference: point.theta_difference.min(SHARE_OF_HORIZON * limit), ..point }
+}
+
+/// Half and difference angles of a pair of unit directions at a unit normal, without a frame, in `f32`.
+#[inline]
+pub fn angles(normal: Vec3, to_light: Vec3, to_eye: Vec3) -> (f32, f32, f32) {
+    let sum = to_light + to_eye;
+    let half = sum * (sum.length_squared().max(1e-20)).sqrt().recip();
+    let (half_cosine, light_cosine) = (half.dot(normal), to_light.dot(half));
+    let across = normal.cross(half);
+    let half_sine = across.length();
+    let theta_half = half_sine.atan2(half_cosine).clamp(0.0, FRAC_PI_2);
+    // Half of the angle between the two directions, from their difference: exact near 0.
+    let theta_difference = (0.5 * (to_light - to_eye).length()).atan2(light_cosine.max(0.0)).clamp(0.0, FRAC_PI_2);
+    // Tangent and bitangent of the half vector, both times the sine of theta_half.
+    let (x, y) = (light_cosine * half_cosine - to_light.dot(normal), to_light.dot(across));
+    let azimuth = y.atan2(x);
+    let folded = if azimuth < 0.0 { azimuth + PI } else { azimuth };
+    (theta_half, theta_difference, if folded >= PI { 0.0 } else { folded })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::SequentialRandom;
+    use glam::DVec3;
+
+    fn direction(random: &mut SequentialRandom) -> DVec3 {
+        let z = f64::from(random.next_number());
+        let phi = std::f64::consts::TAU * f64::from(random.next_number());
+        let r = (1.0 - z * z).sqrt();
+        DVec3::new(r * phi.cos(), r * phi.sin(), z)
+    }
+
+    #[test]
+    fn angles_without_a_frame_are_those_of_the_frame() {
+        let mut random = SequentialRandom::new(3);
+        for _ in 0..20_000 {
+            let (light, eye) = (direction(&mut random), direction(&mut random));
+            let exact = HalfDifference::from_directions(light, eye);
+            let (half, difference, azimuth) = angles(Vec3::Z, light.as_vec3(), eye.as_vec3());
+            assert!((f64::from(half) - exact.theta_half).abs() < 3e-6);
+            assert!((f64::from(difference) - exact.theta_difference).abs() < 3e-6);
+            let apart = (f64::from(azimuth) - exact.phi_difference).abs();
+            let around =
+                apart.min(std::f64::consts::PI - apart) * exact.theta_half.sin() * exact.theta_difference.sin();
+            assert!(around < 1e-5, "{azimuth} {exact:?}");
+        }
+    }
+
+    #[test]
+    fn places_invert_the_axes_and_weights_sum_to_one() {
+        let grid = NodeGrid::new([9, 7, 6]);
+        for place in 0..=20 {
+            let place = place as f32 / 20.0;
+            assert!((half_coordinate(half_angle(place)) - place).abs() < 1e-5);
+            assert!((difference_coordinate(difference_angle(place)) - place).abs() < 2e-4, "{place}");
+        }
+        for (node, point) in grid.points().iter().enumerate() {
+            let (light, eye) = point.directions();
+            assert!(light.z > 0.0 && eye.z > 0.0 || point.theta_half > 1.57, "{point:?}");
+            // A node that was not lowered is found at itself.
+            let place =
+                grid.place(point.theta_half as f32, point.theta_difference as f32, point.phi_difference as f32 + 1e-6);
+            let (corners, weights) = (grid.corners(place.cell), weights(place.fraction));
+            assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-5);
+            let own: f32 = (0..8).filter(|&k| corners[k] == node).map(|k| weights[k]).sum();
+            let index = node / 6 % 7;
+            let raised = f64::from(difference_angle(index as f32 / 6.0)) > point.theta_difference + 1e-6;
+            assert!(raised || own > 0.99, "{point:?}: {own}");
+        }
+    }
+
+    #[test]
+    fn the_azimuth_is_periodic() {
+        let grid = NodeGrid::new([5, 5, 8]);
+        let place = grid.place(0.3, 0.6, PI - 1e-4);
+        let corners = grid.corners(place.cell);
+        assert_eq!(corners[1] % 8, 0);
+        assert!(grid.corners((grid.len() - 1) as u16 - 40 - 8).iter().all(|&corner| corner < grid.len()));
+    }
+}

@@ -1,0 +1,139 @@
+//! Whole pictures of an object under any light: re-renders, relit pictures, and the inputs of studies.
+//!
+//! Nothing is stored between pixels, so a picture may have any size. [`render`] uses the nodes of a fit; [`render_exact`]
+//! asks the reflectance itself at every part of every texel, and is what studies photograph with.
+
+use super::geometry::{ObjectGeometry, Visibility};
+use super::nodes::{NodeGrid, NodeTable, weights};
+use super::transport::TexelDirections;
+use crate::image::{Image, RgbImage};
+use crate::light::Environment;
+use crate::measured::coordinates::HalfDifference;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// Pixels a task.
+const CHUNK: usize = 32;
+
+/// Pictures of an object under several lights of the same size; black where the object is not.
+pub fn render(
+    geometry: &ObjectGeometry,
+    visibility: Option<&Visibility>,
+    directions: &TexelDirections,
+    grid: &NodeGrid,
+    table: &NodeTable,
+    lights: &[&Environment],
+) -> Vec<RgbImage> {
+    let parts: Vec<Vec<Vec3>> = geometry
+        .pixels
+        .par_chunks(CHUNK)
+        .enumerate()
+        .map(|(chunk, pixels)| {
+            let mut values = Vec::with_capacity(pixels.len() * lights.len());
+            for (offset, pixel) in pixels.iter().enumerate() {
+                let mut sums = vec![DVec3::ZERO; lights.len()];
+                let is_visible =
+                    |texel: usize| visibility.is_none_or(|bits| bits.is_visible(chunk * CHUNK + offset, texel));
+                directions.for_each_part(pixel, is_visible, |texel, weight, (half, difference, azimuth)| {
+                    let place = grid.place(half, difference, azimuth);
+                    let mut value = Vec3::ZERO;
+                    for (corner, share) in grid.corners(place.cell).into_iter().zip(weights(place.fraction)) {
+                        value += Vec3::from_array(table.values[corner]) * share;
+                    }
+                    for (sum, light) in sums.iter_mut().zip(lights) {
+                        *sum += (value * light.radiance.pixels()[texel] * weight).as_dvec3();
+                    }
+                });
+                values.extend(sums.iter().map(|sum| sum.as_vec3()));
+            }
+            values
+        })
+        .collect();
+    let values: Vec<Vec3> = parts.into_iter().flatten().collect();
+    (0..lights.len())
+        .map(|light| picture_of(geometry, values.iter().skip(light).step_by(lights.len().max(1)).copied()))
+        .collect()
+}
+
+/// Writes the reflectance at many places, in 1/sr.
+pub type ReflectanceAt<'a> = dyn Fn(&[HalfDifference], &mut [[f64; 3]]) + Sync + 'a;
+
+/// Pictures under several lights of a reflectance that is asked itself at every part of every texel, once for all
+/// lights.
+pub fn render_exact(
+    geometry: &ObjectGeometry,
+    visibility: Option<&Visibility>,
+    directions: &TexelDirections,
+    evaluate: &ReflectanceAt,
+    lights: &[&Environment],
+) -> Vec<RgbImage> {
+    let parts: Vec<Vec<Vec3>> = geometry
+        .pixels
+        .par_chunks(CHUNK)
+        .enumerate()
+        .map(|(chunk, pixels)| {
+            let (mut at, mut places, mut values) = (Vec::new(), Vec::new(), Vec::new());
+            let mut results = Vec::with_capacity(pixels.len() * lights.len());
+            for (offset, pixel) in pixels.iter().enumerate() {
+                at.clear();
+                places.clear();
+                let is_visible =
+                    |texel: usize| visibility.is_none_or(|bits| bits.is_visible(chunk * CHUNK + offset, texel));
+                directions.for_each_part(pixel, is_visible, |texel, weight, (half, difference, azimuth)| {
+                    at.push(HalfDifference {
+                        theta_half: f64::from(half),
+                        theta_difference: f64::from(difference),
+                        phi_difference: f64::from(azimuth),
+                    });
+                    places.push((texel, f64::from(weight)));
+                });
+                values.clear();
+                values.resize(at.len(), [0.0; 3]);
+                evaluate(&at, &mut values);
+                for light in lights {
+                    let radiance = light.radiance.pixels();
+                    let sum: DVec3 = values
+                        .iter()
+                        .zip(&places)
+                        .map(|(value, &(texel, weight))| {
+                            DVec3::from_array(*value) * radiance[texel].as_dvec3() * weight
+                        })
+                        .sum();
+                    results.push(sum.as_vec3());
+                }
+            }
+            results
+        })
+        .collect();
+    let values: Vec<Vec3> = parts.into_iter().flatten().collect();
+    (0..lights.len())
+        .map(|light| picture_of(geometry, values.iter().skip(light).step_by(lights.len().max(1)).copied()))
+        .collect()
+}
+
+fn picture_of(geometry: &ObjectGeometry, values: impl Iterator<Item = Vec3>) -> RgbImage {
+    let mut picture = Image::filled(geometry.width, geometry.height, Vec3::ZERO);
+    for (pixel, value) in geometry.pixels.iter().zip(values) {
+        picture[(pixel.row as usize, pixel.column as usize)] = value;
+    }
+    picture
+}
+
+/// Root mean square of the logarithm of one picture over another, over the pixels of an object: as they are, and after
+/// the best factor per channel. `epsilon` is added to both.
+pub fn log_errors(geometry: &ObjectGeometry, picture: &RgbImage, truth: &RgbImage, epsilon: f32) -> (f64, f64) {
+    let mut sums = [(0.0f64, 0.0f64); 3];
+    for pixel in &geometry.pixels {
+        let place = (pixel.row as usize, pixel.column as usize);
+        for (channel, sums) in sums.iter_mut().enumerate() {
+            let log = |image: &RgbImage| f64::from((image[place][channel].max(0.0) + epsilon).ln());
+            let difference = log(picture) - log(truth);
+            sums.0 += difference;
+            sums.1 += difference * difference;
+        }
+    }
+    let count = geometry.pixels.len().max(1) as f64;
+    let raw = sums.iter().map(|sums| sums.1).sum::<f64>() / (3.0 * count);
+    let aligned = sums.iter().map(|sums| sums.1 - sums.0 * sums.0 / count).sum::<f64>() / (3.0 * count);
+    (raw.sqrt(), aligned.max(0.0).sqrt())
+}

@@ -1,0 +1,134 @@
+//! From files to views: photo, mesh, camera, mask.
+
+use super::geometry::ObjectGeometry;
+use super::observations::ObjectView;
+use super::photo::ObjectPhoto;
+use crate::error::{Error, ErrorKind, Finding, Place, Result};
+use crate::image::file;
+use crate::scene::read::source::SourceCamera;
+use crate::scene::read::world::{up_in_source, world_from_source};
+use crate::scene::read::{camera_file, mesh_file};
+use crate::scene::settings::{PixelCentre, Up};
+use crate::trace::Bvh;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The files of an estimation.
+#[derive(Clone, Debug, Default)]
+pub struct ObjectFiles {
+    /// Photos, at least one.
+    pub photos: Vec<PathBuf>,
+    /// One mask a photo, or none at all: 0.5 and above is object.
+    pub masks: Vec<PathBuf>,
+    /// The mesh; `None` for a sphere seen from infinitely far.
+    pub mesh: Option<PathBuf>,
+    /// `cameras.json`, or one BlendedMVS camera file a photo.
+    pub cameras: Vec<PathBuf>,
+    /// Which axis of mesh and cameras points up.
+    pub up: Up,
+    /// Where the source puts pixel centres; `Auto` is by the kind of the camera file.
+    pub pixel_centre: PixelCentre,
+}
+
+/// Reads photos and what they show.
+///
+/// # Errors
+/// Anything missing, damaged or contradictory, with place and remedy.
+pub fn read_views(files: &ObjectFiles) -> Result<(Vec<ObjectView>, Vec<Finding>)> {
+    let wrong = |setting: &str, message: String| {
+        Error::new(ErrorKind::InvalidSetting, message).at(Place::Setting(setting.into()))
+    };
+    if !files.masks.is_empty() && files.masks.len() != files.photos.len() {
+        let message = format!("{} masks for {} photos", files.masks.len(), files.photos.len());
+        return Err(wrong("mask", message).remedy("give one mask a photo, in the same order, or none"));
+    }
+    let mut findings = Vec::new();
+    let mut photos = Vec::new();
+    for (index, path) in files.photos.iter().enumerate() {
+        let (mut photo, mut noticed) = ObjectPhoto::read(path)?;
+        findings.append(&mut noticed);
+        if let Some(mask) = files.masks.get(index) {
+            photo.apply_mask(&file::read_grey(mask)?, Place::File(mask.clone()))?;
+        }
+        photos.push(photo);
+    }
+    let geometries = match &files.mesh {
+        None => photos
+            .iter()
+            .map(|photo| {
+                let (width, height) = (photo.radiance.width(), photo.radiance.height());
+                ObjectGeometry::sphere(width, height, 0.5 * width.min(height) as f32)
+            })
+            .collect(),
+        Some(mesh) => geometries_of_mesh(files, mesh, &photos, &mut findings)?,
+    };
+    let views = photos.into_iter().zip(geometries).map(|(photo, geometry)| ObjectView::new(photo, geometry));
+    Ok((views.collect::<Result<Vec<_>>>()?, findings))
+}
+
+fn geometries_of_mesh(
+    files: &ObjectFiles,
+    mesh: &Path,
+    photos: &[ObjectPhoto],
+    findings: &mut Vec<Finding>,
+) -> Result<Vec<ObjectGeometry>> {
+    let (cameras, default_centre) = source_cameras(files, findings)?;
+    let source = mesh_file::read_pieces(&[mesh.to_path_buf()])?;
+    let (up, mut noticed) = up_in_source(files.up, &cameras)?;
+    findings.append(&mut noticed);
+    let world = world_from_source(up, source.bounds());
+    let (mut mesh, mut noticed) = source.into_world(&world);
+    findings.append(&mut noticed);
+    mesh.validate()?;
+    if mesh.normals.len() != mesh.positions.len() {
+        mesh.compute_normals();
+    }
+    let bvh = Arc::new(Bvh::build(&mesh.positions, &mesh.triangles)?);
+    let centre = if files.pixel_centre == PixelCentre::Auto { default_centre } else { files.pixel_centre };
+    cameras
+        .iter()
+        .zip(photos)
+        .map(|(camera, photo)| {
+            let size = (photo.radiance.width(), photo.radiance.height());
+            let camera = camera.in_world(&world, size, centre.shift_pixels());
+            camera.validate(1e-2)?;
+            Ok(ObjectGeometry::of_mesh_with(&mesh, Arc::clone(&bvh), &camera))
+        })
+        .collect()
+}
+
+/// The camera of each photo, and where its kind of file puts pixel centres.
+fn source_cameras(files: &ObjectFiles, findings: &mut Vec<Finding>) -> Result<(Vec<SourceCamera>, PixelCentre)> {
+    let missing = |message: String| {
+        Error::new(ErrorKind::Missing, message)
+            .at(Place::Setting("camera".into()))
+            .remedy("give cameras.json, or one BlendedMVS camera file a photo, in the same order")
+    };
+    let Some(first) = files.cameras.first() else {
+        return Err(missing("a mesh needs a camera".into()));
+    };
+    if first.extension().is_some_and(|extension| extension == "json") {
+        let (listed, mut noticed) = camera_file::read_cameras_json(first)?;
+        findings.append(&mut noticed);
+        let cameras = files.photos.iter().map(|photo| {
+            let stem = photo.file_stem();
+            let only = if listed.len() == 1 && files.photos.len() == 1 { listed.first() } else { None };
+            let found = listed.iter().find(|view| view.file.file_stem() == stem).or(only);
+            found
+                .map(|view| view.camera)
+                .ok_or_else(|| missing(format!("{} has no camera for {}", first.display(), photo.display())))
+        });
+        return Ok((cameras.collect::<Result<Vec<_>>>()?, PixelCentre::Half));
+    }
+    if files.cameras.len() != files.photos.len() {
+        return Err(missing(format!("{} cameras for {} photos", files.cameras.len(), files.photos.len())));
+    }
+    let mut cameras = Vec::new();
+    for path in &files.cameras {
+        let (camera, mut noticed) = camera_file::read_cam_txt(path)?;
+        findings.append(&mut noticed);
+        cameras.push(camera);
+    }
+    // The centres of BlendedMVS lie at whole numbers in the scenes that were measured.
+    Ok((cameras, PixelCentre::Integer))
+}

@@ -1,0 +1,176 @@
+//! The step on the reflectance while the light is held: quasi-Newton on the parameters of any model.
+
+use super::likelihood::Likelihood;
+use super::matrices::NodeMatrix;
+use super::nodes::NodeGrid;
+use crate::measured::model::ReflectanceModel;
+use std::collections::VecDeque;
+
+/// Pairs of steps and slopes that are remembered.
+const MEMORY: usize = 12;
+/// Halvings of a step before it is given up.
+const HALVINGS: usize = 8;
+
+/// A pull on the parameters: the code prior of the paper is `weight * |z|^2` on the codes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ParameterPrior {
+    /// One weight a parameter; 0 for those that are free.
+    pub weight: Vec<f64>,
+    /// Where each is pulled to.
+    pub centre: Vec<f64>,
+}
+
+impl ParameterPrior {
+    /// No pull at all.
+    pub fn none(count: usize) -> Self {
+        ParameterPrior { weight: vec![0.0; count], centre: vec![0.0; count] }
+    }
+
+    /// The penalty.
+    pub fn energy(&self, parameters: &[f64]) -> f64 {
+        (0..parameters.len()).map(|i| self.weight[i] * (parameters[i] - self.centre[i]).powi(2)).sum()
+    }
+}
+
+/// The objective at some parameters, term by term.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ReflectanceObjective {
+    /// The picture's.
+    pub data: f64,
+    /// The pull's.
+    pub prior: f64,
+    /// By the parameters.
+    pub gradient: Vec<f64>,
+    /// Values and slopes that were not finite and were left out.
+    pub not_finite: usize,
+}
+
+impl ReflectanceObjective {
+    /// The sum of the terms.
+    pub fn total(&self) -> f64 {
+        self.data + self.prior
+    }
+}
+
+/// What is held during a step.
+pub struct ReflectanceProblem<'a> {
+    /// The model.
+    pub model: &'a dyn ReflectanceModel,
+    /// Where it is tabulated.
+    pub grid: &'a NodeGrid,
+    /// The picture on the nodes, under the light that is held.
+    pub matrix: &'a NodeMatrix,
+    /// The loss.
+    pub likelihood: &'a Likelihood,
+    /// The pull.
+    pub prior: &'a ParameterPrior,
+}
+
+impl ReflectanceProblem<'_> {
+    /// Objective without derivatives.
+    pub fn value(&self, parameters: &[f64]) -> f64 {
+        let table = self.grid.tabulate(self.model, parameters);
+        self.likelihood.loss(&self.matrix.forward(&table)) + self.prior.energy(parameters)
+    }
+
+    /// Objective with derivatives.
+    pub fn slopes(&self, parameters: &[f64]) -> ReflectanceObjective {
+        let table = self.grid.tabulate(self.model, parameters);
+        let state = self.likelihood.slopes(&self.matrix.forward(&table));
+        let adjoint = self.matrix.adjoint(&state.by_pixel);
+        let mut gradient = self.grid.pull_back(self.model, parameters, &adjoint);
+        let mut not_finite = state.not_finite + table.not_finite;
+        for (index, slope) in gradient.iter_mut().enumerate() {
+            if !slope.is_finite() {
+                *slope = 0.0;
+                not_finite += 1;
+            }
+            *slope += 2.0 * self.prior.weight[index] * (parameters[index] - self.prior.centre[index]);
+        }
+        ReflectanceObjective { data: state.loss, prior: self.prior.energy(parameters), gradient, not_finite }
+    }
+
+    /// At most `steps` steps of L-BFGS (Nocedal 1980) with halving; ends when a step gains less than `patience` of the
+    /// objective. The model projects its parameters after each step.
+    pub fn improve(&self, parameters: &mut Vec<f64>, steps: usize, patience: f64) -> ReflectanceObjective {
+        let mut current = self.slopes(parameters);
+        let mut pairs: VecDeque<(Vec<f64>, Vec<f64>)> = VecDeque::new();
+        for _ in 0..steps {
+            let mut direction = descent(&current.gradient, &pairs);
+            let mut slope = dot(&direction, &current.gradient);
+            if !(slope < 0.0) {
+                pairs.clear();
+                direction = descent(&current.gradient, &pairs);
+                slope = dot(&direction, &current.gradient);
+            }
+            // A first step of unknown length moves no parameter by more than this.
+            let largest = direction.iter().fold(0.0f64, |a, b| a.max(b.abs()));
+            let cap = if pairs.is_empty() { 0.25 } else { 1.0 };
+            let mut length = if largest > cap { cap / largest } else { 1.0 };
+            let mut found = None;
+            for _ in 0..HALVINGS {
+                let mut moved: Vec<f64> = parameters.iter().zip(&direction).map(|(p, d)| p + length * d).collect();
+                self.model.project(&mut moved);
+                if self.value(&moved) < current.total() + 1e-4 * length * slope {
+                    found = Some(moved);
+                    break;
+                }
+                length *= 0.4;
+            }
+            let Some(moved) = found else {
+                if pairs.is_empty() {
+                    break;
+                }
+                pairs.clear();
+                continue;
+            };
+            let reached = self.slopes(&moved);
+            let step: Vec<f64> = moved.iter().zip(parameters.iter()).map(|(a, b)| a - b).collect();
+            let change: Vec<f64> = reached.gradient.iter().zip(&current.gradient).map(|(a, b)| a - b).collect();
+            if dot(&step, &change) > 1e-12 * dot(&change, &change) {
+                pairs.push_back((step, change));
+                if pairs.len() > MEMORY {
+                    pairs.pop_front();
+                }
+            }
+            let gain = current.total() - reached.total();
+            *parameters = moved;
+            current = reached;
+            if gain < patience * current.total() {
+                break;
+            }
+        }
+        current
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Minus the gradient times the remembered inverse curvature.
+fn descent(gradient: &[f64], pairs: &VecDeque<(Vec<f64>, Vec<f64>)>) -> Vec<f64> {
+    let mut direction: Vec<f64> = gradient.iter().map(|slope| -slope).collect();
+    let mut shares = Vec::with_capacity(pairs.len());
+    for (step, change) in pairs.iter().rev() {
+        let share = dot(step, &direction) / dot(step, change);
+        direction.iter_mut().zip(change).for_each(|(value, change)| *value -= share * change);
+        shares.push(share);
+    }
+    match pairs.back() {
+        Some((step, change)) => {
+            let scale = dot(step, change) / dot(change, change);
+            direction.iter_mut().for_each(|value| *value *= scale);
+        }
+        // Slopes of a mean loss are small: the first step is scaled to a fifth of a unit.
+        None => {
+            let largest = direction.iter().fold(0.0f64, |a, b| a.max(b.abs())).max(1e-300);
+            direction.iter_mut().for_each(|value| *value *= 0.2 / largest);
+        }
+    }
+    for ((step, change), share) in pairs.iter().zip(shares.into_iter().rev()) {
+        let other = dot(change, &direction) / dot(step, change);
+        direction.iter_mut().zip(step).for_each(|(value, step)| *value += (share - other) * step);
+    }
+    direction
+}

@@ -1,0 +1,123 @@
+//! What an estimation leaves behind, under fixed names.
+//!
+//! | file | what |
+//! |---|---|
+//! | `object.json` | model, parameters (codes, then colours), start, gauge, spread, findings; marks the folder |
+//! | `settings.toml` | the settings |
+//! | `reflectance.binary` | the reflectance as a table of MERL's format |
+//! | `env.exr` | the light |
+//! | `rerender_N.exr` `relit_N_LIGHT.exr` | the object under the fitted light, and under others |
+//! | `loss.csv` | the objective after every step |
+//! | `report.html` | all of it to look at |
+
+use super::geometry::Visibility;
+use super::joint::Estimate;
+use super::nodes::NodeGrid;
+use super::observations::ObjectView;
+use super::page::{self, Shown};
+use super::picture::render;
+use super::progress::write_rows;
+use super::settings::ObjectSettings;
+use super::split::{Gauge, SplitSpread};
+use super::starts::StartedModel;
+use super::transport::TexelDirections;
+use crate::error::{Error, ErrorKind, Place, Result};
+use crate::image::file;
+use crate::light::Environment;
+use crate::measured::table::MeasuredBrdf;
+use std::path::Path;
+
+/// Name of the file that marks a result of object mode.
+pub const MARK: &str = "object.json";
+
+/// Makes the folder, or takes an empty one or one of an earlier estimation.
+///
+/// # Errors
+/// `Unwritable` when it holds other things, or cannot be made.
+pub fn prepare(folder: &Path) -> Result<()> {
+    if folder.exists() && !folder.join(MARK).is_file() {
+        let mut entries = std::fs::read_dir(folder).map_err(|source| Error::writing(folder, source))?;
+        if entries.next().is_some() {
+            return Err(Error::new(ErrorKind::Unwritable, "the folder holds other files than an estimation's")
+                .at(Place::File(folder.into()))
+                .remedy("name a new or an empty folder with -o; nothing was changed"));
+        }
+    }
+    std::fs::create_dir_all(folder).map_err(|source| Error::writing(folder, source))
+}
+
+/// Renders, and writes everything. `relights` are other lights with their names.
+///
+/// # Errors
+/// Files that cannot be written.
+pub fn write(
+    folder: &Path,
+    views: &[ObjectView],
+    model: &StartedModel,
+    estimate: &Estimate,
+    settings: &ObjectSettings,
+    relights: &[(String, Environment)],
+) -> Result<()> {
+    let grid = NodeGrid::new(settings.nodes);
+    let (width, height) = settings.light_size();
+    let directions = TexelDirections::new(width, height)?;
+    let environment = estimate.light.environment();
+    environment.write(&folder.join("env.exr"))?;
+    MeasuredBrdf::from_model(model.model.as_ref(), &estimate.parameters).write(&folder.join("reflectance.binary"))?;
+    write_rows(&folder.join("loss.csv"), &estimate.rows)?;
+    let settings_text = toml::to_string_pretty(settings)
+        .map_err(|source| Error::new(ErrorKind::Internal, format!("settings cannot be written: {source}")))?;
+    crate::files::write_bytes(&folder.join("settings.toml"), settings_text.as_bytes())?;
+
+    let gauge = Gauge::of(&estimate.light, &grid, &estimate.table);
+    let spread = SplitSpread::of(&estimate.candidates);
+    let json = serde_json::json!({
+        "format": "patina object 1",
+        "model": model.model.name(),
+        "parameters": estimate.parameters,
+        "start": estimate.start,
+        "picture_log_rmse": estimate.picture_log_rmse,
+        "seconds": estimate.seconds,
+        "gauge": gauge,
+        "split": spread,
+        "followed": estimate.candidates.iter().map(|candidate| serde_json::json!({
+            "start": candidate.name, "objective": candidate.total(), "parameters": candidate.parameters,
+        })).collect::<Vec<_>>(),
+        "findings": estimate.findings,
+    });
+    crate::files::write_bytes(&folder.join(MARK), format!("{json:#}\n").as_bytes())?;
+
+    let resampled: Vec<Environment> = relights.iter().map(|(_, light)| light.resampled(width, height)).collect();
+    let lights: Vec<&Environment> = std::iter::once(&environment).chain(&resampled).collect();
+    let mut sections = vec![("Found", page::facts(estimate, model.model.name(), &gauge, &spread))];
+    let mut galleries = String::new();
+    for (index, view) in views.iter().enumerate() {
+        let visibility: Option<Visibility> =
+            view.geometry.visibility(&view.geometry.pixels, width, height).filter(|_| settings.shadows);
+        let pictures = render(&view.geometry, visibility.as_ref(), &directions, &grid, &estimate.table, &lights);
+        let stops = page::stops_of(&view.photo.radiance);
+        let mut shown = vec![
+            Shown { caption: format!("photo {}", view.photo.name), picture: &view.photo.radiance, stops },
+            Shown { caption: "re-render".into(), picture: &pictures[0], stops },
+        ];
+        file::write_exr_rgb(&folder.join(format!("rerender_{index}.exr")), &pictures[0])?;
+        for ((name, _), picture) in relights.iter().zip(&pictures[1..]) {
+            file::write_exr_rgb(&folder.join(format!("relit_{index}_{name}.exr")), picture)?;
+            let stops = page::stops_of(picture);
+            shown.push(Shown { caption: format!("under {name}"), picture, stops });
+        }
+        galleries += &page::gallery(&shown, 256)?;
+    }
+    sections.push(("Photo and pictures", galleries));
+    let stops = page::stops_of(&environment.radiance);
+    let light = Shown { caption: "estimated light".into(), picture: &environment.radiance, stops };
+    sections.push(("Light", page::gallery(&[light], 512)?));
+    sections.push(("Objective", page::curve(&estimate.rows)));
+    let findings: String = estimate
+        .findings
+        .iter()
+        .map(|finding| format!("<li>{}</li>", crate::insight::report::number::escaped(&finding.to_string())))
+        .collect();
+    sections.push(("Findings", format!("<ul>{findings}</ul>")));
+    crate::files::write_bytes(&folder.join("report.html"), page::page("Object", &sections).as_bytes())
+}

@@ -1,0 +1,166 @@
+//! What an estimation is asked to do, and three sets of answers.
+
+use super::prior::LightPriorKind;
+use crate::error::{Error, ErrorKind, Place, Result};
+
+/// How the light is improved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum LightMethod {
+    /// Damped steps of Newton, with the deep prior in alternation.
+    #[default]
+    ClosedForm,
+    /// Adam through the net, as released.
+    FirstOrder,
+}
+
+/// Settings of an estimation.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, rename_all = "kebab-case")]
+pub struct ObjectSettings {
+    /// Height of the fitted light in texels; it is twice as wide.
+    pub light_height: usize,
+    /// Pixels that are used, spread over the photos.
+    pub pixels: usize,
+    /// Nodes along theta_half, theta_difference and phi_difference.
+    pub nodes: [usize; 3],
+    /// Whether shadow rays are traced.
+    pub shadows: bool,
+    /// Prior of the light.
+    pub prior: LightPriorKind,
+    /// How the light is improved.
+    pub method: LightMethod,
+    /// Rounds of light and reflectance.
+    pub outer_loops: usize,
+    /// First rounds in which the light is grey.
+    pub grey_loops: usize,
+    /// Steps on the light a round: of Newton, or of Adam.
+    pub light_steps: usize,
+    /// Products of the picture's matrix in each step of Newton.
+    pub light_products: usize,
+    /// Steps of Adam on the net for each step of Newton.
+    pub net_steps: usize,
+    /// Channels of the net; the paper's has 128.
+    pub net_channels: usize,
+    /// Rate of Adam on the net.
+    pub net_rate: f32,
+    /// Pull between light and net: weight of their mean squared difference.
+    pub net_weight: f64,
+    /// Weight of the mean absolute step of the gradient prior.
+    pub gradient_weight: f64,
+    /// Weight of the entropy prior.
+    pub entropy_weight: f64,
+    /// Steps on the reflectance a round, at most.
+    pub reflectance_steps: usize,
+    /// Weight of the squared codes of a model that has codes.
+    pub code_weight: f64,
+    /// Added to radiance before the logarithm, over the exposure of the photos.
+    pub epsilon_share: f64,
+    /// Where the loss on logarithms turns from square to absolute.
+    pub loss_width: f64,
+    /// Starts that are followed at low resolution after all were tried.
+    pub followed: usize,
+    /// Seed of pixels and net.
+    pub seed: u64,
+}
+
+impl Default for ObjectSettings {
+    fn default() -> Self {
+        ObjectSettings {
+            light_height: 64,
+            pixels: 2048,
+            nodes: [48, 24, 15],
+            shadows: true,
+            prior: LightPriorKind::Deep,
+            method: LightMethod::ClosedForm,
+            outer_loops: 8,
+            grey_loops: 2,
+            light_steps: 2,
+            light_products: 12,
+            net_steps: 30,
+            net_channels: 32,
+            net_rate: 0.01,
+            net_weight: 0.05,
+            gradient_weight: 0.01,
+            entropy_weight: 0.01,
+            reflectance_steps: 8,
+            code_weight: 1e-5,
+            epsilon_share: 1e-3,
+            loss_width: 0.02,
+            followed: 6,
+            seed: 1,
+        }
+    }
+}
+
+impl ObjectSettings {
+    /// Less of everything: a first look.
+    pub fn quick() -> Self {
+        ObjectSettings {
+            light_height: 32,
+            pixels: 1024,
+            nodes: [28, 15, 8],
+            outer_loops: 6,
+            net_channels: 16,
+            net_steps: 12,
+            ..Self::default()
+        }
+    }
+
+    /// The schedule that was released with the paper: Adam through the net, ten rounds, grey light in the first three.
+    pub fn released() -> Self {
+        ObjectSettings {
+            method: LightMethod::FirstOrder,
+            outer_loops: 10,
+            grey_loops: 3,
+            light_steps: 300,
+            net_channels: 128,
+            net_rate: 1e-3,
+            reflectance_steps: 100,
+            ..Self::default()
+        }
+    }
+
+    /// Size of the fitted light in texels: width, height.
+    pub fn light_size(&self) -> (usize, usize) {
+        (2 * self.light_height, self.light_height)
+    }
+
+    /// Checks ranges.
+    ///
+    /// # Errors
+    /// `InvalidSetting` with the name of the setting.
+    pub fn validate(&self) -> Result<()> {
+        let wrong = |name: &str, message: &str| {
+            Err(Error::new(ErrorKind::InvalidSetting, message).at(Place::Setting(name.into())))
+        };
+        if !(8..=128).contains(&self.light_height) {
+            return wrong("light-height", "the light needs 8 to 128 rows");
+        }
+        if self.pixels == 0 {
+            return wrong("pixels", "at least one pixel is needed");
+        }
+        let positive = [
+            ("epsilon-share", self.epsilon_share),
+            ("loss-width", self.loss_width),
+            ("net-rate", f64::from(self.net_rate)),
+        ];
+        for (name, value) in positive {
+            if !(value > 0.0 && value.is_finite()) {
+                return wrong(name, "this must be a number above 0");
+            }
+        }
+        let weights = [
+            ("net-weight", self.net_weight),
+            ("gradient-weight", self.gradient_weight),
+            ("entropy-weight", self.entropy_weight),
+            ("code-weight", self.code_weight),
+        ];
+        for (name, value) in weights {
+            if !(value >= 0.0 && value.is_finite()) {
+                return wrong(name, "a weight must not be negative");
+            }
+        }
+        Ok(())
+    }
+}

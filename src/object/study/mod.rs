@@ -1,0 +1,108 @@
+//! The experiments of the paper with one photo: figures 3, 4 and 5, and shadows.
+//!
+//! [`inputs`] photographs: the measured reflectance itself, asked at every part of a light that is finer than any that
+//! is fitted. [`case`] estimates and measures one case. [`plan`] says which cases there are. Results go to
+//! `results.csv` line by line, and what stands there is not done again: a study that was stopped goes on.
+//!
+//! What this folder refuses to do: fit anything to the truth, or leave out a case that failed. A case that fails is a
+//! line of NaN.
+
+pub mod case;
+pub mod inputs;
+pub mod plan;
+pub mod tables;
+
+use super::starts::ModelKind;
+use crate::error::{Error, ErrorKind, Place, Result};
+use case::{CaseResult, HEADER};
+use inputs::Inputs;
+use plan::{Case, plan};
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What is studied.
+#[derive(Clone, Debug)]
+pub struct StudyOptions {
+    /// Folder of the neural fits of the MERL materials.
+    pub library: PathBuf,
+    /// Folder of environments.
+    pub envmaps: PathBuf,
+    /// Mesh of an object that shadows itself; without one that part is left out, and told.
+    pub mesh: Option<PathBuf>,
+    /// Weights of the neural model; without them it is left out, and told.
+    pub weights: Option<PathBuf>,
+    /// Models of the reflectance.
+    pub models: Vec<ModelKind>,
+    /// A few small cases.
+    pub quick: bool,
+    /// Seed of pixels, noise and nets.
+    pub seed: u64,
+    /// Where results go.
+    pub output: PathBuf,
+}
+
+/// Runs what is not done yet and writes tables and page. Returns the tables as text.
+///
+/// # Errors
+/// Inputs that are missing, files that cannot be written, a stop. Cases that fail are results.
+pub fn run(options: &StudyOptions, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Result<String> {
+    std::fs::create_dir_all(&options.output).map_err(|source| Error::writing(&options.output, source))?;
+    let inputs = Inputs::read(options, tell)?;
+    let cases = plan(&inputs, options);
+    let path = options.output.join("results.csv");
+    let mut lines = read_results(&path)?;
+    // Photos of one material under all lights are taken at once: cases are grouped by what is photographed.
+    let mut photographed: Option<(String, HashMap<String, inputs::Photographed>)> = None;
+    let mut pictures = Vec::new();
+    for (index, case) in cases.iter().enumerate() {
+        if stop.load(Ordering::Relaxed) {
+            return Err(Error::new(ErrorKind::Stopped, "the study was stopped; started again it goes on"));
+        }
+        if lines.iter().any(|line| line.starts_with(&case.key())) {
+            continue;
+        }
+        let subject = case.subject();
+        if photographed.as_ref().is_none_or(|(name, _)| *name != subject) {
+            tell(&format!("photographing {subject}"));
+            photographed = Some((subject, inputs.photograph(case)?));
+        }
+        let Some((_, photos)) = &photographed else { continue };
+        let result = match case::run(case, &inputs, photos, options, stop) {
+            Ok((result, shown)) => {
+                pictures.extend(shown);
+                result
+            }
+            Err(error) if error.kind() == ErrorKind::Stopped => return Err(error),
+            Err(error) => {
+                tell(&format!("{}: {error}", case.key()));
+                CaseResult::failed()
+            }
+        };
+        lines.push(format!("{}{}", case.key(), result.csv()));
+        tell(&format!("{} of {}  {}{}", index + 1, cases.len(), case.key(), result.text()));
+        let text = format!("{HEADER}\n{}\n", lines.join("\n"));
+        crate::files::write_bytes(&path, text.as_bytes())?;
+    }
+    tables::write(options, &inputs, &cases, &lines, &pictures)
+}
+
+/// The lines of an earlier sitting.
+fn read_results(path: &std::path::Path) -> Result<Vec<String>> {
+    if !path.is_file() {
+        return Ok(Vec::new());
+    }
+    let text = crate::scene::read::camera_file::read_text(path)?;
+    let mut lines = text.lines();
+    if lines.next() != Some(HEADER) {
+        return Err(Error::new(ErrorKind::Malformed, "these are results of another study")
+            .at(Place::File(path.into()))
+            .remedy("name another folder with -o"));
+    }
+    Ok(lines.filter(|line| !line.is_empty()).map(str::to_string).collect())
+}
+
+/// Key of a case as text, for tables.
+pub(super) fn fields_of<'a>(line: &'a str, case: &Case) -> Option<Vec<&'a str>> {
+    line.strip_prefix(&case.key()).map(|rest| rest.split(',').collect())
+}

@@ -1,0 +1,211 @@
+//! Which cases a study has.
+
+use super::StudyOptions;
+use super::inputs::Inputs;
+use crate::object::prior::LightPriorKind;
+use crate::object::starts::ModelKind;
+
+/// A figure of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Figure {
+    /// Figure 3: reflectance under a known light.
+    Reflectance,
+    /// Figure 4: light with known reflectance.
+    Light,
+    /// Figure 5: both.
+    Both,
+    /// An object that shadows itself: both light and, with known light, nothing else.
+    Shadows,
+}
+
+impl Figure {
+    /// All, with their keys and titles.
+    pub const NAMED: [(Figure, &str, &str); 4] = [
+        (Figure::Reflectance, "fig3", "Figure 3: reflectance from one photo under a known light"),
+        (Figure::Light, "fig4", "Figure 4: light from one photo with known reflectance"),
+        (Figure::Both, "fig5", "Figure 5: light and reflectance from one photo"),
+        (Figure::Shadows, "shadows", "An object that shadows itself: shadows traced or left out"),
+    ];
+
+    /// The key in `results.csv`.
+    pub fn key(self) -> &'static str {
+        Self::NAMED.iter().find(|(figure, _, _)| *figure == self).map_or("", |(_, key, _)| key)
+    }
+}
+
+/// What was done to a photo before it was given away.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Spoilt {
+    /// Nothing.
+    Clean,
+    /// Noise of a hundredth of each value and a thousandth of the exposure.
+    Noise,
+    /// Eight bits, with the brightest 2 % saturated.
+    Bytes,
+}
+
+impl Spoilt {
+    fn key(self) -> &'static str {
+        match self {
+            Spoilt::Clean => "clean",
+            Spoilt::Noise => "noise",
+            Spoilt::Bytes => "8bit",
+        }
+    }
+}
+
+/// One estimation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Case {
+    /// Where it belongs.
+    pub figure: Figure,
+    /// Name of the material.
+    pub material: String,
+    /// Name of the light.
+    pub light: String,
+    /// Model of the reflectance; `None` when it is known.
+    pub model: Option<ModelKind>,
+    /// Prior of the light.
+    pub prior: LightPriorKind,
+    /// What was done to the photo.
+    pub spoilt: Spoilt,
+    /// Whether shadows are traced.
+    pub shadows: bool,
+}
+
+impl Case {
+    /// The first columns of its line, with a comma behind them.
+    pub fn key(&self) -> String {
+        format!("{},{},{},{},", self.figure.key(), self.material, self.light, self.variant())
+    }
+
+    /// What tells it from other cases of the same photo.
+    pub fn variant(&self) -> String {
+        let model = match self.model {
+            Some(ModelKind::Ibrdf) => "ibrdf",
+            Some(ModelKind::CookTorrance) => "cook-torrance",
+            Some(ModelKind::Ggx) => "ggx",
+            Some(ModelKind::Ward) => "ward",
+            None => "known",
+        };
+        let prior = match (self.figure, self.prior) {
+            (Figure::Reflectance, _) => "",
+            (_, LightPriorKind::Deep) => " + deep",
+            (_, LightPriorKind::Gradient) => " + gradient",
+            (_, LightPriorKind::Entropy) => " + entropy",
+            (_, LightPriorKind::None) => " + no prior",
+        };
+        let shadows = match (self.figure, self.shadows) {
+            (Figure::Shadows, true) => " + shadows",
+            (Figure::Shadows, false) => " without shadows",
+            _ => "",
+        };
+        format!("{model}{prior}{shadows} ({})", self.spoilt.key())
+    }
+
+    /// What is photographed.
+    pub fn subject(&self) -> String {
+        match self.figure {
+            Figure::Shadows => format!("{} on the mesh", self.material),
+            _ => format!("{} on a sphere", self.material),
+        }
+    }
+}
+
+/// Materials of the studies that take some: from matt to mirror, by MERL's names.
+const MATERIALS: [&str; 20] = [
+    "gold-metallic-paint",
+    "blue-rubber",
+    "alum-bronze",
+    "red-plastic",
+    "white-fabric",
+    "cherry-235",
+    "nickel",
+    "green-acrylic",
+    "pink-felt",
+    "aluminium",
+    "dark-specular-fabric",
+    "pearl-paint",
+    "chrome",
+    "violet-acrylic",
+    "black-oxidized-steel",
+    "yellow-matte-plastic",
+    "brass",
+    "light-brown-fabric",
+    "silver-metallic-paint",
+    "pvc",
+];
+
+/// All cases, grouped by what is photographed.
+pub fn plan(inputs: &Inputs, options: &StudyOptions) -> Vec<Case> {
+    let known: Vec<String> = inputs.fits.materials.iter().map(|fit| fit.name.clone()).collect();
+    let mut some: Vec<String> =
+        MATERIALS.iter().map(|name| name.to_string()).filter(|name| known.contains(name)).collect();
+    if some.is_empty() {
+        some = known.clone();
+    }
+    let quick = options.quick;
+    let lights: Vec<String> = inputs.lights.iter().map(|(name, _)| name.clone()).collect();
+    let take = |from: &[String], count: usize| from.iter().take(count).cloned().collect::<Vec<_>>();
+    let base = Case {
+        figure: Figure::Both,
+        material: String::new(),
+        light: String::new(),
+        model: None,
+        prior: LightPriorKind::Deep,
+        spoilt: Spoilt::Clean,
+        shadows: false,
+    };
+    let mut cases = Vec::new();
+    let all = if quick { take(&some, 2) } else { known };
+    for material in &all {
+        for light in take(&lights, if quick { 2 } else { 5 }) {
+            for &model in &options.models {
+                let (material, light) = (material.clone(), light.clone());
+                cases.push(Case { figure: Figure::Reflectance, material, light, model: Some(model), ..base.clone() });
+            }
+        }
+    }
+    let priors: &[LightPriorKind] = match quick {
+        true => &[LightPriorKind::None, LightPriorKind::Gradient, LightPriorKind::Deep],
+        false => &[LightPriorKind::None, LightPriorKind::Gradient, LightPriorKind::Entropy, LightPriorKind::Deep],
+    };
+    for material in take(&some, if quick { 1 } else { 5 }) {
+        for light in take(&lights, if quick { 2 } else { 10 }) {
+            for &prior in priors {
+                let (material, light) = (material.clone(), light.clone());
+                cases.push(Case { figure: Figure::Light, material, light, prior, ..base.clone() });
+            }
+        }
+    }
+    for (index, material) in take(&some, if quick { 2 } else { 20 }).into_iter().enumerate() {
+        for light in take(&lights, if quick { 1 } else { 5 }) {
+            for &model in &options.models {
+                let mut spoils = vec![Spoilt::Clean];
+                // Noise and bytes on a quarter of the materials.
+                if index % 4 == 0 {
+                    spoils.extend([Spoilt::Noise, Spoilt::Bytes]);
+                }
+                for spoilt in spoils {
+                    let (material, light) = (material.clone(), light.clone());
+                    cases.push(Case { material, light, model: Some(model), spoilt, ..base.clone() });
+                }
+            }
+        }
+    }
+    if inputs.mesh.is_some() {
+        for material in take(&some, if quick { 1 } else { 4 }) {
+            for light in take(&lights, if quick { 1 } else { 3 }) {
+                for shadows in [true, false] {
+                    let (material, light, figure) = (material.clone(), light.clone(), Figure::Shadows);
+                    cases.push(Case { figure, material, light, shadows, ..base.clone() });
+                }
+            }
+        }
+    }
+    // A stable order by subject: photos are taken once.
+    let subjects: Vec<String> = cases.iter().map(Case::subject).collect();
+    let first = |case: &Case| subjects.iter().position(|subject| *subject == case.subject());
+    cases.sort_by_key(first);
+    cases
+}

@@ -1,0 +1,85 @@
+//! The tables and the page of a study, out of the lines of `results.csv`.
+
+use super::case::{CasePictures, MEASURES};
+use super::inputs::Inputs;
+use super::plan::{Case, Figure};
+use super::{StudyOptions, fields_of};
+use crate::error::Result;
+use crate::insight::report::number::escaped;
+use crate::insight::study::StudyTable;
+use crate::object::page::{Shown, gallery, page, stops_of};
+
+/// Most cases that are shown in pictures.
+const MOST_SHOWN: usize = 24;
+
+/// Writes a table a figure as CSV, Markdown and SVG, and `report.html`; returns the tables as Markdown.
+///
+/// # Errors
+/// Files that cannot be written.
+pub fn write(
+    options: &StudyOptions,
+    inputs: &Inputs,
+    cases: &[Case],
+    lines: &[String],
+    pictures: &[CasePictures],
+) -> Result<String> {
+    let mut text = String::new();
+    let mut sections = vec![("What was done", what_was_done(options, inputs))];
+    for (figure, key, title) in Figure::NAMED {
+        let mut table = StudyTable::new(title, "variant", &MEASURES);
+        for case in cases.iter().filter(|case| case.figure == figure) {
+            let Some(fields) = lines.iter().find_map(|line| fields_of(line, case)) else { continue };
+            let values: Vec<f64> = fields.iter().map(|field| field.parse().unwrap_or(f64::NAN)).collect();
+            table.add(&case.variant(), &values);
+        }
+        if table.row_names().next().is_none() {
+            continue;
+        }
+        table.notes.push(format!("Seed {}; a sample is one material under one light.", options.seed));
+        table.write(&options.output, key)?;
+        text += &table.to_markdown();
+        text.push('\n');
+        let bars: String = [1, 3, 6, 8].iter().filter_map(|&column| table.bar_svg(column)).collect();
+        sections.push((title, format!("<pre>{}</pre>{bars}", escaped(&table.to_markdown()))));
+    }
+    let mut shown = String::new();
+    for case in pictures.iter().take(MOST_SHOWN) {
+        shown += &format!("<h3>{}</h3>", escaped(&case.title));
+        // A fitted light is shown at the exposure of the true one, after the same mean: levels are not known.
+        let mut beside = Vec::new();
+        let mut stops = 0.0;
+        for (index, (caption, picture)) in case.pictures.iter().enumerate() {
+            if index % 2 == 0 || index == 3 || index == 5 {
+                stops = stops_of(picture);
+            }
+            beside.push(Shown { caption: caption.clone(), picture, stops });
+        }
+        shown += &gallery(&beside, 160)?;
+    }
+    if shown.is_empty() {
+        shown = "<p class=note>All cases were done in an earlier sitting: no picture was made in this one.</p>".into();
+    }
+    sections.push(("Pictures", shown));
+    crate::files::write_bytes(&options.output.join("report.html"), page("Study of object mode", &sections).as_bytes())?;
+    Ok(text)
+}
+
+fn what_was_done(options: &StudyOptions, inputs: &Inputs) -> String {
+    let (width, height) = inputs.settings.light_size();
+    let fine = &inputs.held_out.1;
+    let text = format!(
+        "Photos show the measured reflectance itself (MERL via neural fits), asked at every part of a light of {} x {} \
+         texels; what is fitted is a light of {width} x {height} texels and a model at {} nodes, by {} pixels. Errors of \
+         light are over the sphere by solid angle, those of reflectance over all cells of the table, those of pictures \
+         over the object; all are root mean squares of natural logarithms. Aligned: after the best factor per channel. \
+         The material that is estimated is never among the starts; whether the weights of the neural model have seen it \
+         is stated by their file. Held-out light: {}. Seed {}.",
+        fine.width(),
+        fine.height(),
+        inputs.settings.nodes.iter().product::<usize>(),
+        inputs.settings.pixels,
+        inputs.held_out.0,
+        options.seed
+    );
+    format!("<p>{}</p>", escaped(&text))
+}

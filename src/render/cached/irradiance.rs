@@ -1,0 +1,164 @@
+//! Diffuse light at a point: a masked sum over the hats of the light, its row and its transpose.
+//!
+//! `E = 1/pi ∑_j share_j max(0, n . moment_j) L_j`: what a white Lambert surface sends back. It is linear in the light.
+
+use super::light_basis::LightBasis;
+#[cfg(target_arch = "x86_64")]
+use super::vector::Avx2;
+use super::vector::{Eight, LANES, Plain, has_avx2};
+use glam::Vec3;
+use std::f32::consts::FRAC_1_PI;
+
+/// `E` per channel of a point with this unit normal and these visible shares, under a light in planes of the basis.
+#[inline]
+pub fn irradiance(basis: &LightBasis, normal: Vec3, shares: &[u8], light: &[Vec<f32>; 3]) -> [f32; 3] {
+    #[cfg(target_arch = "x86_64")]
+    if has_avx2() {
+        // SAFETY: the processor has what the function is compiled for.
+        return unsafe { irradiance_avx2(basis, normal, shares, light) };
+    }
+    irradiance_in::<Plain>(basis, normal, shares, light)
+}
+
+/// The transpose of [`irradiance`]: adds the derivative by the light, given that by `E`.
+#[inline]
+pub fn irradiance_backward(
+    basis: &LightBasis,
+    normal: Vec3,
+    shares: &[u8],
+    d_irradiance: [f32; 3],
+    d_light: &mut [Vec<f32>; 3],
+) {
+    #[cfg(target_arch = "x86_64")]
+    if has_avx2() {
+        // SAFETY: the processor has what the function is compiled for.
+        return unsafe { backward_avx2(basis, normal, shares, d_irradiance, d_light) };
+    }
+    backward_in::<Plain>(basis, normal, shares, d_irradiance, d_light);
+}
+
+/// Adds `scale` times the row of [`irradiance`] to a row over the padded texels of the light.
+#[inline]
+pub fn add_irradiance_row(basis: &LightBasis, normal: Vec3, shares: &[u8], scale: f32, row: &mut [f32]) {
+    #[cfg(target_arch = "x86_64")]
+    if has_avx2() {
+        // SAFETY: the processor has what the function is compiled for.
+        return unsafe { row_avx2(basis, normal, shares, scale, row) };
+    }
+    row_in::<Plain>(basis, normal, shares, scale, row);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn irradiance_avx2(basis: &LightBasis, normal: Vec3, shares: &[u8], light: &[Vec<f32>; 3]) -> [f32; 3] {
+    irradiance_in::<Avx2>(basis, normal, shares, light)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn backward_avx2(basis: &LightBasis, normal: Vec3, shares: &[u8], d: [f32; 3], d_light: &mut [Vec<f32>; 3]) {
+    backward_in::<Avx2>(basis, normal, shares, d, d_light);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn row_avx2(basis: &LightBasis, normal: Vec3, shares: &[u8], scale: f32, row: &mut [f32]) {
+    row_in::<Avx2>(basis, normal, shares, scale, row);
+}
+
+/// `share (n . moment)+` of eight hats, in units of 1/255; `None` when all lie below the horizon.
+#[inline(always)]
+fn weights<V: Eight>(basis: &LightBasis, normal: [V; 3], shares: &[u8], at: usize) -> Option<V> {
+    let [x, y, z] = &basis.moment;
+    let cosine = normal[0].mul(V::load(&x[at..at + LANES]));
+    let cosine = normal[1].mul_add(V::load(&y[at..at + LANES]), cosine);
+    let cosine = normal[2].mul_add(V::load(&z[at..at + LANES]), cosine);
+    if !cosine.any_positive() {
+        return None;
+    }
+    Some(cosine.max(V::splat(0.0)).mul(V::load_bytes(&shares[at..at + LANES])))
+}
+
+#[inline(always)]
+fn irradiance_in<V: Eight>(basis: &LightBasis, normal: Vec3, shares: &[u8], light: &[Vec<f32>; 3]) -> [f32; 3] {
+    let normal = normal.to_array().map(V::splat);
+    let mut sums = [V::splat(0.0); 3];
+    for at in (0..basis.padded()).step_by(LANES) {
+        let Some(weight) = weights(basis, normal, shares, at) else { continue };
+        for channel in 0..3 {
+            sums[channel] = weight.mul_add(V::load(&light[channel][at..at + LANES]), sums[channel]);
+        }
+    }
+    sums.map(|sum| sum.sum() * (FRAC_1_PI / 255.0))
+}
+
+#[inline(always)]
+fn backward_in<V: Eight>(basis: &LightBasis, normal: Vec3, shares: &[u8], d: [f32; 3], d_light: &mut [Vec<f32>; 3]) {
+    let normal = normal.to_array().map(V::splat);
+    let d = d.map(|value| V::splat(value * (FRAC_1_PI / 255.0)));
+    for at in (0..basis.padded()).step_by(LANES) {
+        let Some(weight) = weights(basis, normal, shares, at) else { continue };
+        for channel in 0..3 {
+            let place = &mut d_light[channel][at..at + LANES];
+            weight.mul_add(d[channel], V::load(place)).store(place);
+        }
+    }
+}
+
+#[inline(always)]
+fn row_in<V: Eight>(basis: &LightBasis, normal: Vec3, shares: &[u8], scale: f32, row: &mut [f32]) {
+    let normal = normal.to_array().map(V::splat);
+    let scale = V::splat(scale * (FRAC_1_PI / 255.0));
+    for at in (0..basis.padded()).step_by(LANES) {
+        let Some(weight) = weights(basis, normal, shares, at) else { continue };
+        let place = &mut row[at..at + LANES];
+        weight.mul_add(scale, V::load(place)).store(place);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::SequentialRandom;
+
+    #[test]
+    fn versions_agree_and_the_transpose_is_one() {
+        let basis = LightBasis::new(64, 32);
+        let mut random = SequentialRandom::new(3);
+        let mut plane = || (0..basis.padded()).map(|_| random.next_number()).collect::<Vec<f32>>();
+        let light = [plane(), plane(), plane()];
+        let shares: Vec<u8> = plane().iter().map(|value| (value * 300.0).min(255.0) as u8).collect();
+        let d_light = [plane(), plane(), plane()];
+        for normal in [Vec3::Y, Vec3::new(0.36, 0.48, -0.8), Vec3::NEG_X] {
+            let fast = irradiance(&basis, normal, &shares, &light);
+            let plain = irradiance_in::<Plain>(&basis, normal, &shares, &light);
+            let truth: [f64; 3] = [0, 1, 2].map(|channel| {
+                (0..basis.count())
+                    .map(|j| {
+                        let cosine: f64 =
+                            (0..3).map(|axis| f64::from(basis.moment[axis][j]) * f64::from(normal[axis])).sum();
+                        cosine.max(0.0) * f64::from(shares[j]) / 255.0 * f64::from(light[channel][j])
+                    })
+                    .sum::<f64>()
+                    / std::f64::consts::PI
+            });
+            let mut row = vec![0.0; basis.padded()];
+            add_irradiance_row(&basis, normal, &shares, 1.0, &mut row);
+            let d = [0.3f32, -1.0, 2.0];
+            let mut transposed = [(); 3].map(|()| vec![0.0; basis.padded()]);
+            irradiance_backward(&basis, normal, &shares, d, &mut transposed);
+            for channel in 0..3 {
+                assert!((f64::from(fast[channel]) / truth[channel] - 1.0).abs() < 1e-6);
+                assert!((f64::from(plain[channel]) / truth[channel] - 1.0).abs() < 3e-6);
+                let dot =
+                    |a: &[f32], b: &[f32]| -> f64 { a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum() };
+                let by_row = dot(&row, &light[channel]);
+                assert!((by_row / truth[channel] - 1.0).abs() < 1e-6);
+                // <A x, d> = <x, A' d>, with another x than the light.
+                let forward = f64::from(irradiance(&basis, normal, &shares, &d_light)[channel] * d[channel]);
+                let backward = dot(&transposed[channel], &d_light[channel]);
+                assert!((forward / backward - 1.0).abs() < 1e-6, "{forward} {backward}");
+            }
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! The arithmetic of wide lobes: one walk over the hats of the light for several widths, eight hats at a time.
+//!
+//! Written once over [`Eight`]; [`super::lobe_sum`] chooses the version at run time.
+
+use super::light_basis::LightBasis;
+use super::lobe_sum::{LobePlace, LobeSums};
+use super::vector::{Eight, LANES};
+use std::f32::consts::{LN_2, PI};
+
+/// Widths summed in one walk over the light.
+pub(super) const MOST_AT_ONCE: usize = 8;
+
+/// What eight hats have in common for all widths.
+struct Hats<V> {
+    /// `n.i`, at least 0.
+    cos_in: V,
+    /// Logarithm to base 2 of `(n.h)^2`.
+    log_cos_squared: V,
+    /// `(1 - h.o)^5`.
+    schlick: V,
+    /// Solid angle times `n.i`.
+    weight: V,
+}
+
+#[inline(always)]
+fn hats<V: Eight>(basis: &LightBasis, normal: [V; 3], viewer: [V; 3], cos_out: V, at: usize) -> Option<Hats<V>> {
+    let direction = [0, 1, 2].map(|axis| V::load(&basis.direction[axis][at..at + LANES]));
+    let dot = |a: [V; 3]| a[2].mul_add(direction[2], a[1].mul_add(direction[1], a[0].mul(direction[0])));
+    let cos_in = dot(normal);
+    if !cos_in.any_positive() {
+        return None;
+    }
+    let cos_in = cos_in.max(V::splat(0.0));
+    // |i + o|^2 = 2 + 2 i.o, n.h = (n.i + n.o) / |i + o|, h.o = |i + o| / 2.
+    let length_squared = dot(viewer).mul_add(V::splat(2.0), V::splat(2.0)).max(V::splat(1e-6));
+    let sum = cos_in.add(cos_out);
+    let cos_squared = sum.mul(sum).div(length_squared).min(V::splat(1.0));
+    let rest = V::splat(1.0).sub(length_squared.sqrt().mul(V::splat(0.5))).max(V::splat(0.0));
+    let squared = rest.mul(rest);
+    Some(Hats {
+        cos_in,
+        log_cos_squared: cos_squared.max(V::splat(1e-30)).log2(),
+        schlick: squared.mul(squared).mul(rest),
+        weight: cos_in.mul(V::load(&basis.solid_angle[at..at + LANES])),
+    })
+}
+
+/// Numbers of a lobe that hats do not change.
+#[derive(Clone, Copy, Default)]
+struct Lobe {
+    /// Half the exponent: of `(n.h)^2`.
+    half_exponent: f32,
+    /// `k` of the shadowing term.
+    k: f32,
+    /// What all hats are multiplied by.
+    scale: f32,
+    /// The part of the derivative that hats do not change.
+    slope: f32,
+    /// Factor of `log2 (n.h)^2` in the derivative.
+    slope_of_log: f32,
+}
+
+impl Lobe {
+    #[inline(always)]
+    fn new(width: f32, cos_out: f32) -> Self {
+        let inverse = 1.0 / (width * width);
+        let k = 0.5 * width;
+        let q_out = cos_out * (1.0 - k) + k;
+        Lobe {
+            half_exponent: inverse - 1.0,
+            k,
+            scale: inverse * 0.25 / (PI * q_out),
+            slope: -2.0 - k * (1.0 - cos_out) / q_out,
+            slope_of_log: -2.0 * LN_2 * inverse,
+        }
+    }
+}
+
+/// [`lobe_sums`](super::lobe_sum::lobe_sums) of at most [`MOST_AT_ONCE`] wide lobes, with vectors of any kind.
+#[inline(always)]
+pub(super) fn sums_in<V: Eight, const DERIVATIVE: bool>(
+    basis: &LightBasis,
+    place: &LobePlace,
+    light: &[Vec<f32>; 3],
+    widths: &[f32],
+    sums: &mut [LobeSums],
+) {
+    let count = widths.len().min(MOST_AT_ONCE).min(sums.len());
+    let cos_out = place.normal.dot(place.to_viewer);
+    let mut lobes = [Lobe::default(); MOST_AT_ONCE];
+    for (lobe, &width) in lobes.iter_mut().zip(widths) {
+        *lobe = Lobe::new(width, cos_out);
+    }
+    let zero = V::splat(0.0);
+    // Per width: three channels whole, three weighted with Schlick's factor, and the same two for what is hidden.
+    let mut totals = [[zero; 8]; MOST_AT_ONCE];
+    let mut slopes = [[zero; 8]; MOST_AT_ONCE];
+    let normal = place.normal.to_array().map(V::splat);
+    let viewer = place.to_viewer.to_array().map(V::splat);
+    let cos_out_all = V::splat(cos_out);
+    for at in (0..basis.padded()).step_by(LANES) {
+        let Some(hats) = hats(basis, normal, viewer, cos_out_all, at) else { continue };
+        let share = V::load_bytes(&place.shares[at..at + LANES]).mul(V::splat(1.0 / 255.0));
+        let seen = hats.weight.mul(share);
+        let arriving = [
+            seen.mul(V::load(&light[0][at..at + LANES])),
+            seen.mul(V::load(&light[1][at..at + LANES])),
+            seen.mul(V::load(&light[2][at..at + LANES])),
+            hats.weight.sub(seen),
+        ];
+        let grazing = arriving.map(|value| value.mul(hats.schlick));
+        for which in 0..count {
+            let lobe = &lobes[which];
+            let power = hats.log_cos_squared.mul(V::splat(lobe.half_exponent)).exp2();
+            let q_in = hats.cos_in.mul_add(V::splat(1.0 - lobe.k), V::splat(lobe.k));
+            let value = power.div(q_in);
+            let total = &mut totals[which];
+            for k in 0..4 {
+                total[k] = value.mul_add(arriving[k], total[k]);
+                total[4 + k] = value.mul_add(grazing[k], total[4 + k]);
+            }
+            if DERIVATIVE {
+                let shadowing = V::splat(1.0).sub(hats.cos_in).mul(V::splat(lobe.k)).div(q_in);
+                let slope = hats.log_cos_squared.mul_add(V::splat(lobe.slope_of_log), V::splat(lobe.slope));
+                let slope = slope.sub(shadowing).mul(value);
+                let total = &mut slopes[which];
+                for k in 0..4 {
+                    total[k] = slope.mul_add(arriving[k], total[k]);
+                    total[4 + k] = slope.mul_add(grazing[k], total[4 + k]);
+                }
+            }
+        }
+    }
+    for which in 0..count {
+        let scale = lobes[which].scale;
+        let whole = totals[which].map(|value| value.sum() * scale);
+        let moved = if DERIVATIVE { slopes[which].map(|value| value.sum() * scale) } else { [0.0; 8] };
+        sums[which] = LobeSums {
+            base: [0, 1, 2].map(|c| whole[c] - whole[4 + c]),
+            grazing: [whole[4], whole[5], whole[6]],
+            hidden: [whole[3] - whole[7], whole[7]],
+            d_base: [0, 1, 2].map(|c| moved[c] - moved[4 + c]),
+            d_grazing: [moved[4], moved[5], moved[6]],
+            d_hidden: [moved[3] - moved[7], moved[7]],
+        };
+    }
+}
+
+/// [`add_lobe_row`](super::lobe_sum::add_lobe_row) of a wide lobe, with vectors of any kind.
+#[inline(always)]
+pub(super) fn row_in<V: Eight>(basis: &LightBasis, place: &LobePlace, width: f32, scales: [f32; 2], row: &mut [f32]) {
+    let cos_out = place.normal.dot(place.to_viewer);
+    let lobe = Lobe::new(width, cos_out);
+    let normal = place.normal.to_array().map(V::splat);
+    let viewer = place.to_viewer.to_array().map(V::splat);
+    let cos_out_all = V::splat(cos_out);
+    let scale = lobe.scale / 255.0;
+    let (base, change) = (V::splat(scales[0] * scale), V::splat((scales[1] - scales[0]) * scale));
+    for at in (0..basis.padded()).step_by(LANES) {
+        let Some(hats) = hats(basis, normal, viewer, cos_out_all, at) else { continue };
+        let power = hats.log_cos_squared.mul(V::splat(lobe.half_exponent)).exp2();
+        let q_in = hats.cos_in.mul_add(V::splat(1.0 - lobe.k), V::splat(lobe.k));
+        let value = power.div(q_in).mul(hats.weight).mul(V::load_bytes(&place.shares[at..at + LANES]));
+        // base (1 - s) + grazing s.
+        let factor = hats.schlick.mul_add(change, base);
+        let place = &mut row[at..at + LANES];
+        value.mul_add(factor, V::load(place)).store(place);
+    }
+}

@@ -1,0 +1,263 @@
+//! Specular integrals of a shading point: what the lobe sends to the camera, before Fresnel.
+//!
+//! With Schlick's `F = F0 (1 - s) + s`, `s = (1 - h.o)^5`, the lobe's radiance is `F0 (S0 - S5) + S5`, where
+//! `S0 = ∫ L V D G / (4 (n.i)(n.o)) (n.i) dω` and `S5` is the same integral with a factor `s`. Both are linear in the
+//! light. [`LobeSums::base`] is `S0 - S5`, [`LobeSums::grazing`] is `S5`.
+//!
+//! Wide lobes are summed over the hats of the light, one value of the lobe a hat: no noise, and smooth in everything.
+//! A lobe narrower than a few texels is integrated over half vectors instead, at fixed places of equal probability in a
+//! frame that turns with the viewer ([`super::half_vector`]).
+
+use super::half_vector;
+use super::light_basis::LightBasis;
+use super::lobe_kernel::{MOST_AT_ONCE, row_in, sums_in};
+#[cfg(target_arch = "x86_64")]
+use super::vector::Avx2;
+use super::vector::{Plain, has_avx2};
+use glam::Vec3;
+
+/// Lobes of at least this microfacet width, for a light of 32 rows, are summed over hats. The standard deviation of
+/// reflected directions is then 20 degrees, 3.6 texels: one value a hat errs by 1 % at the peak of the lobe.
+const WIDE_AT_32_ROWS: f32 = 0.25;
+
+/// The narrowest lobe that is summed over the hats of this basis.
+pub fn wide_from(basis: &LightBasis) -> f32 {
+    (WIDE_AT_32_ROWS * 32.0 / basis.height as f32).min(1.0)
+}
+
+/// Where a lobe is integrated: unit normal and unit direction towards the viewer, above its horizon.
+#[derive(Clone, Copy, Debug)]
+pub struct LobePlace<'a> {
+    /// Unit shading normal.
+    pub normal: Vec3,
+    /// Unit direction towards the viewer.
+    pub to_viewer: Vec3,
+    /// Visible shares of the hats.
+    pub shares: &'a [u8],
+}
+
+/// Integrals of one lobe of one width, and their derivatives by the logarithm of the width.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LobeSums {
+    /// `S0 - S5` per channel: times F0.
+    pub base: [f32; 3],
+    /// `S5` per channel.
+    pub grazing: [f32; 3],
+    /// `S0 - S5` and `S5` of a white light over what is hidden: the part of the lobe that meets other surface.
+    pub hidden: [f32; 2],
+    /// Derivative of `base` by the logarithm of the width; zero where it was not asked for.
+    pub d_base: [f32; 3],
+    /// Derivative of `grazing`.
+    pub d_grazing: [f32; 3],
+    /// Derivative of `hidden`.
+    pub d_hidden: [f32; 2],
+}
+
+/// The sums of a lobe at several widths, without derivatives. `sums` is as long as `widths`.
+pub fn lobe_sums(basis: &LightBasis, place: &LobePlace, light: &[Vec<f32>; 3], widths: &[f32], sums: &mut [LobeSums]) {
+    let narrow = widths.partition_point(|&width| width < wide_from(basis));
+    for (sum, &width) in sums.iter_mut().zip(&widths[..narrow]) {
+        *sum = half_vector::lobe_sums(basis, place, light, width, half_vector::place_count(basis, width));
+    }
+    for (sums, widths) in sums[narrow..].chunks_mut(MOST_AT_ONCE).zip(widths[narrow..].chunks(MOST_AT_ONCE)) {
+        wide_sums::<false>(basis, place, light, widths, sums);
+    }
+}
+
+/// The sums of a lobe and their derivatives by the logarithm of its width.
+///
+/// Over hats the derivative is that of the sum. Over half vectors it is the difference of the sum at widths two per cent
+/// apart: the places move with the width, and between hats the sum bends.
+pub fn lobe_with_derivative(basis: &LightBasis, place: &LobePlace, light: &[Vec<f32>; 3], width: f32) -> LobeSums {
+    let mut sums = [LobeSums::default()];
+    if width >= wide_from(basis) {
+        wide_sums::<true>(basis, place, light, &[width], &mut sums);
+        return sums[0];
+    }
+    const STEP: f32 = 0.01;
+    let count = half_vector::place_count(basis, width);
+    let at = |width: f32| half_vector::lobe_sums(basis, place, light, width, count);
+    let (mut sum, below, above) = (at(width), at(width * (-STEP).exp()), at(width * STEP.exp()));
+    let slope = |above: f32, below: f32| (above - below) / (2.0 * STEP);
+    sum.d_base = std::array::from_fn(|c| slope(above.base[c], below.base[c]));
+    sum.d_grazing = std::array::from_fn(|c| slope(above.grazing[c], below.grazing[c]));
+    sum.d_hidden = std::array::from_fn(|k| slope(above.hidden[k], below.hidden[k]));
+    sum
+}
+
+/// Adds the rows of `S0 - S5` and `S5`, times `scales`, to a row over the padded texels of the light.
+pub fn add_lobe_row(basis: &LightBasis, place: &LobePlace, width: f32, scales: [f32; 2], row: &mut [f32]) {
+    if width < wide_from(basis) {
+        half_vector::add_lobe_row(basis, place, width, scales, row);
+        return;
+    }
+    #[cfg(target_arch = "x86_64")]
+    if has_avx2() {
+        // SAFETY: the processor has what the function is compiled for.
+        return unsafe { row_avx2(basis, place, width, scales, row) };
+    }
+    row_in::<Plain>(basis, place, width, scales, row);
+}
+
+fn wide_sums<const DERIVATIVE: bool>(
+    basis: &LightBasis,
+    place: &LobePlace,
+    light: &[Vec<f32>; 3],
+    widths: &[f32],
+    sums: &mut [LobeSums],
+) {
+    #[cfg(target_arch = "x86_64")]
+    if has_avx2() {
+        // SAFETY: the processor has what the function is compiled for.
+        return unsafe { sums_avx2::<DERIVATIVE>(basis, place, light, widths, sums) };
+    }
+    sums_in::<Plain, DERIVATIVE>(basis, place, light, widths, sums);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn sums_avx2<const DERIVATIVE: bool>(
+    basis: &LightBasis,
+    place: &LobePlace,
+    light: &[Vec<f32>; 3],
+    widths: &[f32],
+    sums: &mut [LobeSums],
+) {
+    sums_in::<Avx2, DERIVATIVE>(basis, place, light, widths, sums);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn row_avx2(basis: &LightBasis, place: &LobePlace, width: f32, scales: [f32; 2], row: &mut [f32]) {
+    row_in::<Avx2>(basis, place, width, scales, row);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::{LobeGeometry, Material};
+    use crate::math::random::SequentialRandom;
+    use crate::math::sphere::{direction_of_texel, solid_angle_of_texel};
+
+    fn light_of(basis: &LightBasis, seed: u64) -> [Vec<f32>; 3] {
+        let mut random = SequentialRandom::new(seed);
+        let mut light = [(); 3].map(|()| vec![0.0f32; basis.padded()]);
+        for texel in 0..basis.count() {
+            for plane in &mut light {
+                plane[texel] = 0.2 + 0.3 * random.next_number();
+            }
+        }
+        // A sun.
+        for plane in &mut light {
+            plane[8 * 64 + 20] = 80.0;
+        }
+        light
+    }
+
+    /// The integrals by brute force over the bilinear light: the lobe of the path tracer on a fine grid.
+    fn truth(light: &[Vec<f32>; 3], normal: Vec3, viewer: Vec3, width: f32) -> ([f64; 3], [f64; 3]) {
+        let (mut base, mut grazing) = ([0.0; 3], [0.0; 3]);
+        let (fine_width, fine_height) = (64 * 10, 32 * 10);
+        for row in 0..fine_height {
+            let solid = solid_angle_of_texel(row, fine_width, fine_height);
+            for column in 0..fine_width {
+                let direction = direction_of_texel(row, column, fine_width, fine_height);
+                let Some(geometry) = LobeGeometry::new(normal, direction, viewer) else { continue };
+                let lobe = |specular: f32| {
+                    let material = Material { diffuse: [0.0; 3], specular: [specular; 3], log_width: width.ln() };
+                    f64::from(material.reflect(&geometry, 1.0)[0])
+                };
+                let (grazing_lobe, whole) = (lobe(0.0), lobe(1.0));
+                let tap = crate::math::sphere::tap_of_direction(direction, 64, 32);
+                for channel in 0..3 {
+                    let radiance: f64 =
+                        (0..4).map(|k| f64::from(light[channel][tap.index[k] as usize] * tap.weight[k])).sum();
+                    base[channel] += (whole - grazing_lobe) * radiance * solid;
+                    grazing[channel] += grazing_lobe * radiance * solid;
+                }
+            }
+        }
+        (base, grazing)
+    }
+
+    #[test]
+    fn sums_are_the_integrals_of_the_lobe_at_all_widths() {
+        let basis = LightBasis::new(64, 32);
+        let light = light_of(&basis, 2);
+        let shares = vec![255u8; basis.padded()];
+        let sun = basis.direction_of(8 * 64 + 20);
+        let normal = Vec3::new(0.1, 0.95, 0.2).normalize_or(Vec3::Y);
+        // Beside the highlight only the tail of a narrow lobe reaches the sun, and few places lie there: what counts is
+        // the error beside what the highlight sends.
+        let mut highlights = Vec::new();
+        for (offset, name, tolerance) in
+            [(Vec3::ZERO, "highlight", 0.025), (Vec3::new(0.2, 0.1, -0.3), "beside", 0.025)]
+        {
+            let mirrored = (normal * (2.0 * normal.dot(sun)) - sun + offset).normalize_or(Vec3::Y);
+            let place = LobePlace { normal, to_viewer: mirrored, shares: &shares };
+            for (index, width) in [0.01f32, 0.05, 0.1, 0.17, 0.24, 0.26, 0.4, 0.7, 1.0].into_iter().enumerate() {
+                let (base, grazing) = truth(&light, normal, mirrored, width);
+                if offset == Vec3::ZERO {
+                    highlights.push(base);
+                }
+                let mut sums = [LobeSums::default()];
+                lobe_sums(&basis, &place, &light, &[width], &mut sums);
+                for channel in 0..3 {
+                    let error = f64::from(sums[0].base[channel]) - base[channel];
+                    let allowed = tolerance * base[channel] + 0.012 * highlights[index][channel];
+                    println!("{name} {width} base {error:.4} of {:.4}", base[channel]);
+                    assert!(error.abs() < allowed, "{name} {width}: {error}");
+                    let relative = (f64::from(sums[0].grazing[channel]) - grazing[channel]) / base[channel];
+                    assert!(relative.abs() < 0.01, "{name} {width} grazing: {relative}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn versions_rows_and_derivatives_agree() {
+        let basis = LightBasis::new(64, 32);
+        let light = light_of(&basis, 5);
+        let mut random = SequentialRandom::new(9);
+        let shares: Vec<u8> = (0..basis.padded()).map(|_| (random.next_number() * 255.0) as u8).collect();
+        let normal = Vec3::new(0.3, 0.9, -0.1).normalize_or(Vec3::Y);
+        let to_viewer = Vec3::new(-0.5, 0.6, 0.4).normalize_or(Vec3::Y);
+        let place = LobePlace { normal, to_viewer, shares: &shares };
+        for width in [0.03f32, 0.2, 0.3, 0.55, 1.0] {
+            let sums = lobe_with_derivative(&basis, &place, &light, width);
+            if width >= wide_from(&basis) {
+                let mut plain = [LobeSums::default()];
+                sums_in::<Plain, true>(&basis, &place, &light, &[width], &mut plain);
+                for channel in 0..3 {
+                    for (a, b) in [
+                        (sums.base[channel], plain[0].base[channel]),
+                        (sums.grazing[channel], plain[0].grazing[channel]),
+                        (sums.d_base[channel], plain[0].d_base[channel]),
+                    ] {
+                        assert!((a - b).abs() < 2e-5 * sums.base[channel], "{width}: {a} {b}");
+                    }
+                }
+            }
+            for channel in 0..3 {
+                let mut row = vec![0.0; basis.padded()];
+                add_lobe_row(&basis, &place, width, [0.3, 1.0], &mut row);
+                let by_row: f64 = row.iter().zip(&light[channel]).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum();
+                let direct = f64::from(0.3 * sums.base[channel] + sums.grazing[channel]);
+                assert!((by_row / direct - 1.0).abs() < 2e-6, "{width}: {by_row} {direct}");
+            }
+            let step = 0.01f32;
+            let at = |width: f32| {
+                let mut sums = [LobeSums::default()];
+                lobe_sums(&basis, &place, &light, &[width], &mut sums);
+                sums[0]
+            };
+            if width < 1.0 {
+                let (below, above) = (at(width * (-step).exp()), at(width * step.exp()));
+                let difference = (above.base[1] - below.base[1]) / (2.0 * step);
+                assert!((difference - sums.d_base[1]).abs() < 3e-3 * sums.base[1], "{width}: {difference}");
+                let difference = (above.hidden[0] - below.hidden[0]) / (2.0 * step);
+                assert!((difference - sums.d_hidden[0]).abs() < 2e-3 * sums.hidden[0], "{width}: {difference}");
+            }
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! The cache as a whole: against the path tracer, its transposes, its bits.
+
+use super::*;
+use crate::material::texels::{PyramidWeights, TexelPyramid, texels_from_maps};
+use crate::math::random::SequentialRandom;
+use crate::render::picture::{PictureSettings, render};
+use crate::render::{Parameters, Surface};
+use crate::scene::{Scene, demo};
+use std::sync::atomic::AtomicBool;
+
+struct Small {
+    scene: Scene,
+    surface: Surface,
+    parameters: Parameters<f32>,
+}
+
+fn small() -> Small {
+    let settings = demo::DemoSettings { views: 4, held_out: 0, width: 64, height: 48, map_size: 128, seed: 1 };
+    let scene = demo::build(&settings).unwrap().scene;
+    let surface = Surface::new(scene.mesh.clone()).unwrap();
+    let truth = scene.truth.as_ref().unwrap();
+    let weights = PyramidWeights::flat(128, 128);
+    let parameters =
+        Parameters::new(TexelPyramid::from_base(texels_from_maps(&truth.maps), &weights), &truth.environment);
+    Small { scene, surface, parameters }
+}
+
+/// Root mean square error of the cache against the path tracer, relative to the picture's, noise taken out.
+fn error(small: &Small, settings: CachedSettings, samples: usize) -> f64 {
+    let Small { scene, surface, parameters } = small;
+    let transport =
+        CachedTransport::build(surface, settings, parameters.environment_size, &AtomicBool::new(false)).unwrap();
+    let light = transport.basis.planes(&parameters.light);
+    let texels = &parameters.texels.levels[0].texels;
+    let at = transport.point_light(&light, &transport.reflectance_of_points(texels, 128));
+    let (mut squared, mut power) = (0.0f64, 0.0f64);
+    for view in 0..2 {
+        let camera = &scene.views[view].camera;
+        let first_hits = FootprintSettings { map_size: 128, ..FootprintSettings::default() };
+        let footprints = ViewFootprints::trace(surface, &transport.grid, camera, view as u32, &first_hits);
+        let picture = transport.picture(&footprints, texels, &light, &at);
+        let references = [1, 2].map(|seed| {
+            let settings = PictureSettings {
+                samples,
+                max_bounces: settings.max_bounces,
+                lobe_strength: settings.lobe_strength,
+                background_visible: false,
+                seed,
+                ..PictureSettings::default()
+            };
+            render(surface, camera, parameters, view as u32, &settings, &AtomicBool::new(false)).radiance
+        });
+        for (pixel, own) in picture.iter().enumerate() {
+            for channel in 0..3 {
+                let [a, b] = [0, 1].map(|k| f64::from(references[k].pixels()[pixel][channel]));
+                let own = f64::from(own[channel]);
+                squared += (own - a) * (own - b);
+                power += a * b;
+            }
+        }
+    }
+    (squared / power).max(0.0).sqrt()
+}
+
+#[test]
+fn pictures_agree_with_the_path_tracer_and_better_on_a_finer_grid() {
+    let small = small();
+    let direct = CachedSettings { grid: 32, max_bounces: 1, lobe_strength: 0.0, ..CachedSettings::default() };
+    let coarse = error(&small, direct, 64);
+    let fine = error(&small, CachedSettings { grid: 128, ..direct }, 64);
+    let whole = error(&small, CachedSettings { grid: 128, max_bounces: 3, lobe_strength: 1.0, ..direct }, 64);
+    println!("direct, diffuse: grid 32 {coarse:.4}, grid 128 {fine:.4}; three hits with lobe, grid 128 {whole:.4}");
+    assert!(fine < 0.4 * coarse, "{coarse} {fine}");
+    assert!(fine < 0.05, "{fine}");
+    assert!(whole < 0.06, "{whole}");
+}
+
+#[test]
+fn light_at_points_is_linear_with_an_exact_transpose() {
+    let small = small();
+    let settings = CachedSettings { grid: 32, bounce_rays: 16, max_bounces: 4, ..CachedSettings::default() };
+    let transport = CachedTransport::build(&small.surface, settings, (64, 32), &AtomicBool::new(false)).unwrap();
+    let count = transport.grid.points.len();
+    let mut random = SequentialRandom::new(3);
+    let mut values = |count: usize| (0..count).map(|_| [(); 3].map(|()| random.next_number())).collect::<Vec<_>>();
+    let (light, d_arriving, reflectance) = (values(64 * 32), values(count), values(count));
+    let planes = transport.basis.planes(&light);
+    let arriving = transport.point_light(&planes, &reflectance).arriving;
+    let d_direct = transport.with_bounces_backward(&d_arriving, &reflectance);
+    let d_light = transport.direct_backward(&d_direct);
+    let sum = |a: &[[f32; 3]], b: &[[f32; 3]]| -> f64 {
+        a.iter().flatten().zip(b.iter().flatten()).map(|(&a, &b)| f64::from(a) * f64::from(b)).sum()
+    };
+    let forward = sum(&arriving, &d_arriving);
+    let backward: f64 = (0..3)
+        .map(|c| planes[c].iter().zip(&d_light[c]).map(|(&a, &b)| f64::from(a) * f64::from(b)).sum::<f64>())
+        .sum();
+    assert!(count > 300 && (forward / backward - 1.0).abs() < 1e-6, "{count} {forward} {backward}");
+}
+
+#[test]
+fn inherited_visibility_is_that_of_rays_but_for_a_few_texels() {
+    let small = small();
+    let basis = LightBasis::new(64, 32);
+    let grid = VisibilityGrid::new(&small.surface, 64);
+    let visibility = visibility::Visibility::trace(&small.surface, &grid, &basis, &AtomicBool::new(false)).unwrap();
+    let (mut wrong, mut count) = (0usize, 0usize);
+    for (index, point) in grid.points.iter().enumerate().step_by(7) {
+        let origin = small.surface.bvh().offset_origin(point.position, point.geometric_normal, point.geometric_normal);
+        for texel in (0..basis.count()).step_by(3) {
+            let share = visibility.of(index)[texel];
+            let direction = crate::math::sphere::direction_of_texel(texel / 64, texel % 64, 64, 32);
+            let cosine = direction.dot(point.geometric_normal).min(direction.dot(point.shading_normal));
+            if (1..255).contains(&share) || cosine.abs() < 0.1 {
+                continue;
+            }
+            let ray = crate::trace::Ray { origin, direction, t_max: f32::INFINITY };
+            let seen = cosine > 0.0 && !small.surface.bvh().is_occluded(&ray);
+            wrong += usize::from(seen != (share == 255));
+            count += 1;
+        }
+    }
+    let share = wrong as f64 / count as f64;
+    println!("{wrong} of {count} texels differ; {} rays for {} points", visibility.rays, grid.points.len());
+    assert!(count > 20_000 && share < 0.004, "{share}");
+}
+
+#[test]
+fn the_number_of_threads_changes_no_bit() {
+    let small = small();
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let settings = CachedSettings { grid: 32, bounce_rays: 16, ..CachedSettings::default() };
+            let transport =
+                CachedTransport::build(&small.surface, settings, (64, 32), &AtomicBool::new(false)).unwrap();
+            let light = transport.basis.planes(&small.parameters.light);
+            let texels = &small.parameters.texels.levels[0].texels;
+            let at = transport.point_light(&light, &transport.reflectance_of_points(texels, 128));
+            let first_hits = FootprintSettings { map_size: 128, ..FootprintSettings::default() };
+            let camera = &small.scene.views[1].camera;
+            let footprints = ViewFootprints::trace(&small.surface, &transport.grid, camera, 1, &first_hits);
+            let d_light = transport.direct_backward(&at.arriving);
+            (transport.picture(&footprints, texels, &light, &at), d_light)
+        })
+    };
+    assert_eq!(run(1), run(3));
+}
+
+#[test]
+fn footprints_cover_pixels_with_weights_that_sum_to_one() {
+    let small = small();
+    let grid = VisibilityGrid::new(&small.surface, 64);
+    let first_hits = FootprintSettings { map_size: 128, ..FootprintSettings::default() };
+    let footprints = ViewFootprints::trace(&small.surface, &grid, &small.scene.views[0].camera, 0, &first_hits);
+    let mut share = footprints.escaped.clone();
+    for point in &footprints.points {
+        share[point.pixel as usize] += point.share;
+        for list in [footprints.texels_of(point), footprints.lit_of(point)] {
+            let sum: f32 = list.iter().map(|(_, weight)| weight).sum();
+            assert!((sum - 1.0).abs() < 1e-4, "{list:?}");
+        }
+        assert!(point.normal.dot(point.to_viewer) > 0.0);
+    }
+    assert!(share.iter().all(|&share| share < 1.0001));
+    let whole = share.iter().filter(|&&share| share > 0.999).count();
+    // Backs and the very rim are left out.
+    assert!(whole as f64 > 0.97 * share.len() as f64, "{whole} of {}", share.len());
+}

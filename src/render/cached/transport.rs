@@ -1,0 +1,341 @@
+//! All that is cached of a scene, and the radiance it gives for maps and a light.
+
+use super::bounce::BounceMatrix;
+use super::footprint::{ShadingPoint, ViewFootprints};
+use super::half_vector;
+use super::irradiance::{irradiance, irradiance_backward};
+use super::light_basis::LightBasis;
+use super::lobe_sum::{LobePlace, LobeSums, lobe_sums};
+use super::points::{NO_POINT, VisibilityGrid};
+use super::vector::LANES;
+use super::visibility::Visibility;
+use crate::material::texels::Texel;
+use crate::render::Surface;
+use glam::Vec3;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// How fine the cache is. Its error against the path tracer falls as these rise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CachedSettings {
+    /// Width and height in texels of the grid over the atlas on which visibility is kept.
+    pub grid: usize,
+    /// Rays from each of its points to other surface.
+    pub bounce_rays: usize,
+    /// Number of surface hits on the longest path: 1 is direct light only.
+    pub max_bounces: usize,
+    /// Strength of the specular lobe as a whole, in [0, 1].
+    pub lobe_strength: f32,
+    /// Seed of the rays to other surface.
+    pub seed: u64,
+}
+
+impl Default for CachedSettings {
+    fn default() -> Self {
+        CachedSettings { grid: 256, bounce_rays: 64, max_bounces: 3, lobe_strength: 1.0, seed: 1 }
+    }
+}
+
+/// Visibility, light between surfaces, and integrals of the light's hats: all that rays are needed for.
+#[derive(Clone, Debug)]
+pub struct CachedTransport {
+    /// How fine it is.
+    pub settings: CachedSettings,
+    /// Integrals of the light's hats.
+    pub basis: LightBasis,
+    /// Where visibility is kept.
+    pub grid: VisibilityGrid,
+    /// What each point sees of the light.
+    pub visibility: Visibility,
+    /// What each point sees of other points; `None` for direct light only.
+    pub bounces: Option<BounceMatrix>,
+    /// Share of light that lobes send back on average, without and with Schlick's factor, over log width.
+    albedo: Vec<[f32; 2]>,
+}
+
+/// Light at the points of the grid, per channel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointLight {
+    /// What a white Lambert surface would send back: irradiance over pi, direct and from other surface.
+    pub arriving: Vec<[f32; 3]>,
+    /// The part of `arriving` that comes from the light directly.
+    pub direct: Vec<[f32; 3]>,
+    /// Radiance that points send to others, as far as paths are long enough to bring it to the camera.
+    pub leaving: Vec<[f32; 3]>,
+    /// Mean radiance of the surface that points see; zero where they see none.
+    pub around: Vec<[f32; 3]>,
+}
+
+impl CachedTransport {
+    /// Traces everything for lights of this size; `None` when `stop` was raised.
+    pub fn build(
+        surface: &Surface,
+        settings: CachedSettings,
+        light_size: (usize, usize),
+        stop: &AtomicBool,
+    ) -> Option<Self> {
+        let basis = LightBasis::new(light_size.0, light_size.1);
+        let grid = VisibilityGrid::new(surface, settings.grid);
+        let visibility = Visibility::trace(surface, &grid, &basis, stop)?;
+        let bounces = (settings.max_bounces > 1)
+            .then(|| BounceMatrix::trace(surface, &grid, settings.bounce_rays, settings.seed, stop));
+        let albedo = lobe_albedo();
+        let made = CachedTransport { settings, basis, grid, visibility, bounces, albedo };
+        (!stop.load(Ordering::Relaxed)).then_some(made)
+    }
+
+    /// Bytes it takes.
+    pub fn memory_bytes(&self) -> usize {
+        self.visibility.shares.len() + self.grid.points.len() * 60
+    }
+
+    /// Direct light at all points: irradiance over pi.
+    pub fn direct(&self, light: &[Vec<f32>; 3]) -> Vec<[f32; 3]> {
+        let point_of = |index: usize| &self.grid.points[index];
+        (0..self.grid.points.len())
+            .into_par_iter()
+            .with_min_len(64)
+            .map(|index| irradiance(&self.basis, point_of(index).shading_normal, self.visibility.of(index), light))
+            .collect()
+    }
+
+    /// The transpose of [`CachedTransport::direct`]: the derivative by the light, given that by direct light.
+    pub fn direct_backward(&self, d_direct: &[[f32; 3]]) -> [Vec<f32>; 3] {
+        // A fixed number of parts, added up in order: the same bits whatever the thread count.
+        let part = d_direct.len().div_ceil(64).max(1);
+        let sums: Vec<[Vec<f32>; 3]> = d_direct
+            .par_chunks(part)
+            .enumerate()
+            .map(|(which, d_direct)| {
+                let mut sum = [(); 3].map(|()| vec![0.0; self.basis.padded()]);
+                for (offset, &d) in d_direct.iter().enumerate() {
+                    if d != [0.0; 3] {
+                        let index = which * part + offset;
+                        let normal = self.grid.points[index].shading_normal;
+                        irradiance_backward(&self.basis, normal, self.visibility.of(index), d, &mut sum);
+                    }
+                }
+                sum
+            })
+            .collect();
+        let mut total = [(); 3].map(|()| vec![0.0f32; self.basis.padded()]);
+        for sum in sums {
+            for (total, part) in total.iter_mut().zip(sum) {
+                for (total, part) in total.iter_mut().zip(part) {
+                    *total += part;
+                }
+            }
+        }
+        total
+    }
+
+    /// What points send back of light from everywhere: diffuse reflectance, and the lobe's as if it were diffuse too.
+    pub fn reflectance_of_points(&self, texels: &[Texel<f32>], map_size: usize) -> Vec<[f32; 3]> {
+        self.grid
+            .points
+            .par_iter()
+            .map(|point| {
+                let tap = crate::material::TextureTap::at(point.uv, 0, map_size, map_size);
+                let mut mean = [0.0f32; 7];
+                for k in 0..4 {
+                    for (sum, value) in mean.iter_mut().zip(&texels[tap.index[k] as usize]) {
+                        *sum += value * tap.weight[k];
+                    }
+                }
+                let [base, grazing] = self.lobe_albedo_at(mean[6]);
+                let strength = self.settings.lobe_strength;
+                [0, 1, 2].map(|c| mean[c] + strength * (mean[3 + c] * base + grazing))
+            })
+            .collect()
+    }
+
+    /// Light at all points, with as many bounces as paths have.
+    pub fn point_light(&self, light: &[Vec<f32>; 3], reflectance: &[[f32; 3]]) -> PointLight {
+        let direct = self.direct(light);
+        self.with_bounces(direct, reflectance)
+    }
+
+    /// Adds the light of other surface to direct light.
+    pub fn with_bounces(&self, direct: Vec<[f32; 3]>, reflectance: &[[f32; 3]]) -> PointLight {
+        let reflect = |arriving: &[[f32; 3]]| -> Vec<[f32; 3]> {
+            arriving.iter().zip(reflectance).map(|(e, r)| [0, 1, 2].map(|c| e[c] * r[c])).collect()
+        };
+        let Some(bounces) = &self.bounces else {
+            let nothing = vec![[0.0; 3]; direct.len()];
+            return PointLight { arriving: direct.clone(), direct, leaving: nothing.clone(), around: nothing };
+        };
+        let mut leaving = reflect(&direct);
+        let add = |indirect: Vec<[f32; 3]>| -> Vec<[f32; 3]> {
+            indirect.iter().zip(&direct).map(|(a, b)| [0, 1, 2].map(|c| a[c] + b[c])).collect()
+        };
+        for _ in 2..self.settings.max_bounces {
+            leaving = reflect(&add(bounces.apply(&leaving)));
+        }
+        let indirect = bounces.apply(&leaving);
+        let around = indirect
+            .iter()
+            .enumerate()
+            .map(|(index, value)| value.map(|value| value / bounces.row_sum(index).max(1e-6)))
+            .collect();
+        PointLight { arriving: add(indirect), direct, leaving, around }
+    }
+
+    /// The derivative by direct light of what [`CachedTransport::with_bounces`] returns as arriving, at fixed
+    /// reflectance: the exact transpose of its sweeps.
+    pub fn with_bounces_backward(&self, d_arriving: &[[f32; 3]], reflectance: &[[f32; 3]]) -> Vec<[f32; 3]> {
+        let mut d_direct = d_arriving.to_vec();
+        let Some(bounces) = &self.bounces else { return d_direct };
+        let reflect = |d: Vec<[f32; 3]>| -> Vec<[f32; 3]> {
+            d.iter().zip(reflectance).map(|(d, r)| [0, 1, 2].map(|c| d[c] * r[c])).collect()
+        };
+        let mut d_inner = d_arriving.to_vec();
+        for _ in 1..self.settings.max_bounces {
+            d_inner = reflect(bounces.apply_transposed(&d_inner));
+            for (sum, d) in d_direct.iter_mut().zip(&d_inner) {
+                for channel in 0..3 {
+                    sum[channel] += d[channel];
+                }
+            }
+        }
+        d_direct
+    }
+
+    /// Mean over a shading point of what the points of the grid hold.
+    #[inline]
+    pub fn interpolate(values: &[[f32; 3]], footprints: &ViewFootprints, point: &ShadingPoint) -> [f32; 3] {
+        let mut sum = [0.0; 3];
+        for &(index, weight) in footprints.lit_of(point) {
+            let value = &values[index as usize];
+            for channel in 0..3 {
+                sum[channel] += weight * value[channel];
+            }
+        }
+        sum
+    }
+
+    /// Where the lobe of a shading point is integrated.
+    #[inline]
+    pub fn lobe_place(&self, point: &ShadingPoint) -> LobePlace<'_> {
+        LobePlace {
+            normal: point.normal,
+            to_viewer: point.to_viewer,
+            shares: self.visibility.of(point.points.heaviest() as usize),
+        }
+    }
+
+    /// Mean radiance of the surface that a shading point's lobe meets: of what its rays hit, and with the weight of one
+    /// ray of what is around the point. Without that, the colour of a small hidden part of a lobe would be black whenever
+    /// all rays miss it, and pictures of polished things two per cent too dark.
+    #[inline]
+    pub fn lobe_surroundings(&self, at: &PointLight, point: &ShadingPoint) -> [f32; 3] {
+        let mut sum = at.around[point.points.heaviest() as usize];
+        let mut count = 1.0;
+        for &hit in point.lobe_hits.iter().filter(|&&hit| hit != NO_POINT) {
+            for channel in 0..3 {
+                sum[channel] += at.leaving[hit as usize][channel];
+            }
+            count += 1.0;
+        }
+        sum.map(|value| value / count)
+    }
+
+    /// Radiance of a shading point with a material of seven numbers.
+    pub fn shade(
+        &self,
+        light: &[Vec<f32>; 3],
+        at: &PointLight,
+        footprints: &ViewFootprints,
+        point: &ShadingPoint,
+        material: &[f32; 7],
+    ) -> [f32; 3] {
+        let arriving = Self::interpolate(&at.arriving, footprints, point);
+        let diffuse = [0, 1, 2].map(|c| material[c] * arriving[c]);
+        let strength = self.settings.lobe_strength;
+        if strength == 0.0 {
+            return diffuse;
+        }
+        let mut sums = [LobeSums::default()];
+        lobe_sums(&self.basis, &self.lobe_place(point), light, &[material[6].exp()], &mut sums);
+        let around = self.lobe_surroundings(at, point);
+        let [LobeSums { base, grazing, hidden, .. }] = sums;
+        [0, 1, 2].map(|c| {
+            let lobe = material[3 + c] * (base[c] + hidden[0] * around[c]) + grazing[c] + hidden[1] * around[c];
+            diffuse[c] + strength * lobe
+        })
+    }
+
+    /// Mean over a shading point's texels.
+    #[inline]
+    pub fn material_of(footprints: &ViewFootprints, point: &ShadingPoint, texels: &[Texel<f32>]) -> [f32; 7] {
+        let mut mean = [0.0f32; 7];
+        for &(texel, weight) in footprints.texels_of(point) {
+            for (sum, value) in mean.iter_mut().zip(&texels[texel as usize]) {
+                *sum += value * weight;
+            }
+        }
+        mean
+    }
+
+    /// A picture of a view in linear radiance, row-major. The background is black.
+    pub fn picture(
+        &self,
+        footprints: &ViewFootprints,
+        texels: &[Texel<f32>],
+        light: &[Vec<f32>; 3],
+        at: &PointLight,
+    ) -> Vec<[f32; 3]> {
+        let shaded: Vec<[f32; 3]> = footprints
+            .points
+            .par_iter()
+            .with_min_len(256)
+            .map(|point| self.shade(light, at, footprints, point, &Self::material_of(footprints, point, texels)))
+            .collect();
+        let mut picture = vec![[0.0f32; 3]; footprints.width * footprints.height];
+        for (point, radiance) in footprints.points.iter().zip(shaded) {
+            for channel in 0..3 {
+                picture[point.pixel as usize][channel] += point.share * radiance[channel];
+            }
+        }
+        picture
+    }
+
+    /// Share of light that a lobe sends back, averaged over directions: of F0 and of the grazing part.
+    fn lobe_albedo_at(&self, log_width: f32) -> [f32; 2] {
+        let last = self.albedo.len() - 1;
+        let place = (1.0 + log_width / ALBEDO_SPAN).clamp(0.0, 1.0) * last as f32;
+        let low = (place as usize).min(last - 1);
+        let share = place - low as f32;
+        [0, 1].map(|k| self.albedo[low][k] * (1.0 - share) + self.albedo[low + 1][k] * share)
+    }
+}
+
+/// Logarithms of widths from minus this to 0 have their albedo in a table.
+const ALBEDO_SPAN: f32 = 5.0;
+
+/// Directional albedo of the lobe, averaged over the hemisphere with the cosine, at even steps of log width.
+fn lobe_albedo() -> Vec<[f32; 2]> {
+    let constant = LightBasis { width: 1, height: 1, ..LightBasis::new(1, 1) };
+    let light = [(); 3].map(|()| {
+        let mut plane = vec![0.0f32; constant.padded().max(LANES)];
+        plane[0] = 1.0;
+        plane
+    });
+    let shares = vec![255u8; constant.padded().max(LANES)];
+    (0..=20)
+        .map(|step| {
+            let width = (ALBEDO_SPAN * (step as f32 / 20.0 - 1.0)).exp();
+            let mut sum = [0.0f32; 2];
+            const ANGLES: usize = 24;
+            for angle in 0..ANGLES {
+                // Equal steps of cos^2: the cosine's density.
+                let cosine = ((angle as f32 + 0.5) / ANGLES as f32).sqrt();
+                let to_viewer = Vec3::new((1.0 - cosine * cosine).sqrt(), cosine, 0.0);
+                let place = LobePlace { normal: Vec3::Y, to_viewer, shares: &shares };
+                let sums = half_vector::lobe_sums(&constant, &place, &light, width, 256);
+                sum[0] += sums.base[0] / ANGLES as f32;
+                sum[1] += sums.grazing[0] / ANGLES as f32;
+            }
+            sum
+        })
+        .collect()
+}

@@ -1,0 +1,278 @@
+//! How much of each hat of the light a point sees: one byte, traced once.
+//!
+//! The light's texels are split into 2 x 2 cells, each seen or not by one ray through its centre; the visible share of a
+//! hat is the weighted mean over its 4 x 4 cells. So most bytes are 0 or 255, and shadow edges have shares in between:
+//! with two bits a texel, a hard edge across the sun showed as bands, with eight it does not.
+//!
+//! Two things save rays. Within a point, three of four cells are traced only where neighbouring texels disagree. Between
+//! points, a texel that all coarser neighbours on the grid see wholly, or not at all, is taken over.
+
+use super::light_basis::LightBasis;
+use super::points::{NO_POINT, VisibilityGrid};
+use crate::math::sphere::direction_of_texel;
+use crate::render::Surface;
+use crate::trace::Ray;
+use glam::Vec3;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Weights of a hat over four cells along an axis, when none is clamped.
+const HAT: [f32; 4] = [0.125, 0.375, 0.375, 0.125];
+/// Distance on the grid of the points that are traced first.
+const COARSEST_STRIDE: usize = 4;
+/// Cells of points this much alike are taken over: cosine between normals.
+const ALIKE: f32 = 0.95;
+
+/// Visible shares of all hats at all points.
+#[derive(Clone, Debug)]
+pub struct Visibility {
+    /// Bytes a point has: the light's texels, padded.
+    pub stride: usize,
+    /// 255 is wholly visible; row after row of points.
+    pub shares: Vec<u8>,
+    /// Rays that were traced.
+    pub rays: u64,
+}
+
+impl Visibility {
+    /// Traces the visibility of all points of a grid; `None` when `stop` was raised.
+    pub fn trace(surface: &Surface, grid: &VisibilityGrid, basis: &LightBasis, stop: &AtomicBool) -> Option<Self> {
+        let stride = basis.padded();
+        let mut shares = vec![0u8; grid.points.len() * stride];
+        let cells = Cells::new(basis);
+        let mut rays = 0;
+        let mut step = COARSEST_STRIDE;
+        let mut done = vec![false; grid.points.len()];
+        while step >= 1 {
+            let chosen: Vec<usize> = (0..grid.points.len())
+                .filter(|&index| {
+                    let (row, column) =
+                        (grid.points[index].texel as usize / grid.size, grid.points[index].texel as usize % grid.size);
+                    !done[index] && row % step == 0 && column % step == 0
+                })
+                .collect();
+            // Few at a time: their bytes are held twice until they are written.
+            for group in chosen.chunks(8192) {
+                if stop.load(Ordering::Relaxed) {
+                    return None;
+                }
+                let rows: Vec<(Vec<u8>, u64)> = group
+                    .par_iter()
+                    .map_init(Scratch::default, |scratch, &index| {
+                        // Dropped as a whole above.
+                        if stop.load(Ordering::Relaxed) {
+                            return (vec![0; stride], 0);
+                        }
+                        let parents = parents(grid, index, step, &done);
+                        let rows: Vec<&[u8]> =
+                            parents.iter().map(|&parent| &shares[parent * stride..(parent + 1) * stride]).collect();
+                        cells.shares(surface, grid, index, &rows, scratch)
+                    })
+                    .collect();
+                for (&index, (row, traced)) in group.iter().zip(rows) {
+                    shares[index * stride..(index + 1) * stride].copy_from_slice(&row);
+                    rays += traced;
+                }
+            }
+            for index in chosen {
+                done[index] = true;
+            }
+            step /= 2;
+        }
+        (!stop.load(Ordering::Relaxed)).then_some(Visibility { stride, shares, rays })
+    }
+
+    /// The shares of a point.
+    #[inline]
+    pub fn of(&self, point: usize) -> &[u8] {
+        &self.shares[point * self.stride..(point + 1) * self.stride]
+    }
+}
+
+/// Points of the coarser grid around a point; none unless enough of them lie on the same smooth piece of surface.
+fn parents(grid: &VisibilityGrid, index: usize, step: usize, done: &[bool]) -> Vec<usize> {
+    if step == COARSEST_STRIDE {
+        return Vec::new();
+    }
+    let own = &grid.points[index];
+    let (row, column) = (own.texel as usize / grid.size, own.texel as usize % grid.size);
+    let coarse = 2 * step;
+    let corner = |value: usize| [value / coarse * coarse, value.div_ceil(coarse) * coarse];
+    let mut found: Vec<usize> = Vec::with_capacity(4);
+    for near_row in corner(row) {
+        for near_column in corner(column) {
+            if near_row >= grid.size || near_column >= grid.size {
+                return Vec::new();
+            }
+            let point = grid.point_of_texel[near_row * grid.size + near_column];
+            if point == NO_POINT || !done[point as usize] {
+                return Vec::new();
+            }
+            if found.contains(&(point as usize)) {
+                continue;
+            }
+            found.push(point as usize);
+        }
+    }
+    let alike = found.iter().all(|&parent| {
+        let parent = &grid.points[parent];
+        let offset = parent.position - own.position;
+        // On another chart a neighbour on the grid lies anywhere; on the same one it lies in the tangent plane.
+        parent.shading_normal.dot(own.shading_normal) > ALIKE
+            && offset.dot(own.geometric_normal).abs() < 0.35 * offset.length() + 1e-6
+    });
+    let spread = |points: &[usize]| {
+        points.iter().map(|&parent| (grid.points[parent].position - own.position).length()).fold(0.0f32, f32::max)
+    };
+    let nearest =
+        found.iter().map(|&p| (grid.points[p].position - own.position).length()).fold(f32::INFINITY, f32::min);
+    if alike && found.len() >= 2 && spread(&found) < 4.0 * nearest { found } else { Vec::new() }
+}
+
+/// Directions of the cells and the weights of hats over them.
+struct Cells {
+    width: usize,
+    height: usize,
+    /// Directions of the cells, twice as many along each axis as texels.
+    directions: Vec<Vec3>,
+    padded: usize,
+}
+
+#[derive(Default)]
+struct Scratch {
+    /// Per cell: 0 hidden, 1 seen, 2 not known yet.
+    cells: Vec<u8>,
+    /// Per texel: 0 hidden, 1 seen, 2 mixed, 3 not known yet.
+    texels: Vec<u8>,
+}
+
+impl Cells {
+    fn new(basis: &LightBasis) -> Self {
+        let (width, height) = (basis.width, basis.height);
+        let directions = (0..4 * width * height)
+            .map(|cell| direction_of_texel(cell / (2 * width), cell % (2 * width), 2 * width, 2 * height))
+            .collect();
+        Cells { width, height, directions, padded: basis.padded() }
+    }
+
+    /// Visible shares of all hats at a point, and the number of rays that took.
+    fn shares(
+        &self,
+        surface: &Surface,
+        grid: &VisibilityGrid,
+        index: usize,
+        parents: &[&[u8]],
+        scratch: &mut Scratch,
+    ) -> (Vec<u8>, u64) {
+        let (width, height) = (self.width, self.height);
+        let point = &grid.points[index];
+        let origin = surface.bvh().offset_origin(point.position, point.geometric_normal, point.geometric_normal);
+        let mut rays = 0u64;
+        let mut trace = |cell: usize| {
+            let direction = self.directions[cell];
+            // Both horizons count, as they do along a path.
+            if direction.dot(point.geometric_normal) <= 0.0 || direction.dot(point.shading_normal) <= 0.0 {
+                return 0;
+            }
+            rays += 1;
+            u8::from(!surface.bvh().is_occluded(&Ray { origin, direction, t_max: f32::INFINITY }))
+        };
+        let cell_of = |row: usize, column: usize, k: usize| (2 * row + k / 2) * 2 * width + 2 * column + k % 2;
+        scratch.cells.clear();
+        scratch.cells.resize(4 * width * height, 2);
+        scratch.texels.clear();
+        scratch.texels.resize(width * height, 3);
+        if let Some((first, others)) = parents.split_first() {
+            for texel in 0..width * height {
+                let value = first[texel];
+                if (value == 0 || value == 255) && others.iter().all(|other| other[texel] == value) {
+                    scratch.texels[texel] = u8::from(value == 255);
+                }
+            }
+        }
+        // One cell a texel, in a checkerboard, so that neighbours look at different places.
+        let mut first_cell = vec![2u8; width * height];
+        for row in 0..height {
+            for column in 0..width {
+                let texel = row * width + column;
+                first_cell[texel] = match scratch.texels[texel] {
+                    3 => {
+                        let cell = cell_of(row, column, if (row + column) % 2 == 0 { 0 } else { 3 });
+                        let seen = trace(cell);
+                        scratch.cells[cell] = seen;
+                        seen
+                    }
+                    known => known,
+                };
+            }
+        }
+        // The other three where the neighbourhood is not of one mind.
+        for row in 0..height {
+            for column in 0..width {
+                let texel = row * width + column;
+                let own = first_cell[texel];
+                let mut agree = true;
+                for near_row in row.saturating_sub(1)..(row + 2).min(height) {
+                    for step in [width - 1, 0, 1] {
+                        agree &= first_cell[near_row * width + (column + step) % width] == own;
+                    }
+                }
+                let inherited = scratch.texels[texel] != 3;
+                let mut sum = 0;
+                for k in 0..4 {
+                    let cell = cell_of(row, column, k);
+                    if scratch.cells[cell] == 2 {
+                        scratch.cells[cell] = if agree || inherited { own } else { trace(cell) };
+                    }
+                    sum += scratch.cells[cell];
+                }
+                scratch.texels[texel] = match sum {
+                    0 => 0,
+                    4 => 1,
+                    _ => 2,
+                };
+            }
+        }
+        let mut made = vec![0u8; self.padded];
+        for row in 0..height {
+            for column in 0..width {
+                let own = scratch.texels[row * width + column];
+                let mut uniform = own != 2;
+                for near_row in row.saturating_sub(1)..(row + 2).min(height) {
+                    for step in [width - 1, 0, 1] {
+                        uniform &= scratch.texels[near_row * width + (column + step) % width] == own;
+                    }
+                }
+                made[row * width + column] =
+                    if uniform { own * 255 } else { self.hat_share(&scratch.cells, row, column) };
+            }
+        }
+        (made, rays)
+    }
+
+    /// Visible share of a hat that an edge crosses.
+    fn hat_share(&self, cells: &[u8], row: usize, column: usize) -> u8 {
+        let (width, height) = (2 * self.width, 2 * self.height);
+        let (mut seen, mut total) = (0.0f32, 0.0f32);
+        for (i, weight_row) in HAT.iter().enumerate() {
+            let cell_row = 2 * row as i64 - 1 + i as i64;
+            // Beyond a pole there is nothing; within half a texel of it a hat stays at its full height.
+            if cell_row < 0 || cell_row >= height as i64 {
+                continue;
+            }
+            let at_pole = cell_row == 0 || cell_row == height as i64 - 1;
+            let weight_row = if at_pole { 0.5 } else { *weight_row } * sine_of_row(cell_row as usize, height);
+            for (k, weight_column) in HAT.iter().enumerate() {
+                let cell_column = (2 * column + width + k - 1) % width;
+                let weight = weight_row * weight_column;
+                total += weight;
+                seen += weight * f32::from(cells[cell_row as usize * width + cell_column]);
+            }
+        }
+        (255.0 * seen / total + 0.5) as u8
+    }
+}
+
+fn sine_of_row(row: usize, height: usize) -> f32 {
+    (std::f32::consts::PI * (row as f32 + 0.5) / height as f32).sin()
+}

@@ -1,0 +1,147 @@
+//! The solver as a method of a fit: same door, same folder, same promises.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::*;
+use patina::export::RunFolder;
+use patina::fit::settings::{BackgroundEvidence, Start};
+use patina::fit::{FitSettings, Fitter, Method, StepOutcome, checkpoint};
+use patina::job::prepare::Prepared;
+use patina::job::{Event, JobHandle, JobOptions, RunSettings, start_with};
+use patina::render::Surface;
+use patina::scene::{Background, Scene};
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
+
+static GO: AtomicBool = AtomicBool::new(false);
+
+/// Seven views, the last held out; photographed once for all tests.
+fn scene() -> (Arc<Scene>, Arc<Surface>) {
+    static SCENE: OnceLock<(Arc<Scene>, Arc<Surface>)> = OnceLock::new();
+    SCENE
+        .get_or_init(|| {
+            let trial = Trial { cameras: around(7, 35.0), ..Default::default() };
+            let mut scene = trial.photographed();
+            scene.views[6].held_out = true;
+            (Arc::new(scene), trial.surface())
+        })
+        .clone()
+}
+
+fn base() -> FitSettings {
+    FitSettings { method: Method::Solver, solver_rounds: 4, solver_grid: 32, map_size: 32, ..quick() }
+}
+
+fn new_fitter(settings: &FitSettings) -> Fitter {
+    let (scene, surface) = scene();
+    Fitter::new(scene, surface, settings.clone(), None).unwrap()
+}
+
+fn job(fitter: Fitter, folder: &Path, options: JobOptions) -> JobHandle {
+    let prepared = Prepared {
+        scene: Arc::clone(fitter.scene()),
+        surface: Arc::clone(fitter.surface()),
+        quality: None,
+        findings: Vec::new(),
+        timings: Vec::new(),
+    };
+    let settings = RunSettings { fit: fitter.settings().clone(), ..Default::default() };
+    start_with(prepared, fitter, settings, RunFolder::create(folder).unwrap(), options).unwrap()
+}
+
+#[test]
+fn it_explains_the_photos_and_views_it_never_saw() {
+    let mut fitter = new_fitter(&base());
+    run(&mut fitter).unwrap();
+    let state = fitter.state();
+    let stages: Vec<&str> = state.losses.iter().map(|row| row.stage.as_str()).collect();
+    assert_eq!(stages, ["wide light", "wide light", "narrow light", "narrow light", "maps"]);
+    let held_out: Vec<f64> = state.losses.iter().map(|row| row.held_out_rmse.unwrap()).collect();
+    println!("held out {held_out:?}");
+    assert!(held_out[4] < 0.5 * held_out[0] || held_out[4] < 0.02, "{held_out:?}");
+    // A sixth of the photos' mean.
+    assert!(held_out[4] < 0.06, "{held_out:?}");
+    let figures = &fitter.figures().view_rmse;
+    assert!(figures.iter().all(|rmse| rmse.is_some_and(|rmse| rmse < 0.1)), "{figures:?}");
+    assert!(state.non_finite.is_empty());
+}
+
+#[test]
+fn a_fit_that_is_taken_up_goes_on_bit_for_bit_whatever_the_threads() {
+    let (scene, surface) = scene();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("checkpoint");
+    for settings in [base(), FitSettings { exposure: true, background: BackgroundEvidence::Ignore, ..base() }] {
+        let mut whole = new_fitter(&settings);
+        run(&mut whole).unwrap();
+        let whole = without_seconds(whole.state());
+        for step in [0, 1, 3, 4, 5] {
+            let mut fitter = new_fitter(&settings);
+            (0..step).for_each(|_| drop(fitter.step(&GO).unwrap()));
+            // A step that is stopped leaves no trace.
+            assert_eq!(
+                fitter.step(&AtomicBool::new(true)).unwrap(),
+                match step {
+                    5 => StepOutcome::Finished,
+                    _ => StepOutcome::Interrupted,
+                }
+            );
+            checkpoint::write(&path, fitter.state()).unwrap();
+            let state = checkpoint::read(&path).unwrap();
+            let mut resumed = Fitter::resume(scene.clone(), surface.clone(), settings.clone(), state).unwrap();
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(1 + step % 3).build().unwrap();
+            pool.install(|| run(&mut resumed)).unwrap();
+            assert!(without_seconds(resumed.state()) == whole, "after step {step}");
+        }
+    }
+}
+
+#[test]
+fn the_job_shows_each_step_and_leaves_a_whole_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run");
+    let job = job(new_fitter(&base()), &path, JobOptions::default());
+    let mut progress = 0;
+    let data = loop {
+        match job.events.recv().unwrap() {
+            Event::Progress(row) => {
+                progress += 1;
+                assert_eq!(row.steps_total, 5);
+            }
+            Event::Finished(data) => break data,
+            Event::Failed(error) => panic!("{error}"),
+            _ => {}
+        }
+    };
+    assert_eq!(progress, 5);
+    let (_, snapshot) = job.snapshot.newest().unwrap();
+    assert_eq!((snapshot.step, snapshot.stage.as_str()), (5, "maps"));
+    assert!(data.aggregates.iter().any(|aggregate| aggregate.name == "held-out views"));
+    assert_eq!(data.loss_history.len(), 5);
+    let folder = RunFolder::open(&path).unwrap();
+    assert!(folder.has_result() && folder.report_html_path().is_file());
+    assert!(folder.read_result().is_ok());
+    for name in ["diffuse_deviation.exr", "specular_deviation.exr", "roughness_deviation.exr"] {
+        assert!(folder.file(name).is_file(), "{name}");
+    }
+    assert_eq!(folder.read_loss().unwrap().len(), 5);
+    assert_eq!(folder.read_settings::<RunSettings>().unwrap().fit, base());
+}
+
+#[test]
+fn hard_starts_and_scenes_leave_nothing_that_is_not_finite() {
+    let black_cloth = Trial { cameras: around(5, 35.0), background: Background::Black, ..Default::default() };
+    for settings in [
+        FitSettings { start: Start::Paper, ..base() },
+        FitSettings { bounces: 1, exposure: true, ..base() },
+        FitSettings { fixed_light: true, ..base() },
+        FitSettings { map_size: 16, solver_grid: 64, environment_height: 2, ..base() },
+    ] {
+        fit(black_cloth.photographed(), black_cloth.surface(), settings.clone()).unwrap();
+        // Black photos: nothing to find, and nothing to fall over.
+        fit(black_cloth.black(), black_cloth.surface(), settings).unwrap();
+    }
+}
