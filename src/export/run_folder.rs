@@ -8,6 +8,7 @@
 //! | `diffuse.exr specular.exr roughness.exr seen.exr env.exr mesh.obj` | the result | `patina fit`, at its end |
 //! | `diffuse_deviation.exr specular_deviation.exr roughness_deviation.exr` | standard deviations of the maps given the light | `patina fit --method solver`, at its end |
 //! | `lobe_sharing.exr` | number of texels that share a texel's lobe, 0 where no pixel shows the texel best | the same |
+//! | `environment_evidence.exr` | what a texel of the light is known by: highlights (red), background (green), diffuse light and shadows (blue); the rest to 1 is belief | the same, unless resumed after its rounds |
 //! | `loss.csv` | the loss of every step | `patina fit` |
 //! | `report.json report.html` | scores and pictures | `patina fit`, `patina compare` |
 
@@ -124,6 +125,14 @@ impl RunFolder {
         file::write_exr_rgb(&self.file("diffuse_deviation.exr"), &deviations.diffuse)?;
         file::write_exr_rgb(&self.file("specular_deviation.exr"), &deviations.specular)?;
         file::write_exr_grey(&self.file("roughness_deviation.exr"), &deviations.roughness)
+    }
+
+    /// Writes what each texel of the light is known by.
+    ///
+    /// # Errors
+    /// Files that cannot be written.
+    pub fn write_light_evidence(&self, shares: &RgbImage) -> Result<()> {
+        file::write_exr_rgb(&self.file("environment_evidence.exr"), shares)
     }
 
     /// Writes the number of texels that share each texel's lobe.

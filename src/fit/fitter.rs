@@ -13,6 +13,7 @@ use super::held_out::held_out_targets;
 use super::schedule::{Stage, stages};
 use super::settings::{FitSettings, Method, Start};
 use super::solver::SolverScene;
+use super::solver::light_evidence::EvidenceShares;
 use super::start;
 use super::state::{FitState, LossRow};
 use super::targets::{Target, targets};
@@ -52,6 +53,8 @@ pub struct Fitter {
     pub(super) work: Option<StageWork>,
     /// What the solver traced; `None` under Adam and before its first step.
     pub(super) solver: Option<SolverScene>,
+    /// What the solver's light is known by; empty under Adam and before its first round on the light.
+    pub(super) light_evidence: Vec<EvidenceShares>,
 }
 
 impl Fitter {
@@ -134,7 +137,19 @@ impl Fitter {
         let held_out = held_out_targets(&scene, &uses);
         let figures = LiveFigures::new(scene.views.len());
         let state = FitState::default();
-        Ok(Fitter { scene, surface, settings, uses, training, held_out, state, figures, work: None, solver: None })
+        Ok(Fitter {
+            scene,
+            surface,
+            settings,
+            uses,
+            training,
+            held_out,
+            state,
+            figures,
+            work: None,
+            solver: None,
+            light_evidence: Vec::new(),
+        })
     }
 
     pub(super) fn measured_start(&self) -> start::StartValues {

@@ -10,8 +10,9 @@ use super::settings::Method;
 use super::solver::{Estimate, SolverScene, SolverSettings, SolverStep, StepReport, TransportError};
 use super::state::LossRow;
 use crate::error::Result;
-use crate::image::{GreyImage, Image};
+use crate::image::{GreyImage, Image, RgbImage};
 use crate::material::MaterialMaps;
+use glam::Vec3;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -70,6 +71,17 @@ impl Fitter {
         solver.transport_error(&self.scene, &self.surface, &estimate, stop)
     }
 
+    /// What each texel of the light is known by, as an image: highlights in red, background pixels in green, diffuse light
+    /// and shadows in blue, each a share of the texel's precision; what is missing to 1 is belief. `None` unless a round on
+    /// the light was done since the fit was started or taken up.
+    pub fn light_evidence(&self) -> Option<RgbImage> {
+        let height = self.settings.environment_height;
+        let width = 2 * height;
+        let shares = &self.light_evidence;
+        (shares.len() == width * height && !shares.is_empty())
+            .then(|| Image::from_pixels(width, height, shares.iter().map(|share| Vec3::from_array(*share)).collect()))
+    }
+
     /// Number of texels that share a texel's lobe, as an image: the mean over all ways to cut the surface into regions,
     /// weighed by their evidence; 0 where a texel took over what its neighbours have. `None` as for [`Self::deviations`].
     pub fn lobe_sharing(&self) -> Option<GreyImage> {
@@ -85,6 +97,7 @@ impl Fitter {
             texels: std::mem::take(&mut state.texels),
             variances: std::mem::take(&mut state.moments.second),
             light: std::mem::take(&mut state.light),
+            light_evidence: std::mem::take(&mut self.light_evidence),
             log_gains: solver.views.iter().map(|&view| state.log_gains[view]).collect(),
         };
         // The paper's start is black: nothing could be told apart under it.
@@ -100,6 +113,7 @@ impl Fitter {
         state.texels = estimate.texels;
         state.moments.second = estimate.variances;
         state.light = estimate.light;
+        self.light_evidence = estimate.light_evidence;
         for (&view, gain) in solver.views.iter().zip(estimate.log_gains) {
             state.log_gains[view] = gain;
         }

@@ -10,7 +10,10 @@ use crate::fit::solver::TransportError;
 use crate::fit::{Fitter, ViewUse};
 use crate::image::Image;
 use crate::insight::report::data::{Fact, NonFiniteCount, ReportData, SettingLine, TexelCounts};
+use crate::math::sphere::solid_angle_of_texel;
 use crate::scene::{Background, Scene};
+use glam::DVec3;
+use std::f64::consts::PI;
 
 pub(super) fn describe(
     fitter: &Fitter,
@@ -103,6 +106,24 @@ pub(super) fn solver_facts(fitter: &Fitter, transport: Option<TransportError>) -
                 100.0 * error.bias,
                 error.pixels,
                 error.samples
+            ),
+        ));
+    }
+    if let Some(shares) = fitter.light_evidence() {
+        let (height, width) = (shares.height(), shares.width());
+        let mut mean = DVec3::ZERO;
+        for (texel, share) in shares.pixels().iter().enumerate() {
+            mean += share.as_dvec3() * solid_angle_of_texel(texel / width, width, height) / (4.0 * PI);
+        }
+        facts.push(fact(
+            "what the light is known by",
+            format!(
+                "highlights {:.0} %, background {:.0} %, diffuse light and shadows {:.0} %, belief that skies are smooth \
+                 {:.0} % (means over the sphere; environment_evidence.exr has each texel)",
+                100.0 * mean.x,
+                100.0 * mean.y,
+                100.0 * mean.z,
+                100.0 * (1.0 - mean.element_sum())
             ),
         ));
     }

@@ -64,6 +64,9 @@ pub fn write(
     if let Some(sharing) = fitter.lobe_sharing() {
         folder.write_lobe_sharing(&sharing)?;
     }
+    if let Some(shares) = fitter.light_evidence() {
+        folder.write_light_evidence(&shares)?;
+    }
     folder.write_loss(&loss_rows(fitter.state()))?;
 
     tell("pictures of the views");

@@ -14,6 +14,9 @@ pub struct BlockRows {
     pub rows: Vec<f32>,
     /// Right sides.
     pub right: Vec<f64>,
+    /// Per light coefficient, the squares of what reaches pixels through lobes and through diffuse reflectance, added up
+    /// over the observations before the block's unknowns are taken out.
+    pub powers: [Vec<f32>; 2],
     /// Columns of the block's unknowns over all rows, column after column.
     columns: Vec<f64>,
     observation_count: usize,
@@ -31,6 +34,10 @@ impl BlockRows {
         self.rows.resize(total * light_count, 0.0);
         self.right.clear();
         self.right.resize(total, 0.0);
+        for power in &mut self.powers {
+            power.clear();
+            power.resize(light_count, 0.0);
+        }
         self.columns.clear();
         self.columns.resize(total * unknowns, 0.0);
     }
@@ -38,6 +45,19 @@ impl BlockRows {
     /// The row of an observation over the light.
     pub fn row_mut(&mut self, observation: usize) -> &mut [f32] {
         &mut self.rows[observation * self.light_count..(observation + 1) * self.light_count]
+    }
+
+    /// Sets the row of an observation: what a unit of each coefficient sends to it through the lobe and diffusely.
+    pub fn set_row(&mut self, observation: usize, lobe: impl Iterator<Item = f32>, diffuse: impl Iterator<Item = f32>) {
+        let range = observation * self.light_count..(observation + 1) * self.light_count;
+        let [lobe_power, diffuse_power] = &mut self.powers;
+        for ((((entry, lobe), diffuse), lobe_power), diffuse_power) in
+            self.rows[range].iter_mut().zip(lobe).zip(diffuse).zip(lobe_power).zip(diffuse_power)
+        {
+            *entry = lobe + diffuse;
+            *lobe_power += lobe * lobe;
+            *diffuse_power += diffuse * diffuse;
+        }
     }
 
     /// Sets the derivative of an observation by an unknown.

@@ -1,5 +1,6 @@
 //! What the solver changes: maps, light and gains, and how sure it is of the maps.
 
+use super::light_evidence::EvidenceShares;
 use crate::image::Image;
 use crate::light::Environment;
 use crate::material::MaterialMaps;
@@ -17,6 +18,8 @@ pub struct Estimate {
     pub variances: Vec<Texel<f32>>,
     /// Radiance of the light's texels.
     pub light: Vec<[f32; 3]>,
+    /// What each texel of the light is known by; empty before the first round on the light.
+    pub light_evidence: Vec<EvidenceShares>,
     /// Logarithm of each view's gain, in the order of [`super::SolverScene::views`].
     pub log_gains: Vec<f32>,
 }
@@ -34,6 +37,7 @@ impl Estimate {
             texels: vec![START_TEXEL; map_size * map_size],
             variances: vec![[0.0; 8]; map_size * map_size],
             light: light.radiance.pixels().iter().map(|pixel| pixel.to_array()).collect(),
+            light_evidence: Vec::new(),
             log_gains: vec![0.0; views],
         }
     }

@@ -3,6 +3,7 @@
 use super::block::BlockPrior;
 use super::eliminate::BlockRows;
 use super::estimate::Estimate;
+use super::light_evidence::{EvidenceShares, Precisions, evidence_shares};
 use super::light_shape::{LightShape, bright_texels};
 use super::light_step::{Gauge, LightPrior, NormalEquations, solve_channel};
 use super::plan;
@@ -36,8 +37,9 @@ impl SolverScene {
         let light = if self.settings.fixed_light {
             None
         } else {
+            let surface = equations.each_ref().map(NormalEquations::diagonal);
             self.add_background(&mut equations, &shape, &estimate.log_gains);
-            Some(self.solve_light(&equations, &shape, estimate, stop)?)
+            Some(self.solve_light(&equations, &surface, &shape, estimate, stop)?)
         };
         let gains = self.settings.exposure.then(|| gain_ratios(&round, &done, self.views.len()));
         let mut errors = ErrorSums::new(self.views.len());
@@ -47,8 +49,9 @@ impl SolverScene {
         let mut residuals: Vec<f32> = done.iter().map(|(_, work)| work.solution.residual).collect();
 
         // Nothing is dropped from here on.
-        if let Some(light) = light {
+        if let Some((light, evidence)) = light {
             estimate.light = light;
+            estimate.light_evidence = evidence;
         }
         for (index, work) in &done {
             let solution = &work.solution;
@@ -150,31 +153,34 @@ impl SolverScene {
         }
     }
 
+    /// The light, and what each of its texels is known by. `surface` are the diagonals before background was added.
     fn solve_light(
         &self,
         equations: &[NormalEquations; 3],
+        surface: &[Vec<f64>; 3],
         shape: &LightShape,
         estimate: &Estimate,
         stop: &AtomicBool,
-    ) -> Option<Vec<[f32; 3]>> {
+    ) -> Option<(Vec<[f32; 3]>, Vec<EvidenceShares>)> {
         let prior = LightPrior {
             variation: self.settings.light_variation,
             independence: self.settings.independence,
             // Where the background shows, it fixes the scale.
             gauge_slack: if self.background.is_empty() { self.settings.gauge_slack } else { 10.0 },
         };
-        let channels: Vec<Vec<f32>> = (0..3usize)
+        let channels: Vec<(Vec<f32>, Precisions)> = (0..3usize)
             .into_par_iter()
             .map(|c| {
                 let own: Vec<f32> = estimate.light.iter().map(|radiance| radiance[c]).collect();
                 let mut x = shape.coefficients_of(&own);
                 let gauge = Gauge { row: &self.gauge.0, mean: self.gauge.1[c] };
-                solve_channel(&equations[c], shape, &prior, &gauge, &mut x);
-                shape.expand(&x)
+                let belief = solve_channel(&equations[c], shape, &prior, &gauge, &mut x);
+                (shape.expand(&x), Precisions::new(&surface[c], &equations[c], belief, prior.independence))
             })
             .collect();
-        let light = (0..estimate.light.len()).map(|texel| [0, 1, 2].map(|c| channels[c][texel])).collect();
-        (!stop.load(Ordering::Relaxed)).then_some(light)
+        let light = (0..estimate.light.len()).map(|texel| [0, 1, 2].map(|c| channels[c].0[texel])).collect();
+        let precisions: Vec<Precisions> = channels.into_iter().map(|(_, precisions)| precisions).collect();
+        (!stop.load(Ordering::Relaxed)).then(|| (light, evidence_shares(&precisions, shape)))
     }
 }
 

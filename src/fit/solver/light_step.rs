@@ -17,6 +17,8 @@ pub struct NormalEquations {
     /// Lower triangle, row after row.
     matrix: Vec<f64>,
     right: Vec<f64>,
+    /// Of each coefficient: squares of what came through lobes and diffusely, see [`BlockRows::powers`].
+    powers: [Vec<f64>; 2],
     /// Rows that wait, row after row.
     rows: Vec<f32>,
     sides: Vec<f32>,
@@ -30,6 +32,7 @@ impl NormalEquations {
             count,
             matrix: vec![0.0; count * count],
             right: vec![0.0; count],
+            powers: [vec![0.0; count], vec![0.0; count]],
             rows: Vec::new(),
             sides: Vec::new(),
             product: Vec::new(),
@@ -40,6 +43,9 @@ impl NormalEquations {
     pub fn add(&mut self, rows: &BlockRows) {
         self.rows.extend_from_slice(&rows.rows);
         self.sides.extend(rows.right.iter().map(|&value| value as f32));
+        for (own, other) in self.powers.iter_mut().zip(&rows.powers) {
+            own.iter_mut().zip(other).for_each(|(own, &other)| *own += f64::from(other));
+        }
         if self.sides.len() >= ROWS_AT_ONCE {
             self.flush();
         }
@@ -100,6 +106,19 @@ impl NormalEquations {
         for (total, value) in self.right.iter_mut().zip(&other.right) {
             *total += value;
         }
+        for (own, other) in self.powers.iter_mut().zip(&other.powers) {
+            own.iter_mut().zip(other).for_each(|(own, &other)| *own += other);
+        }
+    }
+
+    /// How well each coefficient would be known if all others were: the diagonal.
+    pub fn diagonal(&self) -> Vec<f64> {
+        (0..self.count).map(|row| self.matrix[row * self.count + row]).collect()
+    }
+
+    /// See [`BlockRows::powers`].
+    pub fn powers(&self) -> &[Vec<f64>; 2] {
+        &self.powers
     }
 }
 
@@ -123,14 +142,15 @@ pub struct Gauge<'a> {
     pub mean: f64,
 }
 
-/// Solves one channel: coefficients start at `x` and end there. Returns the number of sweeps.
+/// Solves one channel: coefficients start at `x` and end there. Returns the diagonal of what is believed of the light
+/// (the gauge left out), in the units of the rows times `independence`.
 pub fn solve_channel(
     equations: &NormalEquations,
     shape: &LightShape,
     prior: &LightPrior,
     gauge: &Gauge,
     x: &mut [f32],
-) -> usize {
+) -> Vec<f64> {
     let count = equations.count;
     let mut matrix = vec![0.0f64; count * count];
     for row in 0..count {
@@ -160,6 +180,9 @@ pub fn solve_channel(
         let scale = 3.0 * (f64::from(entries) + mean);
         matrix[index * count + index] += 1.0 / (scale * scale);
     }
+    let believed = (0..count)
+        .map(|row| matrix[row * count + row] - equations.matrix[row * count + row] * prior.independence)
+        .collect();
     // The freedom between reflectance and light is held by the mean light on the surface.
     let mut held = vec![0.0f32; count];
     shape.reduce(gauge.row, &mut held);
@@ -172,11 +195,11 @@ pub fn solve_channel(
         right[row] += own * gauge.mean;
     }
     let mut solution: Vec<f64> = x.iter().map(|&value| f64::from(value)).collect();
-    let sweeps = solve_non_negative(&matrix, &right, &mut solution, 300, 1e-5);
+    solve_non_negative(&matrix, &right, &mut solution, 300, 1e-5);
     for (x, value) in x.iter_mut().zip(solution) {
         *x = value as f32;
     }
-    sweeps
+    believed
 }
 
 /// Weights with which coefficients make up the mean radiance over the sphere.

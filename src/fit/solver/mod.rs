@@ -7,7 +7,8 @@
 //! 3. [`round`]: a block's rows over the light; [`eliminate`] takes the block's own unknowns out of them, so that what is
 //!    left is the Schur complement of the joint Gauss-Newton system.
 //! 4. [`light_step`]: the light from those rows, at least zero ([`non_negative`]), in wide and narrow hats
-//!    ([`light_shape`]), with a weak wish for smoothness. [`light_round`] is the round as a whole.
+//!    ([`light_shape`]), with a weak wish for smoothness. [`light_round`] is the round as a whole,
+//!    [`light_evidence`] says what each texel of the light is known by.
 //! 5. [`maps`]: block by block, then in tiles ([`tile`]) with the footprints of pixels, where the evidence decides which
 //!    texels share a lobe ([`lobe_tree`], [`lobe_evidence`]), then [`mod@diffuse`]: all diffuse texels together.
 //! 6. [`solver`]: the steps in their order. A fit does them one by one, as [`crate::fit::Fitter`] does those of Adam.
@@ -21,6 +22,7 @@ mod cell_sums;
 pub mod diffuse;
 pub mod eliminate;
 pub mod estimate;
+pub mod light_evidence;
 pub mod light_round;
 pub mod light_shape;
 pub mod light_step;

@@ -256,11 +256,8 @@ impl Round<'_> {
                     rho * (term.arriving[c] - direct[c]) + (specular * sums.hidden[0] + sums.hidden[1]) * around[c];
                 rows.right[row] = scale * f64::from(term.radiance[c] - known);
                 let scale32 = scale as f32;
-                for ((entry, &d), (&b, &g)) in
-                    rows.row_mut(row).iter_mut().zip(&reduced[0]).zip(reduced[1].iter().zip(&reduced[2]))
-                {
-                    *entry = scale32 * (rho * d + specular * b + g);
-                }
+                let lobe = reduced[1].iter().zip(&reduced[2]).map(|(&b, &g)| scale32 * (specular * b + g));
+                rows.set_row(row, lobe, reduced[0].iter().map(|&d| scale32 * rho * d));
                 let arriving = f64::from(term.arriving[c]);
                 rows.set_unknown(row, 0, scale * arriving);
                 rows.set_unknown(row, 1 + usize::from(term.cell), scale * arriving);
