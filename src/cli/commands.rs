@@ -4,11 +4,11 @@ use super::arguments::{CheckOptions, CompareOptions, Layer, RelightOptions, Rend
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::export::RunFolder;
 use crate::fit::views::{ViewUse, uses_of};
-use crate::image::{GreyImage, Image, file};
-use crate::insight::scores::{aggregate, score_view};
+use crate::image::file;
+use crate::insight::scores::{aggregate, score_halves};
 use crate::job::pictures::{light_of, matched, parameters, relit, surface_of};
 use crate::job::prepare::RunSettings;
-use crate::job::shown::exposure_of;
+use crate::job::shown::{exposure_of, fully_covered, in_halves};
 use crate::render::picture::{PictureSettings, layers, render as render_picture};
 use crate::render::{Parameters, Surface};
 use crate::scene::{Background, Scene, doctor};
@@ -214,11 +214,12 @@ pub fn compare(options: &CompareOptions, json: bool) -> Result<()> {
     let mut scored = Vec::new();
     let uses = uses_of(&scene, &settings.fit.exclude);
     for (index, (view, kind)) in scene.views.iter().zip(uses).enumerate() {
-        let picture =
-            render_picture(&surface, &view.camera, &own, index as u32, &picture_settings, &AtomicBool::new(false));
-        let coverage = fully_covered(&picture.coverage);
+        let halves = in_halves(&picture_settings, |settings| {
+            render_picture(&surface, &view.camera, &own, index as u32, settings, &AtomicBool::new(false))
+        });
         let photo = view.photo.to_linear();
-        let scores = score_view(&photo, &picture.radiance, &view.states, Some(&coverage), exposure_of(&scene))?;
+        let pictures = halves.each_ref().map(|half| &half.radiance);
+        let scores = score_halves(&photo, pictures, &view.states, Some(&fully_covered(&halves)), exposure_of(&scene))?;
         if json {
             println!(
                 "{}",
@@ -255,9 +256,4 @@ pub fn compare(options: &CompareOptions, json: bool) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// Pixels that the surface covers wholly.
-fn fully_covered(coverage: &GreyImage) -> Image<bool> {
-    coverage.map(|&coverage| coverage >= 0.999)
 }

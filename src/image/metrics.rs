@@ -51,17 +51,37 @@ pub fn compare(estimate: &RgbImage, truth: &RgbImage, mask: Option<&Image<bool>>
 
 /// The scores of an estimate over the pixels of a mask, or over all. Error: images of different sizes.
 pub fn scores(estimate: &RgbImage, truth: &RgbImage, mask: Option<&Image<bool>>) -> Result<Scores> {
-    let counted = counted_pixels(estimate, truth, mask)?;
+    scores_without_noise(estimate, None, truth, mask)
+}
+
+/// The scores that an estimate would have without its noise. `half_difference` is half the difference of two estimates
+/// with independent noise whose mean is `estimate`: its square is, in the mean, the variance of the noise, and is taken off
+/// squared differences and off the estimate's variance in windows of the similarity. Error: images of different sizes.
+pub fn scores_without_noise(
+    estimate: &RgbImage,
+    half_difference: Option<&RgbImage>,
+    truth: &RgbImage,
+    mask: Option<&Image<bool>>,
+) -> Result<Scores> {
+    let mut counted = counted_pixels(estimate, truth, mask)?;
+    if let Some(noise) = half_difference {
+        let of_noise = counted_pixels(noise, truth, Some(&counted.included))?;
+        counted = Counted { not_finite: counted.not_finite + of_noise.not_finite, ..of_noise };
+    }
     let mut squares = Squares::default();
     for index in counted.indices() {
         squares.add(estimate.pixels()[index].as_dvec3(), truth.pixels()[index].as_dvec3());
+        if let Some(noise) = half_difference {
+            squares.difference -= noise.pixels()[index].as_dvec3().length_squared();
+        }
     }
     let rmse = squares.rmse();
+    let noise = half_difference.map(luminance_or_zero);
     Ok(Scores {
         rmse,
         psnr: psnr_of_rmse(rmse),
-        ssim: mean_ssim(&luminance_or_zero(estimate), &luminance_or_zero(truth), &counted),
-        relative_rmse: (squares.difference / squares.truth).sqrt(),
+        ssim: mean_ssim(&luminance_or_zero(estimate), noise.as_ref(), &luminance_or_zero(truth), &counted),
+        relative_rmse: (squares.difference.max(0.0) / squares.truth).sqrt(),
         pixels: counted.count,
         not_finite: counted.not_finite,
     })
@@ -118,7 +138,7 @@ impl Squares {
     }
 
     fn rmse(&self) -> f64 {
-        (self.difference / (3 * self.pixels) as f64).sqrt()
+        (self.difference.max(0.0) / (3 * self.pixels) as f64).sqrt()
     }
 }
 
@@ -162,8 +182,8 @@ fn luminance_or_zero(image: &RgbImage) -> GreyImage {
 const WINDOW_RADIUS: usize = 5;
 
 /// The mean of the map over counted pixels whose window is whole; over all counted pixels when there is none.
-fn mean_ssim(estimate: &GreyImage, truth: &GreyImage, counted: &Counted) -> f64 {
-    let map = ssim_map(estimate, truth);
+fn mean_ssim(estimate: &GreyImage, noise: Option<&GreyImage>, truth: &GreyImage, counted: &Counted) -> f64 {
+    let map = ssim_map_without_noise(estimate, noise, truth);
     let whole = |index: usize| {
         let (row, column) = (index / map.width(), index % map.width());
         let inside = |place: usize, length: usize| place >= WINDOW_RADIUS && place + WINDOW_RADIUS < length;
@@ -181,11 +201,18 @@ fn mean_ssim(estimate: &GreyImage, truth: &GreyImage, counted: &Counted) -> f64 
 /// Similarity", eq. 13, with their Gaussian window of 11 x 11 pixels and standard deviation 1.5, K1 = 0.01, K2 = 0.03.
 /// Windows that reach over the border are cut and their weights scaled to sum to 1. The images are of equal size.
 pub fn ssim_map(first: &GreyImage, second: &GreyImage) -> Image<f64> {
+    ssim_map_without_noise(first, None, second)
+}
+
+/// [`ssim_map`] with the noise of the first image taken off its variance: `half_difference` as in
+/// [`scores_without_noise`].
+fn ssim_map_without_noise(first: &GreyImage, half_difference: Option<&GreyImage>, second: &GreyImage) -> Image<f64> {
     const C1: f64 = 0.01 * 0.01;
     const C2: f64 = 0.03 * 0.03;
     let moments = Image::from_fn(first.width(), first.height(), |row, column| {
         let (x, y) = (f64::from(first[(row, column)]), f64::from(second[(row, column)]));
-        [x, y, x * x, y * y, x * y]
+        let noise = half_difference.map_or(0.0, |noise| f64::from(noise[(row, column)]));
+        [x, y, x * x - noise * noise, y * y, x * y]
     });
     blurred(&moments).map(|&[mean_x, mean_y, square_x, square_y, product]| {
         let variance_x = (square_x - mean_x * mean_x).max(0.0);

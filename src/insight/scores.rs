@@ -3,7 +3,8 @@
 //! A pixel counts when the mask and the rays say surface, it is not clipped, and both sides are finite: background and
 //! clipped pixels would reward or punish what a fit cannot know. RMSE is taken on linear radiance; PSNR and SSIM on
 //! sRGB-encoded values clamped to [0, 1], as they are printed elsewhere. The scale-aligned twins multiply the picture,
-//! channel by channel, by the factor that brings it nearest to the photograph in linear least squares.
+//! channel by channel, by the factor that brings it nearest to the photograph in linear least squares. The noise of our own
+//! path tracer is taken off all of them ([`score_halves`]).
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::image::{Image, RgbImage, metrics, transfer};
@@ -46,21 +47,20 @@ pub struct AlignmentSums {
 }
 
 impl AlignmentSums {
-    /// The sums over the counted pixels of one picture.
-    pub fn of(photo: &RgbImage, picture: &RgbImage, counted: &Image<bool>) -> Self {
+    /// The sums over the counted pixels of one picture, given as two halves with independent noise: products of the two
+    /// have no noise in their mean, where squares of one would. A picture without noise is its own half.
+    pub fn of(photo: &RgbImage, halves: [&RgbImage; 2], counted: &Image<bool>) -> Self {
         let mut sums = AlignmentSums::default();
-        for ((photo, picture), counted) in photo.pixels().iter().zip(picture.pixels()).zip(counted.pixels()) {
-            if !counted {
-                continue;
-            }
+        for (index, _) in counted.pixels().iter().enumerate().filter(|(_, counted)| **counted) {
             sums.pixels += 1;
-            let (photo, picture) = (photo.as_dvec3().to_array(), picture.as_dvec3().to_array());
+            let photo = photo.pixels()[index].as_dvec3().to_array();
+            let [first, second] = halves.map(|half| half.pixels()[index].as_dvec3().to_array());
             for channel in 0..3 {
-                let (y, x) = (photo[channel], picture[channel]);
+                let (y, a, b) = (photo[channel], first[channel], second[channel]);
                 sums.photo_squared[channel] += y * y;
-                sums.picture_squared[channel] += x * x;
-                sums.product[channel] += x * y;
-                sums.squared_difference += (x - y) * (x - y);
+                sums.picture_squared[channel] += a * b;
+                sums.product[channel] += 0.5 * (a + b) * y;
+                sums.squared_difference += (a - y) * (b - y);
             }
         }
         sums
@@ -86,9 +86,9 @@ impl AlignmentSums {
         })
     }
 
-    /// Linear RMSE before alignment; NaN when no pixel counts.
+    /// Linear RMSE before alignment; NaN when no pixel counts, 0 when noise was all there was.
     pub fn rmse(&self) -> f64 {
-        (self.squared_difference / (3 * self.pixels) as f64).sqrt()
+        (self.squared_difference.max(0.0) / (3 * self.pixels) as f64).sqrt()
     }
 
     /// Linear RMSE after multiplying the pictures by `scale`; NaN when no pixel counts.
@@ -143,9 +143,25 @@ pub fn score_view(
     coverage: Option<&Image<bool>>,
     exposure_stops: f32,
 ) -> Result<ViewScores> {
+    score_halves(photo, [picture, picture], states, coverage, exposure_stops)
+}
+
+/// Scores a path-traced picture as [`score_view`] would without its noise: it is given as two halves with independent
+/// noise, whose mean is the picture. Without this a picture of few paths under a strong sun is scored by its noise.
+///
+/// # Errors
+/// `InvalidScene` when the sizes differ.
+pub fn score_halves(
+    photo: &RgbImage,
+    halves: [&RgbImage; 2],
+    states: &Image<PixelState>,
+    coverage: Option<&Image<bool>>,
+    exposure_stops: f32,
+) -> Result<ViewScores> {
     let size = (photo.width(), photo.height());
     let sizes = [
-        ("picture", picture.width(), picture.height()),
+        ("picture", halves[0].width(), halves[0].height()),
+        ("second half of the picture", halves[1].width(), halves[1].height()),
         ("pixel states", states.width(), states.height()),
         ("coverage", coverage.map_or(size.0, Image::width), coverage.map_or(size.1, Image::height)),
     ];
@@ -158,7 +174,8 @@ pub fn score_view(
     let mut counted = counted_pixels(states, coverage);
     let mut non_finite_pixels = 0;
     for (index, counted) in counted.pixels_mut().iter_mut().enumerate() {
-        if *counted && !(photo.pixels()[index].is_finite() && picture.pixels()[index].is_finite()) {
+        let is_finite = [photo, halves[0], halves[1]].iter().all(|image| image.pixels()[index].is_finite());
+        if *counted && !is_finite {
             *counted = false;
             non_finite_pixels += 1;
         }
@@ -168,33 +185,43 @@ pub fn score_view(
     let surface = (0..states.pixels().len()).filter(|&index| on_surface(index)).count();
     let clipped = (0..states.pixels().len()).filter(|&i| on_surface(i) && states.pixels()[i].is_clipped()).count();
 
-    let sums = AlignmentSums::of(photo, picture, &counted);
+    let sums = AlignmentSums::of(photo, halves, &counted);
     let scale = sums.scale();
-    let aligned_picture = scaled(picture, scale);
     let gain = exposure_stops.exp2();
     let encoded_photo = encoded(photo, gain);
-    let encoded_score = |rmse_linear: f64, picture: &RgbImage| -> Result<PictureScore> {
+    let encoded_score = |rmse_linear: f64, halves: [&RgbImage; 2]| -> Result<PictureScore> {
         if sums.pixels == 0 {
             return Ok(PictureScore::NONE);
         }
-        // Windows of the similarity reach over the silhouette: what does not count is equal there.
-        let mut encoded_picture = encoded(picture, gain);
-        for (index, pixel) in encoded_picture.pixels_mut().iter_mut().enumerate() {
-            if !counted.pixels()[index] {
-                *pixel = encoded_photo.pixels()[index];
-            }
-        }
-        let score = metrics::scores(&encoded_picture, &encoded_photo, Some(&counted))?;
+        let [first, second] = halves.map(|half| encoded(half, gain));
+        // Windows of the similarity reach over the silhouette: what does not count is equal there, and has no noise.
+        let both = |of: &dyn Fn(usize) -> Vec3, otherwise: &dyn Fn(usize) -> Vec3| {
+            let pixel = |index: usize| if counted.pixels()[index] { of(index) } else { otherwise(index) };
+            Image::from_pixels(size.0, size.1, (0..photo.pixels().len()).map(pixel).collect())
+        };
+        let mean = mean_of(halves);
+        let encoded_mean = encoded(&mean, gain);
+        let encoded_picture = both(&|index| encoded_mean.pixels()[index], &|index| encoded_photo.pixels()[index]);
+        let noise = both(&|index| 0.5 * (first.pixels()[index] - second.pixels()[index]), &|_| Vec3::ZERO);
+        let score = metrics::scores_without_noise(&encoded_picture, Some(&noise), &encoded_photo, Some(&counted))?;
         Ok(PictureScore { rmse_linear, psnr_srgb_db: score.psnr, ssim_srgb: score.ssim })
     };
+    let aligned = halves.map(|half| scaled(half, scale));
+    let aligned = aligned.each_ref();
     Ok(ViewScores {
-        raw: encoded_score(sums.rmse(), picture)?,
-        aligned: encoded_score(AlignmentSums::of(photo, &aligned_picture, &counted).rmse(), &aligned_picture)?,
+        raw: encoded_score(sums.rmse(), halves)?,
+        aligned: encoded_score(AlignmentSums::of(photo, aligned, &counted).rmse(), aligned)?,
         scale,
         clipped_share: clipped as f64 / surface as f64,
         non_finite_pixels,
         sums,
     })
+}
+
+/// The mean of two halves of a picture.
+pub fn mean_of([first, second]: [&RgbImage; 2]) -> RgbImage {
+    let pixels = first.pixels().iter().zip(second.pixels()).map(|(a, b)| 0.5 * (*a + *b));
+    Image::from_pixels(first.width(), first.height(), pixels.collect())
 }
 
 /// The picture times a factor per channel.
@@ -252,6 +279,36 @@ mod tests {
 
     fn grey(width: usize, height: usize, value: f32) -> RgbImage {
         Image::filled(width, height, Vec3::splat(value))
+    }
+
+    #[test]
+    fn noise_of_the_picture_is_taken_off() {
+        let (width, height) = (96, 64);
+        let photo = Image::from_fn(width, height, |row, column| {
+            Vec3::splat(0.3 + 0.1 * ((row as f32) * 0.3).sin() + 0.1 * ((column as f32) * 0.2).cos())
+        });
+        let truth = photo.map(|&pixel| pixel * 1.1 + Vec3::splat(0.02));
+        let mut random = crate::math::random::SequentialRandom::new(5);
+        let mut noisy =
+            || truth.map(|&pixel| pixel + Vec3::from_array([(); 3].map(|()| 0.2 * (random.next_number() - 0.5))));
+        let (first, second) = (noisy(), noisy());
+        let states = Image::filled(width, height, PixelState::Surface);
+        let exact = score_view(&photo, &truth, &states, None, 0.0).unwrap();
+        let halves = score_halves(&photo, [&first, &second], &states, None, 0.0).unwrap();
+        let as_it_is = score_view(&photo, &mean_of([&first, &second]), &states, None, 0.0).unwrap();
+        for (exact, halves, as_it_is) in
+            [(exact.raw, halves.raw, as_it_is.raw), (exact.aligned, halves.aligned, as_it_is.aligned)]
+        {
+            let off = |a: PictureScore| {
+                [a.rmse_linear - exact.rmse_linear, a.psnr_srgb_db - exact.psnr_srgb_db, a.ssim_srgb - exact.ssim_srgb]
+            };
+            let (without, with) = (off(halves), off(as_it_is));
+            assert!(without[0].abs() < 0.1 * with[0].abs(), "{without:?} {with:?}");
+            assert!(
+                without[1].abs() < 0.15 * with[1].abs() && without[2].abs() < 0.15 * with[2].abs(),
+                "{without:?} {with:?}"
+            );
+        }
     }
 
     #[test]

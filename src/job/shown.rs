@@ -9,8 +9,8 @@ use crate::fit::views::views_of;
 use crate::fit::{Fitter, ViewUse};
 use crate::image::{Image, RgbImage};
 use crate::insight::report::{RelitPicture, RelitStrip, ViewPictures};
-use crate::insight::scores::{ViewScores, score_view};
-use crate::render::picture::{PictureSettings, render};
+use crate::insight::scores::{ViewScores, mean_of, score_halves};
+use crate::render::picture::{Picture, PictureSettings, render};
 use crate::render::{Parameters, Surface};
 use crate::scene::{Background, PixelState, Scene};
 use std::sync::atomic::AtomicBool;
@@ -50,6 +50,21 @@ fn picture_settings(scene: &Scene, settings: &RunSettings, samples: usize) -> Pi
     }
 }
 
+/// Two pictures with independent noise, of half the paths each.
+pub fn in_halves(settings: &PictureSettings, draw: impl Fn(&PictureSettings) -> Picture) -> [Picture; 2] {
+    [0, 0x1a1f].map(|other| {
+        draw(&PictureSettings { samples: (settings.samples / 2).max(1), seed: settings.seed ^ other, ..*settings })
+    })
+}
+
+/// Pixels that surface covers wholly in both halves.
+pub fn fully_covered(halves: &[Picture; 2]) -> Image<bool> {
+    let [first, second] = halves.each_ref().map(|half| &half.coverage);
+    Image::from_fn(first.width(), first.height(), |row, column| {
+        first[(row, column)] >= 0.999 && second[(row, column)] >= 0.999
+    })
+}
+
 pub(super) fn score_views(
     fitter: &Fitter,
     surface: &Surface,
@@ -67,22 +82,23 @@ pub(super) fn score_views(
         let picture_settings = picture_settings(scene, settings, samples);
         let target = Target::new(scene, index, scene.views[index].camera.level_within(most));
         let gain = fitter.state().log_gains[index].exp();
-        let mut picture = render(surface, &target.camera, own, index as u32, &picture_settings, stop);
-        picture.radiance.pixels_mut().iter_mut().for_each(|pixel| *pixel *= gain);
+        let camera = &target.camera;
+        let halves = in_halves(&picture_settings, |settings| {
+            let mut half = render(surface, camera, own, index as u32, settings, stop);
+            half.radiance.pixels_mut().iter_mut().for_each(|pixel| *pixel *= gain);
+            half
+        });
+        let pictures = halves.each_ref().map(|half| &half.radiance);
         let (width, height) = (target.camera.width, target.camera.height);
         let pixel = |row: usize, column: usize| target.at(scene, row * width + column);
         let photo: RgbImage = Image::from_fn(width, height, |row, column| pixel(row, column).0);
         let states: Image<PixelState> = Image::from_fn(width, height, |row, column| pixel(row, column).1);
-        let coverage = picture.coverage.map(|&coverage| coverage >= 0.999);
-        let scores = score_view(&photo, &picture.radiance, &states, Some(&coverage), exposure_of(scene))?;
+        let coverage = fully_covered(&halves);
+        let scores = score_halves(&photo, pictures, &states, Some(&coverage), exposure_of(scene))?;
+        let fit = mean_of(pictures);
         let counted = crate::insight::scores::counted_pixels(&states, Some(&coverage));
-        let pictures = ViewPictures {
-            name: view.name.clone(),
-            held_out: view.held_out,
-            photo,
-            fit: picture.radiance,
-            counted: Some(counted),
-        };
+        let pictures =
+            ViewPictures { name: view.name.clone(), held_out: view.held_out, photo, fit, counted: Some(counted) };
         scored.push(ScoredView { index, kind, scores, pictures });
     }
     Ok(scored)
@@ -129,14 +145,17 @@ pub(super) fn relit_strips(
         };
         for (view, picture) in &truth.pictures {
             let camera = &scene.views[*view].camera;
-            let ours = relit(surface, own, &truth.environment, camera, *view, &own_settings, stop);
+            let halves = in_halves(&own_settings, |settings| {
+                relit(surface, own, &truth.environment, camera, *view, settings, stop)
+            });
+            let pictures = halves.each_ref().map(|half| &half.radiance);
             let states = scene.views[*view].states.clone();
-            let coverage = ours.coverage.map(|&coverage| coverage >= 0.999);
-            errors.push(score_view(picture, &ours.radiance, &states, Some(&coverage), exposure_of(scene))?);
+            let coverage = fully_covered(&halves);
+            errors.push(score_halves(picture, pictures, &states, Some(&coverage), exposure_of(scene))?);
             if strip.pictures.len() < 6 {
                 strip.pictures.push(RelitPicture {
                     caption: scene.views[*view].name.clone(),
-                    picture: ours.radiance,
+                    picture: mean_of(pictures),
                     truth: Some(picture.clone()),
                 });
             }

@@ -9,12 +9,14 @@ use super::light_step::{Gauge, LightPrior, NormalEquations, solve_channel};
 use super::plan;
 use super::report::{ErrorSums, StepReport, median};
 use super::round::{BlockWork, Round, open_prior};
-use super::scene::SolverScene;
+use super::scene::{BackgroundPixel, SolverScene};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Noise of a background pixel, relative to its radiance and to the mean of the surface's.
 const BACKGROUND_NOISE: f64 = 0.03;
+/// By how much the mean light on the surface may differ from the gauge's where background shows, relative.
+const BACKGROUND_GAUGE_SLACK: f64 = 0.3;
 /// A block with fewer observations says nothing of the light.
 const LEAST_OBSERVATIONS: usize = 16;
 /// Parts in which normal matrices are added up; fixed, so that results do not depend on the number of threads.
@@ -140,13 +142,13 @@ impl SolverScene {
     /// Background pixels as rows of few entries.
     fn add_background(&self, total: &mut [NormalEquations; 3], shape: &LightShape, log_gains: &[f32]) {
         let noise = BACKGROUND_NOISE * f64::from(self.observations.mean);
-        for (view, tap, radiance) in &self.background {
+        for BackgroundPixel { view, tap, radiance, scatter } in &self.background {
             let entries: Vec<(u32, f32)> = tap.index.into_iter().zip(tap.weight).collect();
             let row = shape.reduce_sparse(&entries);
             let gain = f64::from((-log_gains[*view]).exp());
-            // Bright places are known to a share of their radiance.
+            // Bright places are known to a share of their radiance, places that views see differently to that difference.
             for (c, total) in total.iter_mut().enumerate() {
-                let scale = 1.0 / (noise + BACKGROUND_NOISE * f64::from(radiance[c].max(0.0)));
+                let scale = 1.0 / (noise + BACKGROUND_NOISE * f64::from(radiance[c].max(0.0)) + f64::from(*scatter));
                 let scaled: Vec<(u32, f64)> = row.iter().map(|&(index, value)| (index, value * scale)).collect();
                 total.add_sparse(&scaled, f64::from(radiance[c]) * gain * scale);
             }
@@ -165,8 +167,9 @@ impl SolverScene {
         let prior = LightPrior {
             variation: self.settings.light_variation,
             independence: self.settings.independence,
-            // Where the background shows, it fixes the scale.
-            gauge_slack: if self.background.is_empty() { self.settings.gauge_slack } else { 10.0 },
+            // Where the background shows, it fixes the scale; but not alone: what photos show behind a thing is seldom as
+            // far away as a sky (`saharov_bmvs` without this: the light grew by a third a round).
+            gauge_slack: if self.background.is_empty() { self.settings.gauge_slack } else { BACKGROUND_GAUGE_SLACK },
         };
         let channels: Vec<(Vec<f32>, Precisions)> = (0..3usize)
             .into_par_iter()

@@ -6,6 +6,7 @@ use super::settings::SolverSettings;
 use crate::error::{Error, ErrorKind, Result};
 use crate::fit::targets::{Target, is_radiance};
 use crate::math::sphere::{BilinearTap, tap_of_direction};
+use crate::math::statistics::Moments;
 use crate::render::Surface;
 use crate::render::cached::{CachedSettings, CachedTransport, FootprintSettings, ViewFootprints};
 use crate::scene::{Background, PixelState, Scene};
@@ -17,13 +18,31 @@ const MOST_BACKGROUND: usize = 20_000;
 /// Mean reflectance that fixes the scale between surface and light: nothing in the photos of a diffuse surface does, see
 /// [`crate::fit::gauge`]. That of the measured start.
 const HELD_REFLECTANCE: f64 = 0.5;
+/// It is held lower where the brightest surface would need more reflectance than this: cut off there, it would be
+/// explained by lobes.
+const MOST_REFLECTANCE: f64 = 0.9;
+/// Which share of the surface is not the brightest.
+const BRIGHT_QUANTILE: f64 = 0.97;
+/// A point that sees less of a constant light than this says nothing of its reflectance.
+const LEAST_SHARE_OF_LIGHT: f32 = 0.05;
 /// Texels along a block's side, and along a cell's, in the rounds that look for the light.
 const ROUND_BLOCK: (usize, usize) = (8, 2);
 /// The same where maps are made.
 const MAP_BLOCK: (usize, usize) = (4, 1);
 
-/// A background pixel: the view's place in [`SolverScene::views`], where it looks, its radiance.
-pub type BackgroundPixel = (usize, BilinearTap, [f32; 3]);
+/// A pixel that shows nothing but background.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BackgroundPixel {
+    /// The view's place in [`SolverScene::views`].
+    pub view: usize,
+    /// Where it looks.
+    pub tap: BilinearTap,
+    /// Its radiance.
+    pub radiance: [f32; 3],
+    /// Standard deviation of the radiance, mean over channels, of all that look at the same texel of the light: large
+    /// where the background is not far away, so that views disagree.
+    pub scatter: f32,
+}
 
 /// The cache, the photographs' evidence, and what holds the scale.
 pub struct SolverScene {
@@ -149,7 +168,29 @@ fn gauge(
         }
     }
     let [row, ..] = transport.direct_backward(&times_used);
-    (row, photo.map(|mean| (mean / HELD_REFLECTANCE).max(1e-9)))
+    let held = held_reflectance(transport, footprints, observations);
+    (row, photo.map(|mean| (mean / held).max(1e-9)))
+}
+
+/// [`HELD_REFLECTANCE`], or less when, under a constant light, the brightest surface would have more than
+/// [`MOST_REFLECTANCE`].
+fn held_reflectance(transport: &CachedTransport, footprints: &[ViewFootprints], observations: &Observations) -> f64 {
+    let white = transport.basis.planes(&vec![[1.0; 3]; transport.basis.count()]);
+    let arriving = transport.direct(&white);
+    let mut apparent: Vec<f32> = observations
+        .list
+        .iter()
+        .map(|observation| {
+            let view = &footprints[observation.view as usize];
+            let lit = view.lit_of(&view.points[observation.point as usize]);
+            let share: f32 = lit.iter().map(|&(index, weight)| weight * arriving[index as usize][0]).sum();
+            observation.radiance.iter().sum::<f32>() / 3.0 / share.max(LEAST_SHARE_OF_LIGHT)
+        })
+        .collect();
+    let mean = apparent.iter().map(|&value| f64::from(value)).sum::<f64>() / apparent.len() as f64;
+    let place = ((apparent.len() - 1) as f64 * BRIGHT_QUANTILE) as usize;
+    let bright = f64::from(*apparent.select_nth_unstable_by(place, f32::total_cmp).1);
+    if mean > 0.0 && bright > 0.0 { HELD_REFLECTANCE.min(MOST_REFLECTANCE * mean / bright) } else { HELD_REFLECTANCE }
 }
 
 /// Pixels that show nothing but background, thinned out evenly.
@@ -175,8 +216,46 @@ fn background_pixels(
                 continue;
             }
             let ray = view.camera.ray_through(Vec2::new(column as f32 + 0.5, row as f32 + 0.5));
-            found.push((index, tap_of_direction(ray.direction, width, height), radiance.to_array()));
+            let tap = tap_of_direction(ray.direction, width, height);
+            found.push(BackgroundPixel { view: index, tap, radiance: radiance.to_array(), scatter: 0.0 });
         }
     }
+    set_scatter(&mut found, width * height);
     found
+}
+
+/// Sets how much pixels that look at one texel differ.
+fn set_scatter(pixels: &mut [BackgroundPixel], texels: usize) {
+    let nearest = |tap: &BilinearTap| {
+        let best = (0..4).max_by(|&a, &b| tap.weight[a].total_cmp(&tap.weight[b])).unwrap_or(0);
+        tap.index[best] as usize
+    };
+    let mut statistics = vec![Moments::default(); texels];
+    for pixel in pixels.iter() {
+        statistics[nearest(&pixel.tap)].add(f64::from(pixel.radiance.iter().sum::<f32>() / 3.0));
+    }
+    for pixel in pixels {
+        pixel.scatter = statistics[nearest(&pixel.tap)].variance().sqrt() as f32;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    #[test]
+    fn background_that_views_see_differently_scatters() {
+        let tap = |direction: Vec3| tap_of_direction(direction, 8, 4);
+        let pixel = |direction: Vec3, grey: f32| BackgroundPixel {
+            view: 0,
+            tap: tap(direction),
+            radiance: [grey; 3],
+            scatter: 0.0,
+        };
+        let mut pixels = vec![pixel(Vec3::X, 1.0), pixel(Vec3::X, 3.0), pixel(-Vec3::X, 2.0), pixel(-Vec3::X, 2.0)];
+        set_scatter(&mut pixels, 32);
+        assert!((pixels[0].scatter - 2f32.sqrt()).abs() < 1e-6 && pixels[0].scatter == pixels[1].scatter);
+        assert_eq!((pixels[2].scatter, pixels[3].scatter), (0.0, 0.0));
+    }
 }

@@ -174,7 +174,7 @@ fn error_of_view(scene: &Scene, target: &Target, says: &[PixelSays]) -> (ViewErr
     let model = Image::from_pixels(width, height, says.iter().map(|says| says.model).collect());
     let is_counted = |says: &PixelSays| says.is_judged() && says.model.is_finite();
     let counted = Image::from_pixels(width, height, says.iter().map(is_counted).collect());
-    let sums = AlignmentSums::of(&photo, &model, &counted);
+    let sums = AlignmentSums::of(&photo, [&model; 2], &counted);
     let on_surface = says.iter().filter(|says| says.is_covered && says.state.is_surface()).count();
     let clipped =
         says.iter().filter(|says| says.is_covered && says.state.is_surface() && says.state.is_clipped()).count();

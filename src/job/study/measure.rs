@@ -140,7 +140,7 @@ fn sums(
         let ours = render(fitter.surface(), &scene.views[view].camera, lit, view as u32, &settings, stop);
         let covered = ours.coverage.map(|&coverage| coverage >= 0.999);
         let counted = counted_pixels(&scene.views[view].states, Some(&covered));
-        let mut own = AlignmentSums::of(&truth, &ours.radiance, &counted);
+        let mut own = AlignmentSums::of(&truth, [&ours.radiance; 2], &counted);
         if let Some(variance) = &ours.variance {
             for (variance, _) in variance.pixels().iter().zip(counted.pixels()).filter(|(_, counted)| **counted) {
                 for channel in 0..3 {
