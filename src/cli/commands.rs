@@ -8,6 +8,7 @@ use crate::image::{GreyImage, Image, file};
 use crate::insight::scores::{aggregate, score_view};
 use crate::job::pictures::{light_of, matched, parameters, relit, surface_of};
 use crate::job::prepare::RunSettings;
+use crate::job::regions;
 use crate::job::shown::exposure_of;
 use crate::render::measured_regions::render_regions;
 use crate::render::picture::{PictureSettings, layers, render as render_picture};
@@ -99,7 +100,8 @@ pub fn relight(options: &RelightOptions) -> Result<()> {
         lobe_strength: if settings.fit.has_lobe() { 1.0 } else { 0.0 },
         ..Default::default()
     };
-    let regions = crate::job::regions::read(&options.material, &options.region)?.map(|(regions, findings)| {
+    let regions = regions::read(&options.material, &options.region, options.library.as_deref())?;
+    let regions = regions.map(|(regions, findings)| {
         findings.iter().for_each(|finding| println!("{finding}"));
         regions
     });

@@ -4,14 +4,18 @@ use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::file;
 use crate::neural::source;
 use crate::render::regions::{MeasuredMaterial, Regions};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The regions of materials and masks in the order they were given, and what was noticed; `None` when no material was.
-/// For what a material may be see [`source::read`].
+/// For what a material may be, and what `library` is for, see [`source::read`].
 ///
 /// # Errors
 /// What cannot be read; another number of masks than of materials, unless one material covers all.
-pub fn read(materials: &[String], masks: &[PathBuf]) -> Result<Option<(Regions, Vec<Finding>)>> {
+pub fn read(
+    materials: &[String],
+    masks: &[PathBuf],
+    library: Option<&Path>,
+) -> Result<Option<(Regions, Vec<Finding>)>> {
     if materials.is_empty() {
         return Ok(None);
     }
@@ -25,7 +29,7 @@ pub fn read(materials: &[String], masks: &[PathBuf]) -> Result<Option<(Regions, 
     let mut findings = Vec::new();
     let mut read = Vec::with_capacity(materials.len());
     for name in materials {
-        let found = source::read(name, None, None)?;
+        let found = source::read(name, library, None)?;
         let material = MeasuredMaterial::new(&found.name, found.table);
         let largest = material.albedos().iter().flat_map(|(_, albedo)| *albedo).fold(0.0, f64::max);
         if largest > 1.0 {

@@ -132,11 +132,7 @@ pub fn estimate(
     };
 
     watch(ObjectEvent::Stage("estimating"));
-    let rounds = if known.reflectance.is_some() {
-        settings.outer_loops.div_ceil(2)
-    } else {
-        settings.outer_loops
-    };
+    let rounds = if known.reflectance.is_some() { settings.outer_loops.div_ceil(2) } else { settings.outer_loops };
     let mut holder = LightHolder::new(settings, &light)?;
     // While the light is held the objective is one from round to round, and what was learned of it stays true.
     let mut memory = StepMemory::default();
