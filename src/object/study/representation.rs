@@ -33,7 +33,7 @@ const HEADER: &str = "material,category,model,parameters,log_rmse,log10_rmse,cos
 /// Lobes of the neural model.
 const LOBES: usize = 3;
 /// Every so many materials are fitted by a quick study.
-const QUICK_STRIDE: usize = 16;
+const QUICK_STRIDE: usize = 22;
 /// Materials left out of the training that a quick study adds.
 const QUICK_LEFT_OUT: usize = 1;
 /// Name of the neural model that was trained on all materials.
@@ -234,13 +234,13 @@ fn finish(
     let mut bars: Vec<PictureBar> = overall
         .iter()
         .map(|own| PictureBar {
-            label: format!("{} ({})", own.model, own.materials),
+            label: format!("{} N={}", own.model, own.materials),
             value: own.mean,
             mark: Some(own.median),
         })
         .collect();
     bars.sort_by(|a, b| a.value.total_cmp(&b.value));
-    let picture = bar_picture::bars("log-RMSE: bar mean, tick median, (materials)", &bars);
+    let picture = bar_picture::bars("log-RMSE: bar = mean, tick = median, N = materials", &bars);
     file::write_png_srgb8(&options.output.join("fig2.png"), &picture)?;
     let shown = bar_picture::embedded(&picture, "log-RMSE of the models")?;
     let section = format!("{shown}<pre>{}</pre><pre>{}</pre>", escaped(&text), escaped(&kinds));
