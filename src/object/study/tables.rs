@@ -37,11 +37,20 @@ pub fn write(
     let mut sections = first;
     sections.push(("What was done with photos", what_was_done(options, inputs)));
     for (figure, key, title) in Figure::NAMED {
-        let mut table = StudyTable::new(title, "variant", &MEASURES);
+        let mut done: Vec<(String, Vec<f64>)> = Vec::new();
         for case in cases.iter().filter(|case| case.figure == figure) {
             let Some(fields) = lines.iter().find_map(|line| fields_of(line, case)) else { continue };
-            let values: Vec<f64> = fields.iter().map(|field| field.parse().unwrap_or(f64::NAN)).collect();
-            table.add(&case.variant(), &values);
+            done.push((case.variant(), fields.iter().map(|field| field.parse().unwrap_or(f64::NAN)).collect()));
+        }
+        // What a figure does not measure has no column: a case that failed is NaN in all that are left.
+        let is_measured =
+            |column: &usize| done.iter().any(|(_, values)| values.get(*column).is_some_and(|v| v.is_finite()));
+        let columns: Vec<usize> = (0..MEASURES.len()).filter(is_measured).collect();
+        let measures: Vec<(&str, &str)> = columns.iter().map(|&column| MEASURES[column]).collect();
+        let mut table = StudyTable::new(title, "variant", &measures);
+        for (variant, values) in &done {
+            let kept: Vec<f64> = columns.iter().map(|&c| values.get(c).copied().unwrap_or(f64::NAN)).collect();
+            table.add(variant, &kept);
         }
         if table.row_names().next().is_none() {
             continue;
@@ -50,7 +59,8 @@ pub fn write(
         table.write(&options.output, key)?;
         text += &table.to_markdown();
         text.push('\n');
-        let bars: String = [1, 3, 6, 8].iter().filter_map(|&column| table.bar_svg(column)).collect();
+        let places = [1, 3, 6, 8].iter().filter_map(|own| columns.iter().position(|column| column == own));
+        let bars: String = places.filter_map(|place| table.bar_svg(place)).collect();
         sections.push((title, format!("<pre>{}</pre>{bars}", escaped(&table.to_markdown()))));
     }
     let mut shown = String::new();
