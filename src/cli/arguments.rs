@@ -406,6 +406,16 @@ pub struct RelightOptions {
     /// Hide the light behind the surface.
     #[arg(long)]
     pub hide_background: bool,
+    /// Give parts of the surface a measured reflectance: a `.binary` file, the result folder of `patina object`, or the
+    /// name of a material of the neural model. One for each --region, or one for the whole surface.
+    #[arg(long, conflicts_with = "turntable")]
+    pub material: Vec<String>,
+    /// Take materials from this folder of neural fits of measurements, not from the neural model.
+    #[arg(long, requires = "material")]
+    pub library: Option<PathBuf>,
+    /// Masks over the texture maps, white where the material of the same place in the list holds.
+    #[arg(long, requires = "material")]
+    pub region: Vec<PathBuf>,
     /// A turntable instead of single pictures.
     #[command(flatten)]
     pub turntable: super::turntable::TurntableOptions,

@@ -8,7 +8,9 @@ use crate::image::file;
 use crate::insight::scores::{aggregate, score_halves};
 use crate::job::pictures::{light_of, matched, parameters, relit, surface_of};
 use crate::job::prepare::RunSettings;
+use crate::job::regions;
 use crate::job::shown::{exposure_of, fully_covered, in_halves};
+use crate::render::measured_regions::render_regions;
 use crate::render::picture::{PictureSettings, layers, render as render_picture};
 use crate::render::{Parameters, Surface};
 use crate::scene::{Background, Scene, doctor};
@@ -98,6 +100,11 @@ pub fn relight(options: &RelightOptions) -> Result<()> {
         lobe_strength: if settings.fit.has_lobe() { 1.0 } else { 0.0 },
         ..Default::default()
     };
+    let regions = regions::read(&options.material, &options.region, options.library.as_deref())?;
+    let regions = regions.map(|(regions, findings)| {
+        findings.iter().for_each(|finding| println!("{finding}"));
+        regions
+    });
     for name in &options.env {
         let (stem, light) = light_of(name, 256)?;
         let light = light.rotated_about_up(options.rotate.to_radians());
@@ -116,7 +123,14 @@ pub fn relight(options: &RelightOptions) -> Result<()> {
         }
         for &view in &views {
             let camera = scene.views[view].camera.shrunk(options.shrink.max(1));
-            let picture = relit(&surface, &own, &light, &camera, view, &picture_settings, &AtomicBool::new(false));
+            let stop = AtomicBool::new(false);
+            let picture = match &regions {
+                Some(regions) => {
+                    let lit = Parameters::new(own.texels.clone(), &light);
+                    render_regions(&surface, &camera, &lit, regions, view as u32, &picture_settings, &stop)
+                }
+                None => relit(&surface, &own, &light, &camera, view, &picture_settings, &stop),
+            };
             let base = output.join(format!("{}_{stem}", scene.views[view].name));
             file::write_exr_rgb(&base.with_extension("exr"), &picture.radiance)?;
             let bytes = file::srgb8_from_linear(&picture.radiance, options.exposure);

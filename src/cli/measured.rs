@@ -13,6 +13,7 @@ use crate::measured::fits::{NeuralFits, PublishedFits};
 use crate::measured::rivals::Rival;
 use crate::measured::sphere::{self, EnvironmentLevels};
 use crate::measured::{Category, MeasuredBrdf};
+use crate::neural::source;
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -31,6 +32,8 @@ pub enum MeasuredTask {
     Convert(ConvertOptions),
     /// Fit a model of few parameters to a material.
     Fit(MeasuredFitOptions),
+    /// Project a measured, fitted or neural reflectance onto diffuse, specular and roughness, and state the error.
+    Project(ProjectOptions),
     /// Fit all such models to all materials of a library and compare their errors.
     Rivals(RivalsOptions),
     /// What concerns the neural model.
@@ -116,6 +119,23 @@ pub struct MeasuredFitOptions {
     pub output: PathBuf,
 }
 
+/// Options of `patina measured project`.
+#[derive(Debug, Args)]
+pub struct ProjectOptions {
+    /// A `.binary` file, the result folder of `patina object`, or the name of a material: of --library, or else of the
+    /// neural model.
+    pub material: String,
+    /// Folder of the neural fits.
+    #[arg(long)]
+    pub library: Option<PathBuf>,
+    /// Weights of the neural model; those that come with the program when not given.
+    #[arg(long, conflicts_with = "library")]
+    pub weights: Option<PathBuf>,
+    /// Folder for `project.json`, the spheres and the lobes side by side, and the table of the projection.
+    #[arg(short, long)]
+    pub output: Option<PathBuf>,
+}
+
 /// Options of `patina measured rivals`.
 #[derive(Debug, Args)]
 pub struct RivalsOptions {
@@ -143,6 +163,7 @@ pub fn run(task: &MeasuredTask, json: bool) -> Result<()> {
         MeasuredTask::Thumbnails(options) => thumbnails(options),
         MeasuredTask::Convert(options) => convert(options),
         MeasuredTask::Fit(options) => fit(options, json),
+        MeasuredTask::Project(options) => project(options, json),
         MeasuredTask::Rivals(options) => rivals(options, json),
         MeasuredTask::Neural(task) => super::neural::run(task, json),
     }
@@ -231,38 +252,62 @@ fn convert(options: &ConvertOptions) -> Result<()> {
 fn fit(options: &MeasuredFitOptions, json: bool) -> Result<()> {
     let rival = Rival::of_key(&options.model).map_err(|error| error.at(Place::Setting("model".into())))?;
     let (table, name) = table_of(&options.source)?;
-    let fit = rival.fit(&table, &ModelFitSettings::default())?;
+    report_fit(rival, &name, &table, Some(&options.output), "fit", json)
+}
+
+fn project(options: &ProjectOptions, json: bool) -> Result<()> {
+    let found = source::read(&options.material, options.library.as_deref(), options.weights.as_deref())?;
+    if !json {
+        println!("{}: {}", found.name, found.origin);
+    }
+    report_fit(Rival::OwnLobe, &found.name, &found.table, options.output.as_deref(), "project", json)
+}
+
+/// Fits a model to a table, writes `STEM.json`, `STEM.binary`, spheres and lobes if a folder is given, and prints the
+/// errors.
+fn report_fit(
+    rival: Rival,
+    name: &str,
+    table: &MeasuredBrdf,
+    output: Option<&Path>,
+    stem: &str,
+    json: bool,
+) -> Result<()> {
+    let fit = rival.fit(table, &ModelFitSettings::default())?;
     let fitted = fit.table();
     let maps = (rival == Rival::OwnLobe).then(|| OwnLobe::map_values(&fit.parameters));
-    let report = serde_json::json!({
-        "event": "measured-fit", "material": name, "model": rival.name(), "error": fit.error, "maps": maps,
-        "parameters": fit.parameters,
-    });
-    write_bytes(&options.output.join("fit.json"), format!("{report:#}\n").as_bytes())?;
-    fitted.write(&options.output.join("fit.binary"))?;
-
-    let value = |at| table.lookup(at).unwrap_or_default();
-    let fitted_value = |at| fitted.lookup(at).unwrap_or_default();
     let lamps = sphere::showing_lamps();
-    let truth = sphere::render_table(256, &table, &lamps);
+    let truth = sphere::render_table(256, table, &lamps);
     let estimate = sphere::render_table(256, &fitted, &lamps);
-    let exposure = sphere::display_exposure(&truth, &sphere::sphere_mask(256));
-    let tiles = [
-        (name.clone(), pictures::shown_sphere_at(&truth, exposure)),
-        (rival.name().to_string(), pictures::shown_sphere_at(&estimate, exposure)),
-    ];
-    file::write_png_srgb8(&options.output.join("spheres.png"), &pictures::sheet(&tiles, Some(2)))?;
-    let svg = pictures::lobes_svg(&[("", &value), ("fit", &fitted_value)]);
-    write_bytes(&options.output.join("lobes.svg"), svg.as_bytes())?;
     let psnr = sphere::displayed_scores(&estimate, &truth)?.psnr;
+    let report = serde_json::json!({
+        "event": "measured-fit", "material": name, "model": rival.name(), "error": fit.error, "sphere_psnr_db": psnr,
+        "maps": maps, "parameters": fit.parameters,
+    });
+    if let Some(output) = output {
+        write_bytes(&output.join(format!("{stem}.json")), format!("{report:#}\n").as_bytes())?;
+        fitted.write(&output.join(format!("{stem}.binary")))?;
+        let value = |at| table.lookup(at).unwrap_or_default();
+        let fitted_value = |at| fitted.lookup(at).unwrap_or_default();
+        let exposure = sphere::display_exposure(&truth, &sphere::sphere_mask(256));
+        let tiles = [
+            (name.to_string(), pictures::shown_sphere_at(&truth, exposure)),
+            (rival.name().to_string(), pictures::shown_sphere_at(&estimate, exposure)),
+        ];
+        file::write_png_srgb8(&output.join("spheres.png"), &pictures::sheet(&tiles, Some(2)))?;
+        let svg = pictures::lobes_svg(&[("", &value), (stem, &fitted_value)]);
+        write_bytes(&output.join("lobes.svg"), svg.as_bytes())?;
+    }
     if json {
         println!("{report}");
-    } else {
-        println!("{name}, {}: log-RMSE {:.4}, sphere {psnr:.1} dB", rival.name(), fit.error.log_rmse);
-        if let Some(maps) = maps {
-            println!("diffuse {:.4?}, specular {:.4?}, roughness {:.5}", maps.diffuse, maps.specular, maps.roughness);
-        }
-        println!("{}", options.output.display());
+        return Ok(());
+    }
+    println!("{name}, {}: log-RMSE {:.4}, sphere {psnr:.1} dB", rival.name(), fit.error.log_rmse);
+    if let Some(maps) = maps {
+        println!("diffuse {:.4?}, specular {:.4?}, roughness {:.5}", maps.diffuse, maps.specular, maps.roughness);
+    }
+    if let Some(output) = output {
+        println!("{}", output.display());
     }
     Ok(())
 }

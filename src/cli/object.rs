@@ -181,15 +181,21 @@ pub struct StudyIbrdfOptions {
     /// Mesh of an object that shadows itself.
     #[arg(long)]
     pub mesh: Option<PathBuf>,
-    /// Weights of the neural model; without them only the rivals are studied.
+    /// Weights of the neural model; those that come with the program for studies of materials left out when not given.
     #[arg(long)]
     pub weights: Option<PathBuf>,
-    /// Models of the reflectance; the neural one, if it has weights, and Cook-Torrance when not given.
+    /// Models of the reflectance; the neural one and Cook-Torrance when not given.
     #[arg(long, value_enum, value_delimiter = ',')]
     pub models: Vec<ModelKind>,
     /// A few small cases, some minutes.
     #[arg(long)]
     pub quick: bool,
+    /// Only these parts.
+    #[arg(long, value_enum, value_delimiter = ',')]
+    pub parts: Vec<study::Part>,
+    /// Minutes after which figure 2 begins no further fit of DSBRDF; none are begun with --quick, and all without.
+    #[arg(long)]
+    pub dsbrdf_minutes: Option<f64>,
     /// Seed of pixels, noise and nets.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -202,10 +208,9 @@ pub struct StudyIbrdfOptions {
 pub fn study(options: &StudyIbrdfOptions, json: bool) -> Result<()> {
     let stop = Arc::new(AtomicBool::new(false));
     stop_on_interrupt(Arc::clone(&stop));
-    let models = match (options.models.is_empty(), options.weights.is_some()) {
-        (false, _) => options.models.clone(),
-        (true, true) => vec![ModelKind::Ibrdf, ModelKind::CookTorrance],
-        (true, false) => vec![ModelKind::CookTorrance],
+    let models = match options.models.is_empty() {
+        false => options.models.clone(),
+        true => vec![ModelKind::Ibrdf, ModelKind::CookTorrance],
     };
     let asked = study::StudyOptions {
         library: options.library.clone(),
@@ -214,6 +219,8 @@ pub fn study(options: &StudyIbrdfOptions, json: bool) -> Result<()> {
         weights: options.weights.clone(),
         models,
         quick: options.quick,
+        parts: options.parts.clone(),
+        dsbrdf_minutes: options.dsbrdf_minutes.unwrap_or(if options.quick { 0.0 } else { f64::INFINITY }),
         seed: options.seed,
         output: options.output.clone(),
     };

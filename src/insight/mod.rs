@@ -6,11 +6,13 @@
 //!
 //! [`coverage`] counts which texels photographs see. [`audit`] checks derivatives against differences. [`cursor`] leads
 //! between photo, surface and map; [`record`] says what each photo and the model say of one point,
-//! [`surface_layers`] what all photos together say of each texel. [`material_pictures`] shows measured reflectance.
+//! [`surface_layers`] what all photos together say of each texel. [`material_pictures`] shows measured reflectance,
+//! [`bar_picture`] bars without a browser.
 //!
 //! What this folder refuses to do: it changes no map, and scores only pictures that are handed to it.
 
 pub mod audit;
+pub mod bar_picture;
 pub mod coverage;
 pub mod cursor;
 pub mod label;

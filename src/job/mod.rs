@@ -10,7 +10,8 @@
 //! fits many times over and makes tables, [`contest`] holds methods against each other by the clock, [`hard`] on
 //! cases that break fits; [`scale`] and [`tracer_speed`] time parts; [`rivals`] fits reflectance models to measured tables.
 //! [`preview`] draws for a window beside a fit. After a fit, [`gallery`] makes what a user shows, [`gauge`] moves its
-//! scale, [`entanglement`] tells how much light is baked into the maps.
+//! scale, [`entanglement`] tells how much light is baked into the maps,
+//! [`regions`] reads measured materials for parts of a surface.
 
 pub mod against_truth;
 pub mod background;
@@ -26,6 +27,7 @@ pub mod outcome;
 pub mod pictures;
 pub mod prepare;
 pub mod preview;
+pub mod regions;
 pub mod rivals;
 mod save;
 pub mod scale;

@@ -10,7 +10,7 @@
 //! * Training: [`library`] and [`target`] (what is learned), [`batch`] (the gradient of one step), [`train`], [`adam`],
 //!   [`run`] (a sitting, with checkpoints), [`weights`] (the file).
 //! * Use: [`model`] (reflectance from codes and colours, through [`lobes`], read between [`nodes`]), [`fit`] (to a table), [`sampler`] (for a
-//!   path tracer), [`embedding`] (the map of codes), [`speed`].
+//!   path tracer), [`embedding`] (the map of codes), [`source`] (reflectance by name), [`speed`].
 //!
 //! What is not claimed: a flow is reciprocal by the folded `phi_difference`, and the compact one has no seam there;
 //! neither keeps energy by construction, so albedo is measured ([`sampler::HalfVectorSampler::albedos`]), not promised.
@@ -32,6 +32,7 @@ pub mod pass;
 pub mod product;
 pub mod run;
 pub mod sampler;
+pub mod source;
 pub mod speed;
 pub mod spline;
 pub mod target;

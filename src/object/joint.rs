@@ -15,7 +15,7 @@ use super::prior::gradient::GradientPrior;
 use super::prior::{LightPriorKind, LogLight};
 use super::problem::ObjectProblem;
 use super::progress::{ObjectEvent, ObjectiveRow, StepKind};
-use super::reflectance_step::ReflectanceProblem;
+use super::reflectance_step::{ReflectanceProblem, StepMemory};
 use super::screen::{Candidate, screen};
 use super::settings::{LightMethod, ObjectSettings};
 use super::starts::StartedModel;
@@ -26,6 +26,9 @@ use std::time::Instant;
 
 /// A step on the reflectance that gains less than this part of the objective is the last of its round.
 const REFLECTANCE_PATIENCE: f64 = 1e-3;
+/// The same under a known light: there is no other unknown that could move instead, and the last tenth of a percent of
+/// the objective is what tells a narrow lobe's width.
+const KNOWN_LIGHT_PATIENCE: f64 = 1e-5;
 /// First-order steps without gain after which a round ends, as released.
 const FIRST_ORDER_PATIENCE: usize = 50;
 /// Width of an edge for the gradient prior, in natural logarithms.
@@ -129,19 +132,21 @@ pub fn estimate(
     };
 
     watch(ObjectEvent::Stage("estimating"));
-    let rounds = if given.is_some() || known.reflectance.is_some() {
-        settings.outer_loops.div_ceil(2)
-    } else {
-        settings.outer_loops
-    };
+    let rounds = if known.reflectance.is_some() { settings.outer_loops.div_ceil(2) } else { settings.outer_loops };
     let mut holder = LightHolder::new(settings, &light)?;
+    // While the light is held the objective is one from round to round, and what was learned of it stays true.
+    let mut memory = StepMemory::default();
     for round in 1..=rounds {
         let grey = given.is_none() && known.reflectance.is_none() && round <= settings.grey_loops;
         if given.is_none() {
             run.step_light(round, grey, &table, &mut holder, &mut light)?;
         }
         if known.reflectance.is_none() {
-            run.step_reflectance(round, &grid, &light, &mut parameters)?;
+            if given.is_none() {
+                memory = StepMemory::default();
+            }
+            let patience = if given.is_some() { KNOWN_LIGHT_PATIENCE } else { REFLECTANCE_PATIENCE };
+            run.step_reflectance(round, &grid, &light, &mut parameters, &mut memory, patience)?;
             table = grid.tabulate(model.model.as_ref(), &parameters);
         }
         watch(ObjectEvent::State { light: &light, table: &table, parameters: &parameters });
@@ -291,6 +296,8 @@ impl Run<'_> {
         grid: &NodeGrid,
         light: &LogLight,
         parameters: &mut Vec<f64>,
+        memory: &mut StepMemory,
+        patience: f64,
     ) -> Result<()> {
         self.check_stop()?;
         let matrix = NodeMatrix::new(&self.problem.transport, &light.texels());
@@ -301,7 +308,7 @@ impl Run<'_> {
             likelihood: &self.problem.likelihood,
             prior: &self.model.prior,
         };
-        let reached = problem.improve(parameters, self.settings.reflectance_steps, REFLECTANCE_PATIENCE);
+        let reached = problem.improve_with(memory, parameters, self.settings.reflectance_steps, patience);
         self.check_stop()?;
         self.code_prior = reached.prior;
         self.push(round, StepKind::Reflectance, [reached.data, self.light_prior, self.code_prior], reached.not_finite);

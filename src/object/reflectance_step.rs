@@ -52,6 +52,12 @@ impl ReflectanceObjective {
     }
 }
 
+/// Steps and changes of slope that L-BFGS remembers; of use only while the objective stays the same.
+#[derive(Clone, Debug, Default)]
+pub struct StepMemory {
+    pairs: VecDeque<(Vec<f64>, Vec<f64>)>,
+}
+
 /// What is held during a step.
 pub struct ReflectanceProblem<'a> {
     /// The model.
@@ -90,17 +96,29 @@ impl ReflectanceProblem<'_> {
         ReflectanceObjective { data: state.loss, prior: self.prior.energy(parameters), gradient, not_finite }
     }
 
-    /// At most `steps` steps of L-BFGS (Nocedal 1980) with halving; ends when a step gains less than `patience` of the
-    /// objective. The model projects its parameters after each step.
+    /// [`ReflectanceProblem::improve_with`] from no memory.
     pub fn improve(&self, parameters: &mut Vec<f64>, steps: usize, patience: f64) -> ReflectanceObjective {
+        self.improve_with(&mut StepMemory::default(), parameters, steps, patience)
+    }
+
+    /// At most `steps` steps of L-BFGS (Nocedal 1980) with halving; ends when a step gains less than `patience` of the
+    /// objective. The model projects its parameters after each step. `memory` is of earlier steps on this very
+    /// objective.
+    pub fn improve_with(
+        &self,
+        memory: &mut StepMemory,
+        parameters: &mut Vec<f64>,
+        steps: usize,
+        patience: f64,
+    ) -> ReflectanceObjective {
         let mut current = self.slopes(parameters);
-        let mut pairs: VecDeque<(Vec<f64>, Vec<f64>)> = VecDeque::new();
+        let pairs = &mut memory.pairs;
         for _ in 0..steps {
-            let mut direction = descent(&current.gradient, &pairs);
+            let mut direction = descent(&current.gradient, pairs);
             let mut slope = dot(&direction, &current.gradient);
             if !(slope < 0.0) {
                 pairs.clear();
-                direction = descent(&current.gradient, &pairs);
+                direction = descent(&current.gradient, pairs);
                 slope = dot(&direction, &current.gradient);
             }
             // A first step of unknown length moves no parameter by more than this.

@@ -2,7 +2,7 @@
 
 use super::reflectance_step::ParameterPrior;
 use super::settings::ObjectSettings;
-use crate::error::{Error, ErrorKind, Place, Result};
+use crate::error::Result;
 use crate::measured::analytic::{LambertLobes, LobeKind};
 use crate::measured::model::ReflectanceModel;
 use crate::neural::model::FlowModel;
@@ -77,21 +77,23 @@ pub enum ModelKind {
 }
 
 impl StartedModel {
-    /// The model of a kind. `weights` and `lobes` are for the neural one.
+    /// The model of a kind. `weights` and `lobes` are for the neural one; without weights it takes those that ship.
     ///
     /// # Errors
     /// Weights that are missing or damaged.
     pub fn of(kind: ModelKind, weights: Option<&Path>, lobes: usize, settings: &ObjectSettings) -> Result<Self> {
-        Self::without(kind, weights, lobes, settings, &[])
+        let read = || weights.map_or_else(crate::neural::shipped, Trained::read).map(Arc::new);
+        Self::without(kind, &read, lobes, settings, &[])
     }
 
-    /// [`StartedModel::of`] without the starts of some materials: for studies that estimate these.
+    /// [`StartedModel::of`] without the starts of some materials: for studies that estimate these. `weights` is asked
+    /// only for the neural model.
     ///
     /// # Errors
-    /// As of [`StartedModel::of`].
+    /// Those of `weights`.
     pub fn without(
         kind: ModelKind,
-        weights: Option<&Path>,
+        weights: &dyn Fn() -> Result<Arc<Trained>>,
         lobes: usize,
         settings: &ObjectSettings,
         without: &[String],
@@ -100,15 +102,7 @@ impl StartedModel {
             ModelKind::CookTorrance => Ok(StartedModel::lobes(LobeKind::CookTorrance)),
             ModelKind::Ggx => Ok(StartedModel::lobes(LobeKind::Ggx)),
             ModelKind::Ward => Ok(StartedModel::lobes(LobeKind::Ward)),
-            ModelKind::Ibrdf => {
-                let Some(path) = weights else {
-                    return Err(Error::new(ErrorKind::Missing, "the neural model needs its weights")
-                        .at(Place::Setting("weights".into()))
-                        .remedy("name them with --weights, or take --model cook-torrance"));
-                };
-                let trained = Trained::read(path)?;
-                Ok(StartedModel::neural(Arc::new(trained), lobes, settings.code_weight, without))
-            }
+            ModelKind::Ibrdf => Ok(StartedModel::neural(weights()?, lobes, settings.code_weight, without)),
         }
     }
 

@@ -10,7 +10,8 @@
 //! 4. [`accumulate`]: pixels in parallel, gradients reduced in a fixed order.
 //! 5. [`cached`]: the same light without rays, for scenes whose geometry is known and stays.
 //! 6. [`picture`]: pictures and layers. [`first_hits`]: primary rays traced once.
-//!    [`progressive`]: a picture that refines.
+//!    [`progressive`]: a picture that refines. [`regions`] and [`measured_regions`]: pictures in which parts of the
+//!    surface have measured reflectance in place of the maps'; nothing is fitted there, so no record is kept.
 //!
 //! The record replaces a second tracing pass: it lives for one pixel, so memory grows neither with the picture nor
 //! with the number of steps, and the reverse pass casts no ray. Silhouettes do not move (geometry and cameras are
@@ -20,9 +21,11 @@
 pub mod accumulate;
 pub mod cached;
 pub mod first_hits;
+pub mod measured_regions;
 pub mod path;
 pub mod picture;
 pub mod progressive;
+pub mod regions;
 pub mod sums;
 pub mod surface;
 

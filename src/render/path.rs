@@ -226,7 +226,7 @@ impl PathTracer<'_> {
 }
 
 /// Weight of a direction drawn with density `own` when another technique could draw it with density `other`.
-fn power_heuristic(own: f32, other: f32) -> f32 {
+pub(super) fn power_heuristic(own: f32, other: f32) -> f32 {
     // Divided first, so that a density of 1e30 does not overflow when squared.
     let ratio = other / own;
     1.0 / (1.0 + ratio * ratio)

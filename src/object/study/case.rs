@@ -21,6 +21,7 @@ use crate::object::settings::ObjectSettings;
 use crate::object::starts::{Start, StartedModel};
 use crate::object::transport::TexelDirections;
 use std::collections::HashMap;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// First line of `results.csv`.
@@ -114,7 +115,8 @@ pub fn run(
         (figure, Some(kind)) => {
             // What is estimated must not be among the starts.
             let without = [case.material.clone()];
-            let model = StartedModel::without(kind, options.weights.as_deref(), 2, &settings, &without)?;
+            let weights = || Ok(Arc::clone(&inputs.trained));
+            let model = StartedModel::without(kind, &weights, 2, &settings, &without)?;
             let light = (figure == Figure::Reflectance).then(|| light.clone());
             (model, Known { light, reflectance: None })
         }

@@ -7,6 +7,7 @@ use crate::image::RgbImage;
 use crate::light::Environment;
 use crate::math::random::SequentialRandom;
 use crate::measured::fits::NeuralFits;
+use crate::neural::Trained;
 use crate::object::geometry::ObjectGeometry;
 use crate::object::photo::ObjectPhoto;
 use crate::object::picture::render_exact;
@@ -16,6 +17,7 @@ use crate::scene::Camera;
 use glam::Vec3;
 use std::collections::HashMap;
 use std::path::Path;
+use std::sync::Arc;
 
 /// How many times finer along each axis the light of the photos is than that of the fit.
 const FINER: usize = 4;
@@ -52,6 +54,8 @@ pub struct Inputs {
     pub mesh: Option<ObjectGeometry>,
     /// Settings of all estimations; cases change prior, shadows and seed.
     pub settings: ObjectSettings,
+    /// The neural model: that of the options, or the one that ships for materials left out.
+    pub trained: Arc<Trained>,
 }
 
 /// One photo with what it was taken of.
@@ -68,6 +72,7 @@ impl Inputs {
     /// What cannot be read; a folder without two lights.
     pub fn read(options: &StudyOptions, tell: &dyn Fn(&str)) -> Result<Self> {
         let fits = NeuralFits::read(&options.library)?;
+        let trained = Arc::new(options.trained()?);
         let base = if options.quick { ObjectSettings::quick() } else { ObjectSettings::default() };
         let settings = ObjectSettings {
             seed: options.seed,
@@ -109,7 +114,12 @@ impl Inputs {
             }
         };
         let sphere = ObjectGeometry::sphere(size, size, 0.5 * size as f32);
-        Ok(Inputs { fits, lights, held_out, sphere, mesh, settings })
+        Ok(Inputs { fits, lights, held_out, sphere, mesh, settings, trained })
+    }
+
+    /// Whether the neural model was trained on a material: what it says of such a one is not a finding.
+    pub fn has_seen(&self, material: &str) -> bool {
+        self.trained.account.materials.iter().any(|own| own == material)
     }
 
     /// The geometry of a case.

@@ -1,8 +1,8 @@
-//! The experiments of the paper with one photo: figures 3, 4 and 5, and shadows.
+//! The experiments of the paper: figure 2 without any photo, figures 3, 4 and 5 with one, and shadows.
 //!
-//! [`inputs`] photographs: the measured reflectance itself, asked at every part of a light that is finer than any that
+//! [`representation`] is figure 2: models against tables. For the others [`inputs`] photographs: the measured reflectance itself, asked at every part of a light that is finer than any that
 //! is fitted. [`case`] estimates and measures one case. [`plan`] says which cases there are. Results go to
-//! `results.csv` line by line, and what stands there is not done again: a study that was stopped goes on.
+//! `results.csv` (`fig2.csv`) line by line, and what stands there is not done again: a study that was stopped goes on.
 //!
 //! What this folder refuses to do: fit anything to the truth, or leave out a case that failed. A case that fails is a
 //! line of NaN.
@@ -10,16 +10,33 @@
 pub mod case;
 pub mod inputs;
 pub mod plan;
+pub mod representation;
 pub mod tables;
 
 use super::starts::ModelKind;
 use crate::error::{Error, ErrorKind, Place, Result};
+use crate::neural::Trained;
 use case::{CaseResult, HEADER};
 use inputs::Inputs;
 use plan::{Case, plan};
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A part of the study that can be asked for alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Part {
+    /// Figure 2: how closely models represent measured materials.
+    Fig2,
+    /// Figure 3: reflectance under a known light.
+    Fig3,
+    /// Figure 4: light with known reflectance.
+    Fig4,
+    /// Figure 5: both.
+    Fig5,
+    /// An object that shadows itself.
+    Shadows,
+}
 
 /// What is studied.
 #[derive(Clone, Debug)]
@@ -30,16 +47,36 @@ pub struct StudyOptions {
     pub envmaps: PathBuf,
     /// Mesh of an object that shadows itself; without one that part is left out, and told.
     pub mesh: Option<PathBuf>,
-    /// Weights of the neural model; without them it is left out, and told.
+    /// Weights of the neural model; those that ship for materials left out ([`crate::neural::shipped_leave_out`]) when
+    /// not given.
     pub weights: Option<PathBuf>,
     /// Models of the reflectance.
     pub models: Vec<ModelKind>,
     /// A few small cases.
     pub quick: bool,
+    /// Only these parts; all when empty.
+    pub parts: Vec<Part>,
+    /// Minutes after which figure 2 begins no further fit of DSBRDF, which takes a hundred times as long as the others.
+    pub dsbrdf_minutes: f64,
     /// Seed of pixels, noise and nets.
     pub seed: u64,
     /// Where results go.
     pub output: PathBuf,
+}
+
+impl StudyOptions {
+    /// Whether a part was asked for.
+    pub fn wants(&self, part: Part) -> bool {
+        self.parts.is_empty() || self.parts.contains(&part)
+    }
+
+    /// The neural model of the study.
+    ///
+    /// # Errors
+    /// Weights that cannot be read.
+    pub fn trained(&self) -> Result<Trained> {
+        self.weights.as_deref().map_or_else(crate::neural::shipped_leave_out, Trained::read)
+    }
 }
 
 /// Runs what is not done yet and writes tables and page. Returns the tables as text.
@@ -48,6 +85,17 @@ pub struct StudyOptions {
 /// Inputs that are missing, files that cannot be written, a stop. Cases that fail are results.
 pub fn run(options: &StudyOptions, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Result<String> {
     std::fs::create_dir_all(&options.output).map_err(|source| Error::writing(&options.output, source))?;
+    let mut text = String::new();
+    let mut first = Vec::new();
+    if options.wants(Part::Fig2) {
+        let (markdown, section) = representation::run(options, stop, tell)?;
+        text += &markdown;
+        first.push((representation::TITLE, section));
+    }
+    if options.parts == [Part::Fig2] {
+        tables::write_page(options, &first)?;
+        return Ok(text);
+    }
     let inputs = Inputs::read(options, tell)?;
     let cases = plan(&inputs, options);
     let path = options.output.join("results.csv");
@@ -84,7 +132,7 @@ pub fn run(options: &StudyOptions, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Re
         let text = format!("{HEADER}\n{}\n", lines.join("\n"));
         crate::files::write_bytes(&path, text.as_bytes())?;
     }
-    tables::write(options, &inputs, &cases, &lines, &pictures)
+    Ok(text + &tables::write(options, &inputs, &cases, &lines, &pictures, first)?)
 }
 
 /// The lines of an earlier sitting.

@@ -1,7 +1,7 @@
 //! Which cases a study has.
 
-use super::StudyOptions;
 use super::inputs::Inputs;
+use super::{Part, StudyOptions};
 use crate::object::prior::LightPriorKind;
 use crate::object::starts::ModelKind;
 
@@ -26,6 +26,16 @@ impl Figure {
         (Figure::Both, "fig5", "Figure 5: light and reflectance from one photo"),
         (Figure::Shadows, "shadows", "An object that shadows itself: shadows traced or left out"),
     ];
+
+    /// The part of the study it belongs to.
+    pub fn part(self) -> Part {
+        match self {
+            Figure::Reflectance => Part::Fig3,
+            Figure::Light => Part::Fig4,
+            Figure::Both => Part::Fig5,
+            Figure::Shadows => Part::Shadows,
+        }
+    }
 
     /// The key in `results.csv`.
     pub fn key(self) -> &'static str {
@@ -71,6 +81,9 @@ pub struct Case {
     pub spoilt: Spoilt,
     /// Whether shadows are traced.
     pub shadows: bool,
+    /// Whether the weights of the neural model were trained on the material. Said of rivals too, so that rows of a
+    /// table speak of the same materials.
+    pub seen: bool,
 }
 
 impl Case {
@@ -100,7 +113,8 @@ impl Case {
             (Figure::Shadows, false) => " without shadows",
             _ => "",
         };
-        format!("{model}{prior}{shadows} ({})", self.spoilt.key())
+        let seen = if self.seen && self.model.is_some() { " of seen materials" } else { "" };
+        format!("{model}{prior}{shadows} ({}){seen}", self.spoilt.key())
     }
 
     /// What is photographed.
@@ -136,14 +150,17 @@ const MATERIALS: [&str; 20] = [
     "pvc",
 ];
 
-/// All cases, grouped by what is photographed.
+/// All cases, grouped by what is photographed. Materials that the neural model has not seen come first: where a figure
+/// takes only some, it takes them.
 pub fn plan(inputs: &Inputs, options: &StudyOptions) -> Vec<Case> {
-    let known: Vec<String> = inputs.fits.materials.iter().map(|fit| fit.name.clone()).collect();
+    let mut known: Vec<String> = inputs.fits.materials.iter().map(|fit| fit.name.clone()).collect();
     let mut some: Vec<String> =
         MATERIALS.iter().map(|name| name.to_string()).filter(|name| known.contains(name)).collect();
     if some.is_empty() {
         some = known.clone();
     }
+    known.sort_by_key(|name| inputs.has_seen(name));
+    some.sort_by_key(|name| inputs.has_seen(name));
     let quick = options.quick;
     let lights: Vec<String> = inputs.lights.iter().map(|(name, _)| name.clone()).collect();
     let take = |from: &[String], count: usize| from.iter().take(count).cloned().collect::<Vec<_>>();
@@ -155,6 +172,7 @@ pub fn plan(inputs: &Inputs, options: &StudyOptions) -> Vec<Case> {
         prior: LightPriorKind::Deep,
         spoilt: Spoilt::Clean,
         shadows: false,
+        seen: false,
     };
     let mut cases = Vec::new();
     let all = if quick { take(&some, 2) } else { known };
@@ -203,6 +221,8 @@ pub fn plan(inputs: &Inputs, options: &StudyOptions) -> Vec<Case> {
             }
         }
     }
+    cases.retain(|case| options.wants(case.figure.part()));
+    cases.iter_mut().for_each(|case| case.seen = inputs.has_seen(&case.material));
     // A stable order by subject: photos are taken once.
     let subjects: Vec<String> = cases.iter().map(Case::subject).collect();
     let first = |case: &Case| subjects.iter().position(|subject| *subject == case.subject());

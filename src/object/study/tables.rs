@@ -12,7 +12,16 @@ use crate::object::page::{Shown, gallery, page, stops_of};
 /// Most cases that are shown in pictures.
 const MOST_SHOWN: usize = 24;
 
-/// Writes a table a figure as CSV, Markdown and SVG, and `report.html`; returns the tables as Markdown.
+/// Writes `report.html` of these sections.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_page(options: &StudyOptions, sections: &[(&str, String)]) -> Result<()> {
+    crate::files::write_bytes(&options.output.join("report.html"), page("Study of object mode", sections).as_bytes())
+}
+
+/// Writes a table a figure as CSV, Markdown and SVG, and `report.html`, which begins with the sections of `first`;
+/// returns the tables as Markdown.
 ///
 /// # Errors
 /// Files that cannot be written.
@@ -22,15 +31,26 @@ pub fn write(
     cases: &[Case],
     lines: &[String],
     pictures: &[CasePictures],
+    first: Vec<(&'static str, String)>,
 ) -> Result<String> {
     let mut text = String::new();
-    let mut sections = vec![("What was done", what_was_done(options, inputs))];
+    let mut sections = first;
+    sections.push(("What was done with photos", what_was_done(options, inputs)));
     for (figure, key, title) in Figure::NAMED {
-        let mut table = StudyTable::new(title, "variant", &MEASURES);
+        let mut done: Vec<(String, Vec<f64>)> = Vec::new();
         for case in cases.iter().filter(|case| case.figure == figure) {
             let Some(fields) = lines.iter().find_map(|line| fields_of(line, case)) else { continue };
-            let values: Vec<f64> = fields.iter().map(|field| field.parse().unwrap_or(f64::NAN)).collect();
-            table.add(&case.variant(), &values);
+            done.push((case.variant(), fields.iter().map(|field| field.parse().unwrap_or(f64::NAN)).collect()));
+        }
+        // What a figure does not measure has no column: a case that failed is NaN in all that are left.
+        let is_measured =
+            |column: &usize| done.iter().any(|(_, values)| values.get(*column).is_some_and(|v| v.is_finite()));
+        let columns: Vec<usize> = (0..MEASURES.len()).filter(is_measured).collect();
+        let measures: Vec<(&str, &str)> = columns.iter().map(|&column| MEASURES[column]).collect();
+        let mut table = StudyTable::new(title, "variant", &measures);
+        for (variant, values) in &done {
+            let kept: Vec<f64> = columns.iter().map(|&c| values.get(c).copied().unwrap_or(f64::NAN)).collect();
+            table.add(variant, &kept);
         }
         if table.row_names().next().is_none() {
             continue;
@@ -39,7 +59,8 @@ pub fn write(
         table.write(&options.output, key)?;
         text += &table.to_markdown();
         text.push('\n');
-        let bars: String = [1, 3, 6, 8].iter().filter_map(|&column| table.bar_svg(column)).collect();
+        let places = [1, 3, 6, 8].iter().filter_map(|own| columns.iter().position(|column| column == own));
+        let bars: String = places.filter_map(|place| table.bar_svg(place)).collect();
         sections.push((title, format!("<pre>{}</pre>{bars}", escaped(&table.to_markdown()))));
     }
     let mut shown = String::new();
@@ -60,7 +81,7 @@ pub fn write(
         shown = "<p class=note>All cases were done in an earlier sitting: no picture was made in this one.</p>".into();
     }
     sections.push(("Pictures", shown));
-    crate::files::write_bytes(&options.output.join("report.html"), page("Study of object mode", &sections).as_bytes())?;
+    write_page(options, &sections)?;
     Ok(text)
 }
 
@@ -72,12 +93,13 @@ fn what_was_done(options: &StudyOptions, inputs: &Inputs) -> String {
          texels; what is fitted is a light of {width} x {height} texels and a model at {} nodes, by {} pixels. Errors of \
          light are over the sphere by solid angle, those of reflectance over all cells of the table, those of pictures \
          over the object; all are root mean squares of natural logarithms. Aligned: after the best factor per channel. \
-         The material that is estimated is never among the starts; whether the weights of the neural model have seen it \
-         is stated by their file. Held-out light: {}. Seed {}.",
+         The material that is estimated is never among the starts. The neural model was trained on {} materials; rows of \
+         materials that are among them say so. Held-out light: {}. Seed {}.",
         fine.width(),
         fine.height(),
         inputs.settings.nodes.iter().product::<usize>(),
         inputs.settings.pixels,
+        inputs.trained.account.materials.len(),
         inputs.held_out.0,
         options.seed
     );

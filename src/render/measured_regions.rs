@@ -1,0 +1,198 @@
+//! Pictures of a surface of which regions have measured reflectance.
+//!
+//! The walk is that of [`super::path`], with the same random numbers for the same decisions: one direction from the
+//! light and one from the material at each vertex, joined by the power heuristic. A region draws its directions from
+//! its table ([`super::regions`]). Where no region is met the picture is that of [`super::picture`] up to rounding.
+//! Nothing is fitted to such pictures, so radiance is added up on the way and no record is kept.
+
+use super::accumulate::PassKey;
+use super::first_hits::CameraRays;
+use super::path::{MAX_BOUNCES, power_heuristic};
+use super::picture::{Picture, PictureSettings};
+use super::regions::{MeasuredMaterial, Regions};
+use super::sums::Parameters;
+use super::surface::{Surface, SurfacePoint};
+use crate::image::Image;
+use crate::light::EnvironmentSampler;
+use crate::material::{LobeGeometry, Material};
+use crate::math::frame::Frame;
+use crate::math::random::SampleStream;
+use crate::math::sphere::tap_of_direction;
+use crate::scene::Camera;
+use crate::trace::{Hit, Ray};
+use glam::Vec3;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What reflects at a vertex.
+enum Reflector<'a> {
+    /// The lobe of the maps.
+    Maps(Material<f32>),
+    /// A measured material.
+    Measured(&'a MeasuredMaterial),
+}
+
+/// A vertex: what reflects, and about which normals.
+struct Vertex<'a> {
+    reflector: Reflector<'a>,
+    point: SurfacePoint,
+    frame: Frame,
+    towards_viewer: Vec3,
+    strength: f32,
+}
+
+impl Vertex<'_> {
+    /// `f cos` and the density of [`Vertex::sample`] towards a unit direction; `None` below a horizon.
+    fn towards(&self, direction: Vec3) -> Option<(Vec3, f32)> {
+        if self.point.geometric_normal.dot(direction) <= 0.0 {
+            return None;
+        }
+        let geometry = LobeGeometry::new(self.point.shading_normal, direction, self.towards_viewer)?;
+        Some(match &self.reflector {
+            Reflector::Maps(material) => {
+                (Vec3::from(material.reflect(&geometry, self.strength)), material.density(&geometry, self.strength))
+            }
+            Reflector::Measured(material) => (
+                Vec3::from(material.reflect(&self.frame, direction, self.towards_viewer)),
+                material.density(&self.frame, direction, self.towards_viewer),
+            ),
+        })
+    }
+
+    fn sample(&self, choice: f32, numbers: [f32; 2]) -> Option<Vec3> {
+        match &self.reflector {
+            Reflector::Maps(material) => {
+                material.sample(&self.frame, self.towards_viewer, self.strength, choice, numbers)
+            }
+            Reflector::Measured(material) => {
+                material.sample(&self.frame, self.towards_viewer, [choice, numbers[0], numbers[1]])
+            }
+        }
+    }
+}
+
+/// What a picture is made of.
+struct RegionTracer<'a> {
+    surface: &'a Surface,
+    parameters: &'a Parameters<f32>,
+    regions: &'a Regions,
+    light: &'a EnvironmentSampler,
+    settings: &'a PictureSettings,
+}
+
+impl RegionTracer<'_> {
+    fn radiance_of_light(&self, direction: Vec3) -> Vec3 {
+        let (width, height) = self.parameters.environment_size;
+        Vec3::from(self.parameters.light_at(&tap_of_direction(direction, width, height)))
+    }
+
+    fn vertex(&self, ray: &Ray, hit: &Hit) -> Option<Vertex<'_>> {
+        let towards_viewer = -ray.direction;
+        let point = match self.settings.two_sided {
+            true => self.surface.point_facing(hit, towards_viewer),
+            false => self.surface.point(hit),
+        };
+        if point.geometric_normal.dot(towards_viewer) <= 0.0 || point.shading_normal.dot(towards_viewer) <= 0.0 {
+            return None;
+        }
+        let reflector = match self.regions.at(point.uv) {
+            Some(measured) => Reflector::Measured(measured),
+            None => {
+                let texels = &self.parameters.texels;
+                Reflector::Maps(texels.fetch(&texels.tap(point.uv, 0)))
+            }
+        };
+        let frame = Frame::around(point.shading_normal);
+        Some(Vertex { reflector, point, frame, towards_viewer, strength: self.settings.lobe_strength })
+    }
+
+    /// Radiance along a camera ray whose first hit is known.
+    fn radiance(&self, camera_ray: &Ray, first_hit: Option<Hit>, stream: &mut SampleStream) -> Vec3 {
+        let Some(mut hit) = first_hit else {
+            let shows = self.settings.background_visible;
+            return if shows { self.radiance_of_light(camera_ray.direction) } else { Vec3::ZERO };
+        };
+        let (mut sum, mut throughput, mut ray) = (Vec3::ZERO, Vec3::ONE, *camera_ray);
+        for _ in 0..self.settings.max_bounces.min(MAX_BOUNCES) {
+            let Some(vertex) = self.vertex(&ray, &hit) else { break };
+            let drawn = self.light.sample(stream.next_pair());
+            if let Some((direction, density)) = drawn
+                && let Some((reflected, other)) = vertex.towards(direction)
+                && !self.surface.is_shadowed(&vertex.point, direction)
+            {
+                let weight = power_heuristic(density, other) / density;
+                sum += throughput * reflected * self.radiance_of_light(direction) * weight;
+            }
+            let choice = stream.next_number();
+            let numbers = stream.next_pair();
+            let Some(direction) = vertex.sample(choice, numbers) else { break };
+            let Some((reflected, density)) = vertex.towards(direction) else { break };
+            if !(density > 1e-9) {
+                break;
+            }
+            throughput *= reflected / density;
+            let next = self.surface.ray_from(&vertex.point, direction);
+            match self.surface.closest(&next) {
+                Some(met) => (ray, hit) = (next, met),
+                None => {
+                    let weight = power_heuristic(density, self.light.pdf(direction));
+                    sum += throughput * self.radiance_of_light(direction) * weight;
+                    break;
+                }
+            }
+        }
+        sum
+    }
+}
+
+/// Renders a view by path tracing, with measured materials in regions. Stops early, with black pixels, when `stop` is
+/// set. The variance of [`Picture`] is filled as by [`super::picture::render`].
+pub fn render_regions(
+    surface: &Surface,
+    camera: &Camera,
+    parameters: &Parameters<f32>,
+    regions: &Regions,
+    view: u32,
+    settings: &PictureSettings,
+    stop: &AtomicBool,
+) -> Picture {
+    let light = EnvironmentSampler::new(&parameters.environment());
+    let tracer = RegionTracer { surface, parameters, regions, light: &light, settings };
+    let rays = CameraRays::fresh(surface, camera, settings.filter, settings.samples);
+    let groups = settings.groups.max(1);
+    let pixels: Vec<(Vec3, Vec3, f32, bool)> = (0..camera.width * camera.height)
+        .into_par_iter()
+        .map(|pixel| {
+            if stop.load(Ordering::Relaxed) {
+                return (Vec3::ZERO, Vec3::ZERO, 0.0, true);
+            }
+            let (mut mean, mut squared_deviations, mut escaped) = (Vec3::ZERO, Vec3::ZERO, 0usize);
+            for group in 0..groups {
+                let key = PassKey { seed: settings.seed, step: group as u32, view };
+                let mut sum = Vec3::ZERO;
+                for sample in 0..rays.samples() {
+                    let mut stream = key.stream(pixel, sample, rays.samples());
+                    let (ray, hit) = rays.at(pixel, sample, &mut stream);
+                    escaped += usize::from(hit.is_none());
+                    sum += tracer.radiance(&ray, hit, &mut stream);
+                }
+                let delta = sum / rays.samples() as f32 - mean;
+                mean += delta / (group + 1) as f32;
+                squared_deviations += delta * (sum / rays.samples() as f32 - mean);
+            }
+            let variance = squared_deviations / ((groups - 1).max(1) * groups) as f32;
+            let coverage = 1.0 - escaped as f32 / (groups * rays.samples()) as f32;
+            if mean.is_finite() { (mean, variance, coverage, true) } else { (Vec3::ZERO, Vec3::ZERO, coverage, false) }
+        })
+        .collect();
+    let (width, height) = (camera.width, camera.height);
+    let image = |pick: fn(&(Vec3, Vec3, f32, bool)) -> Vec3| {
+        Image::from_pixels(width, height, pixels.iter().map(pick).collect())
+    };
+    Picture {
+        radiance: image(|pixel| pixel.0),
+        variance: (groups > 1).then(|| image(|pixel| pixel.1)),
+        coverage: Image::from_pixels(width, height, pixels.iter().map(|pixel| pixel.2).collect()),
+        non_finite_pixels: pixels.iter().filter(|pixel| !pixel.3).count(),
+    }
+}
