@@ -1,8 +1,8 @@
 //! The library of materials to look at: thumbnails, the map of codes, and any place on it; from the weights that come
 //! with the program, no data needed.
 
-use super::object::look::sphere_of;
 use super::object::MaterialLook;
+use super::object::look::sphere_of;
 use crate::error::{Error, ErrorKind, Result};
 use crate::image::RgbImage;
 use crate::light::Environment;
@@ -53,6 +53,11 @@ impl Materials {
         Ok(Materials { model: FlowModel::new(Arc::clone(&trained), 1), trained, map, embedding })
     }
 
+    /// What the library was learned from.
+    pub fn statement(&self) -> String {
+        format!("{} materials; learned from {}", self.map.places.len(), self.trained.account.data)
+    }
+
     /// Spheres of all materials under three lamps, in the order of the map, exposed for a display at 0 stops. `tell`
     /// hears the share done.
     ///
@@ -96,7 +101,8 @@ mod tests {
         let materials = Materials::shipped().unwrap();
         let pictures = materials.thumbnails(12, &AtomicBool::new(false), &|_| {}).unwrap();
         assert_eq!(pictures.len(), materials.map.places.len());
-        let brightest = |picture: &RgbImage| picture.pixels().iter().fold(0.0f32, |most, rgb| most.max(rgb.max_element()));
+        let brightest =
+            |picture: &RgbImage| picture.pixels().iter().fold(0.0f32, |most, rgb| most.max(rgb.max_element()));
         assert!(pictures.iter().all(|picture| brightest(picture) > 0.05 && brightest(picture).is_finite()));
         let stopped = materials.thumbnails(12, &AtomicBool::new(true), &|_| {});
         assert_eq!(stopped.unwrap_err().kind(), ErrorKind::Stopped);

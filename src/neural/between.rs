@@ -81,9 +81,7 @@ impl MaterialMap {
             return vec![Part { name: place.name.clone(), share: 1.0 }];
         }
         let total: f64 = near.iter().map(|(distance, _)| 1.0 / distance).sum();
-        near.iter()
-            .map(|(distance, place)| Part { name: place.name.clone(), share: 1.0 / distance / total })
-            .collect()
+        near.iter().map(|(distance, place)| Part { name: place.name.clone(), share: 1.0 / distance / total }).collect()
     }
 }
 

@@ -86,6 +86,10 @@ pub struct ObjectOutcome {
     pub rerenders: Vec<Arc<RgbImage>>,
     /// Logarithm of re-render over photo, of luminance; NaN beside the object.
     pub log_errors: Vec<Arc<GreyImage>>,
+    /// The reflectance.
+    pub material: Arc<MaterialLook>,
+    /// The light.
+    pub light: Arc<Environment>,
     /// The starts that were followed, the best first; empty when the job was stopped before its end.
     pub starts: Vec<StartFollowed>,
     /// How far apart those are that are as good.

@@ -1,6 +1,6 @@
 //! The thread of an estimation, and the one that paints beside it.
 
-use super::look::{Painter, epsilon_of};
+use super::look::{MaterialLook, Painter, epsilon_of};
 use super::{ObjectLook, ObjectNews, ObjectOutcome, ObjectParts, ObjectRequest, PhotoSeen, StartFollowed, Teller};
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::image::{Image, file};
@@ -235,15 +235,11 @@ impl Worker {
             nats_behind: candidate.evidence - best,
             is_as_good: spread.starts.contains(&candidate.name),
         });
-        ObjectOutcome {
-            folder,
-            rerenders,
-            log_errors,
-            starts: starts.collect(),
-            gauge: Gauge::of(&found.light, &grid, &found.table),
-            spread,
-            parts,
-        }
+        let starts = starts.collect();
+        let material = Arc::new(MaterialLook::of(&parts.reflectance(), None));
+        let light = Arc::new(found.light.environment());
+        let gauge = Gauge::of(&found.light, &grid, &found.table);
+        ObjectOutcome { folder, rerenders, log_errors, starts, material, light, gauge, spread, parts }
     }
 }
 

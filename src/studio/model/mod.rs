@@ -2,13 +2,16 @@
 //!
 //! [`Model`] joins the parts: [`project`] is what is open, [`fit`] the job, [`edits`] what undo covers, [`lights`] the
 //! shelf, [`tasks`] work beside the window, [`log`] what was noticed, [`store`] what is remembered. [`opening`] and
-//! [`starting`] are how a folder becomes a project and a project a fit, [`viewing`] where the eye stands. Panels read the model and queue acts; they change
+//! [`starting`] are how a folder becomes a project and a project a fit, [`viewing`] where the eye stands. [`object`] is the estimation of object
+//! mode, [`materials`] its library. Panels read the model and queue acts; they change
 //! nothing but [`Edits`] directly.
 
 pub mod edits;
 pub mod fit;
 pub mod lights;
 pub mod log;
+pub mod materials;
+pub mod object;
 pub mod opening;
 pub mod project;
 pub mod starting;
@@ -34,6 +37,16 @@ use std::sync::Arc;
 use store::{Preferences, Store};
 use tasks::{Tasks, Wake};
 
+/// Which half of the studio the window shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Workspace {
+    /// Maps and light from photos of a place.
+    #[default]
+    Scene,
+    /// Light and measured reflectance from photos of one object.
+    Object,
+}
+
 /// What a task brings.
 pub enum Done {
     /// A scene was read and checked.
@@ -56,6 +69,14 @@ pub enum Done {
     Strip(Vec<(LightName, Arc<crate::image::RgbImage>)>),
     /// Pictures under other lights were compared with the truth.
     Entangled(Box<crate::job::entanglement::Entanglement>),
+    /// The estimated object under the lights of the shelf.
+    ObjectRelit(Vec<object::RelitObject>),
+    /// The result of an estimation was written to a folder.
+    ObjectSaved(PathBuf),
+    /// The library of materials with its thumbnails.
+    MaterialsDrawn(Arc<crate::job::materials::Materials>, Vec<crate::image::RgbImage>),
+    /// The chosen material.
+    MaterialShown(Box<crate::job::materials::MaterialShown>),
 }
 
 /// What a path is picked for.
@@ -69,7 +90,22 @@ pub enum PickFor {
     RunsFolder,
     /// To save a picture.
     Save,
+    /// A photo of an object.
+    ObjectPhoto,
+    /// A mask of such a photo.
+    ObjectMask,
+    /// The mesh of the object.
+    ObjectMesh,
+    /// A camera of such a photo.
+    ObjectCamera,
+    /// The light of the object, where it is known.
+    ObjectLight,
+    /// A folder for the result of an estimation.
+    ObjectResult,
 }
+
+/// Endings of pictures that are read.
+const PHOTOS: &[&str] = &["exr", "hdr", "pfm", "png", "jpg", "jpeg"];
 
 /// A window over the window.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -167,6 +203,12 @@ pub struct Cursor {
 
 /// Everything the window knows.
 pub struct Model {
+    /// Which half of the studio is shown.
+    pub workspace: Workspace,
+    /// The estimation of object mode.
+    pub object: object::ObjectControl,
+    /// The library of materials.
+    pub materials: materials::MaterialBrowser,
     /// What is open.
     pub project: Option<Project>,
     /// The fit.
@@ -218,6 +260,9 @@ pub struct Model {
     /// Called before each step of a fit with the number of steps done, on its thread; for `patina bench studio`.
     #[doc(hidden)]
     pub before_step: Option<Arc<dyn Fn(usize) + Send + Sync>>,
+    /// Called after each round of an estimation with its number, on its thread; a seam for tests of faults.
+    #[doc(hidden)]
+    pub after_round: Option<Arc<dyn Fn(usize) + Send + Sync>>,
 }
 
 impl Model {
@@ -233,6 +278,9 @@ impl Model {
         let mut history = History::default();
         history.restart(&edits);
         let mut model = Model {
+            workspace: Workspace::Scene,
+            object: object::ObjectControl::default(),
+            materials: materials::MaterialBrowser::default(),
             project: None,
             fit: FitControl::default(),
             edits,
@@ -258,6 +306,7 @@ impl Model {
             light_was_chosen_for_us: None,
             wake,
             before_step: None,
+            after_round: None,
         };
         for path in model.preferences.lights.clone() {
             model.add_light(path);
@@ -282,6 +331,7 @@ impl Model {
             }
         }
         changed |= self.fit.poll(&mut self.log);
+        changed |= self.poll_object();
         self.take_back_refused();
         self.remember_run();
         changed
@@ -322,14 +372,25 @@ impl Model {
                     project.entanglement = Some(Arc::from(table));
                 }
             }
+            Done::ObjectRelit(relit) => self.object.relit = relit,
+            Done::ObjectSaved(folder) => self.object_was_saved(folder),
+            Done::MaterialsDrawn(library, pictures) => self.materials_were_drawn(library, pictures),
+            Done::MaterialShown(shown) => self.materials.shown = Some(Arc::from(shown)),
         }
     }
 
-    fn picked(&mut self, purpose: PickFor, path: PathBuf) {
+    /// Takes in a path that was chosen or typed.
+    pub fn picked(&mut self, purpose: PickFor, path: PathBuf) {
         match purpose {
             PickFor::Open => self.open(path),
             PickFor::Light => self.add_light(path),
             PickFor::RunsFolder => self.preferences.runs_folder = path,
+            PickFor::ObjectPhoto => self.edits.object.photos.push(path),
+            PickFor::ObjectMask => self.edits.object.masks.push(path),
+            PickFor::ObjectCamera => self.edits.object.cameras.push(path),
+            PickFor::ObjectMesh => self.edits.object.mesh = path.display().to_string(),
+            PickFor::ObjectLight => self.edits.object.light = path.display().to_string(),
+            PickFor::ObjectResult => self.save_object(path),
             PickFor::Save => {
                 if let Dialog::Save(request) = &mut self.dialog {
                     request.path = path.display().to_string();
@@ -357,6 +418,14 @@ impl Model {
                     .add_filter("HDR maps", &["hdr", "exr", "pfm", "png", "jpg"])
                     .pick_file(),
                 PickFor::Save => dialog.set_title("Save picture").add_filter("Pictures", &["png", "exr"]).save_file(),
+                PickFor::ObjectPhoto => {
+                    dialog.set_title("Photo of the object").add_filter("Photos", PHOTOS).pick_file()
+                }
+                PickFor::ObjectMask => dialog.set_title("Mask of the photo").add_filter("Masks", PHOTOS).pick_file(),
+                PickFor::ObjectMesh => dialog.set_title("Mesh").add_filter("Meshes", &["obj", "ply"]).pick_file(),
+                PickFor::ObjectCamera => dialog.set_title("Camera").add_filter("Cameras", &["json", "txt"]).pick_file(),
+                PickFor::ObjectLight => dialog.set_title("Known light").add_filter("HDR maps", PHOTOS).pick_file(),
+                PickFor::ObjectResult => dialog.set_title("Folder for the result").pick_folder(),
             };
             Ok(Done::Picked(purpose, path))
         });
@@ -405,6 +474,10 @@ impl Model {
 
     /// Words for the window's title.
     pub fn window_title(&self) -> String {
+        if self.workspace == Workspace::Object {
+            let name = self.object.photos.first().map_or(String::new(), |photo| format!(" - {}", photo.name));
+            return format!("{}{name} - Patina", self.object.status.words());
+        }
         let Some(project) = &self.project else { return "Patina".into() };
         match &self.fit.status {
             FitStatus::Running | FitStatus::Pausing | FitStatus::Paused if self.fit.steps_total > 0 => {
