@@ -75,6 +75,10 @@ pub struct ObjectForm {
     pub prior: LightPriorKind,
     /// How much is done.
     pub effort: Effort,
+    /// Rows of the estimated light, where it is another number than the effort's: 16, 32, 64 or 128.
+    pub light_rows: Option<usize>,
+    /// Pixels that are used, likewise.
+    pub pixels: Option<usize>,
     /// Whether the object shadows itself.
     pub shadows: bool,
     /// Seed of pixels and net.
@@ -94,6 +98,8 @@ impl Default for ObjectForm {
             lobes: 2,
             prior: LightPriorKind::default(),
             effort: Effort::default(),
+            light_rows: None,
+            pixels: None,
             shadows: true,
             seed: 1,
         }
@@ -103,7 +109,15 @@ impl Default for ObjectForm {
 impl ObjectForm {
     /// The settings that are asked for.
     pub fn settings(&self) -> ObjectSettings {
-        ObjectSettings { prior: self.prior, shadows: self.shadows, seed: self.seed, ..self.effort.settings() }
+        let own = self.effort.settings();
+        ObjectSettings {
+            prior: self.prior,
+            shadows: self.shadows,
+            seed: self.seed,
+            light_height: self.light_rows.unwrap_or(own.light_height),
+            pixels: self.pixels.unwrap_or(own.pixels),
+            ..own
+        }
     }
 
     /// The files that are asked for.
@@ -435,11 +449,11 @@ impl Model {
                 "a camera file"
             }
             "hdr" => return self.add_light(path.into()),
-            "png" | "jpg" | "jpeg" | "exr" | "pfm" if name.contains("mask") => {
+            _ if is_photo(path) && name.contains("mask") => {
                 form.masks.push(path.into());
                 "a mask"
             }
-            "png" | "jpg" | "jpeg" | "exr" | "pfm" => {
+            _ if is_photo(path) => {
                 form.photos.push(path.into());
                 "a photo of the object"
             }
@@ -452,4 +466,10 @@ impl Model {
 /// Whether a light is none of a scene's: built in, or of a file.
 pub fn is_free(name: &LightName) -> bool {
     matches!(name, LightName::Sky(_) | LightName::File(_))
+}
+
+/// Whether a file may be a photo, by its ending.
+pub fn is_photo(path: &Path) -> bool {
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+    ["png", "jpg", "jpeg", "exr", "pfm"].contains(&ending.as_str())
 }

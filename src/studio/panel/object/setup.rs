@@ -210,7 +210,28 @@ fn settings(ui: &mut Ui, model: &mut Model) {
             ui.end_row();
         }
         choice(ui, "Prior of the light", &mut form.prior, &PRIORS);
+        let effort = form.effort;
         choice(ui, "Effort", &mut form.effort, &Effort::NAMED);
+        if form.effort != effort {
+            (form.light_rows, form.pixels) = (None, None);
+        }
+        let usual = form.effort.settings();
+        let label = ui.label("Rows of the light").on_hover_text("The light is twice as wide as high");
+        let rows = form.light_rows.unwrap_or(usual.light_height);
+        let list = ComboBox::from_id_salt("light rows").selected_text(rows.to_string()).width(130.0).show_ui(ui, |ui| {
+            for rows in [16, 32, 64, 128] {
+                let text = format!("{} x {rows}", 2 * rows);
+                ui.selectable_value(&mut form.light_rows, Some(rows), text);
+            }
+        });
+        list.response.labelled_by(label.id);
+        ui.end_row();
+        let label = ui.label("Pixels").on_hover_text("Pixels that are used, spread over the photos");
+        let mut pixels = form.pixels.unwrap_or(usual.pixels);
+        if ui.add(DragValue::new(&mut pixels).range(16..=100_000).speed(8.0)).labelled_by(label.id).changed() {
+            form.pixels = Some(pixels);
+        }
+        ui.end_row();
         let label = ui.label("Seed").on_hover_text("Of pixels and net: the same seed gives the same result");
         ui.add(DragValue::new(&mut form.seed).speed(0.1)).labelled_by(label.id);
         ui.end_row();
