@@ -13,7 +13,8 @@ use patina::object::transport::TexelDirections;
 use patina::studio::act::Act;
 use patina::studio::layout::Panel;
 use patina::studio::model::Workspace;
-use patina::studio::model::object::{Effort, ObjectStatus};
+use patina::studio::model::object::ObjectStatus;
+use patina::studio::model::object_form::{Effort, ObjectForm};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -199,16 +200,16 @@ fn files_that_do_not_do_are_refused_with_a_remedy_and_good_ones_work_after() {
     let good = studio.model().edits.object.clone();
     let mut cases = Vec::new();
     for (photo, word) in [(torn, "torn.exr"), (nowhere, "nowhere.exr"), (dark, "neither black nor saturated")] {
-        cases.push((patina::studio::model::object::ObjectForm { photos: vec![photo], ..good.clone() }, word));
+        cases.push((ObjectForm { photos: vec![photo], ..good.clone() }, word));
     }
     for (path, word) in [(narrow, "30 x 40"), (black, "marks no pixel")] {
-        cases.push((patina::studio::model::object::ObjectForm { masks: vec![path], ..good.clone() }, word));
+        cases.push((ObjectForm { masks: vec![path], ..good.clone() }, word));
     }
-    let of_mesh = |mesh: String| patina::studio::model::object::ObjectForm { mesh, is_sphere: false, ..good.clone() };
+    let of_mesh = |mesh: String| ObjectForm { mesh, is_sphere: false, ..good.clone() };
     cases.push((of_mesh(mesh.display().to_string()), "a mesh needs a camera"));
     cases.push((of_mesh(String::new()), "no mesh is named"));
     let light = "nowhere.hdr".to_string();
-    cases.push((patina::studio::model::object::ObjectForm { light, ..good.clone() }, "nowhere.hdr"));
+    cases.push((ObjectForm { light, ..good.clone() }, "nowhere.hdr"));
     for (form, word) in cases {
         studio.model().edits.object = form;
         studio.frames(1);

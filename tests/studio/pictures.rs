@@ -11,7 +11,7 @@ use patina::object::starts::ModelKind;
 use patina::studio::act::Act;
 use patina::studio::layout::Panel;
 use patina::studio::model::LightName;
-use patina::studio::model::object::Effort;
+use patina::studio::model::object_form::Effort;
 use patina::studio::model::store::ThemeChoice;
 use std::path::PathBuf;
 use std::sync::Arc;

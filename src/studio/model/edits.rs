@@ -1,7 +1,7 @@
 //! What undo takes back: settings, lights, display, layer. Where the eye stands is not among them.
 
 use super::lights::LightName;
-use super::object::ObjectForm;
+use super::object_form::ObjectForm;
 use crate::fit::FitSettings;
 use crate::image::display::DisplaySettings;
 use crate::studio::stage::Layer;

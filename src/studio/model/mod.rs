@@ -2,16 +2,20 @@
 //!
 //! [`Model`] joins the parts: [`project`] is what is open, [`fit`] the job, [`edits`] what undo covers, [`lights`] the
 //! shelf, [`tasks`] work beside the window, [`log`] what was noticed, [`store`] what is remembered. [`opening`] and
-//! [`starting`] are how a folder becomes a project and a project a fit, [`viewing`] where the eye stands. [`object`] is the estimation of object
-//! mode, [`materials`] its library. Panels read the model and queue acts; they change
+//! [`starting`] are how a folder becomes a project and a project a fit, [`viewing`] where the eye stands, [`dialogs`] what
+//! is asked in windows over the window. In object mode [`object_form`] is what is asked for, [`object`] the estimation,
+//! [`estimating`] how one becomes the other, [`materials`] the library. Panels read the model and queue acts; they change
 //! nothing but [`Edits`] directly.
 
+pub mod dialogs;
 pub mod edits;
+pub mod estimating;
 pub mod fit;
 pub mod lights;
 pub mod log;
 pub mod materials;
 pub mod object;
+pub mod object_form;
 pub mod opening;
 pub mod project;
 pub mod starting;
@@ -19,6 +23,7 @@ pub mod store;
 pub mod tasks;
 pub mod viewing;
 
+pub use dialogs::{Dialog, PickFor, SaveRequest, SaveWhat};
 pub use edits::Edits;
 pub use fit::{FitControl, FitStatus};
 pub use lights::LightName;
@@ -77,83 +82,6 @@ pub enum Done {
     MaterialsDrawn(Arc<crate::job::materials::Materials>, Vec<crate::image::RgbImage>),
     /// The chosen material.
     MaterialShown(Box<crate::job::materials::MaterialShown>),
-}
-
-/// What a path is picked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PickFor {
-    /// To open a scene or run folder.
-    Open,
-    /// To put a light on the shelf.
-    Light,
-    /// To write new runs into.
-    RunsFolder,
-    /// To save a picture.
-    Save,
-    /// A photo of an object.
-    ObjectPhoto,
-    /// A mask of such a photo.
-    ObjectMask,
-    /// The mesh of the object.
-    ObjectMesh,
-    /// A camera of such a photo.
-    ObjectCamera,
-    /// The light of the object, where it is known.
-    ObjectLight,
-    /// A folder for the result of an estimation.
-    ObjectResult,
-}
-
-/// Endings of pictures that are read.
-const PHOTOS: &[&str] = &["exr", "hdr", "pfm", "png", "jpg", "jpeg"];
-
-/// A window over the window.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub enum Dialog {
-    /// None.
-    #[default]
-    None,
-    /// Finds acts by name.
-    Palette(String),
-    /// Lists acts and keys.
-    Help,
-    /// Asks for the path of a scene, run or light.
-    Path {
-        /// What for.
-        purpose: PickFor,
-        /// What was typed.
-        text: String,
-    },
-    /// Asks how and where to save.
-    Save(SaveRequest),
-}
-
-/// What is saved, and how.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SaveRequest {
-    /// What is saved.
-    pub what: SaveWhat,
-    /// Where to; a file for a picture, a folder for several.
-    pub path: String,
-    /// Width in pixels.
-    pub width: usize,
-    /// Height in pixels.
-    pub height: usize,
-    /// Paths a pixel.
-    pub samples: usize,
-    /// Number of frames of a turntable.
-    pub frames: usize,
-}
-
-/// What can be saved from the stage.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SaveWhat {
-    /// One picture.
-    Picture,
-    /// A round about the scene.
-    Turntable,
-    /// The view under every light of the shelf.
-    Strip,
 }
 
 /// Switches of the stage that undo does not cover.
@@ -377,58 +305,6 @@ impl Model {
             Done::MaterialsDrawn(library, pictures) => self.materials_were_drawn(library, pictures),
             Done::MaterialShown(shown) => self.materials.shown = Some(Arc::from(shown)),
         }
-    }
-
-    /// Takes in a path that was chosen or typed.
-    pub fn picked(&mut self, purpose: PickFor, path: PathBuf) {
-        match purpose {
-            PickFor::Open => self.open(path),
-            PickFor::Light => self.add_light(path),
-            PickFor::RunsFolder => self.preferences.runs_folder = path,
-            PickFor::ObjectPhoto => self.edits.object.photos.push(path),
-            PickFor::ObjectMask => self.edits.object.masks.push(path),
-            PickFor::ObjectCamera => self.edits.object.cameras.push(path),
-            PickFor::ObjectMesh => self.edits.object.mesh = path.display().to_string(),
-            PickFor::ObjectLight => self.edits.object.light = path.display().to_string(),
-            PickFor::ObjectResult => self.save_object(path),
-            PickFor::Save => {
-                if let Dialog::Save(request) = &mut self.dialog {
-                    request.path = path.display().to_string();
-                }
-            }
-        }
-    }
-
-    /// Reads an HDR map and puts it on the shelf.
-    pub fn add_light(&mut self, path: PathBuf) {
-        self.tasks.spawn(format!("Reading {}", path.display()), move |_| {
-            lights::read(&path).map(|light| Done::LightRead(Box::new(light)))
-        });
-    }
-
-    /// Opens the system's file dialog on a thread of its own.
-    pub fn pick(&mut self, purpose: PickFor) {
-        self.tasks.spawn("Choosing", move |_| {
-            let dialog = rfd::FileDialog::new();
-            let path = match purpose {
-                PickFor::Open => dialog.set_title("Open a scene or run folder").pick_folder(),
-                PickFor::RunsFolder => dialog.set_title("Folder for new runs").pick_folder(),
-                PickFor::Light => dialog
-                    .set_title("Add an HDR map")
-                    .add_filter("HDR maps", &["hdr", "exr", "pfm", "png", "jpg"])
-                    .pick_file(),
-                PickFor::Save => dialog.set_title("Save picture").add_filter("Pictures", &["png", "exr"]).save_file(),
-                PickFor::ObjectPhoto => {
-                    dialog.set_title("Photo of the object").add_filter("Photos", PHOTOS).pick_file()
-                }
-                PickFor::ObjectMask => dialog.set_title("Mask of the photo").add_filter("Masks", PHOTOS).pick_file(),
-                PickFor::ObjectMesh => dialog.set_title("Mesh").add_filter("Meshes", &["obj", "ply"]).pick_file(),
-                PickFor::ObjectCamera => dialog.set_title("Camera").add_filter("Cameras", &["json", "txt"]).pick_file(),
-                PickFor::ObjectLight => dialog.set_title("Known light").add_filter("HDR maps", PHOTOS).pick_file(),
-                PickFor::ObjectResult => dialog.set_title("Folder for the result").pick_folder(),
-            };
-            Ok(Done::Picked(purpose, path))
-        });
     }
 
     /// The newest snapshot becomes what the panels show; whether it is another than before.

@@ -53,7 +53,7 @@ pub struct RunRead {
 impl Model {
     /// Opens a scene or run folder; a picture is a photo for object mode.
     pub fn open(&mut self, path: PathBuf) {
-        if super::object::is_photo(&path) && path.is_file() {
+        if super::object_form::is_photo(&path) && path.is_file() {
             self.workspace = Workspace::Object;
             return self.object_dropped(&path);
         }

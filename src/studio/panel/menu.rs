@@ -5,6 +5,9 @@ use crate::studio::act::{Act, Group, LIST};
 use crate::studio::model::{Model, Workspace};
 use egui::{Align, Button, Layout, Ui};
 
+/// Room that the switch of workspaces takes, in points.
+const ROOM: f32 = 220.0;
+
 /// Draws the menu bar.
 pub fn show(ui: &mut Ui, model: &mut Model) {
     egui::Panel::top("menu").show(ui, |ui| {
@@ -19,6 +22,10 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
                         }
                     }
                 });
+            }
+            // In a narrow window the menus come first; the switch is in the menu of object mode too.
+            if ui.available_width() < ROOM {
+                return;
             }
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 for (act, workspace) in

@@ -2,8 +2,8 @@
 
 use super::lobes::{self, LobesMemory};
 use crate::studio::model::Model;
+use crate::studio::model::estimating::is_free;
 use crate::studio::model::materials::MaterialBrowser;
-use crate::studio::model::object::is_free;
 use crate::studio::panel::empty;
 use egui::{ComboBox, RichText, Ui};
 

@@ -4,7 +4,8 @@ use super::toolbar::start;
 use crate::object::prior::LightPriorKind;
 use crate::object::starts::ModelKind;
 use crate::studio::act::Act;
-use crate::studio::model::object::{Effort, ObjectStatus};
+use crate::studio::model::object::ObjectStatus;
+use crate::studio::model::object_form::Effort;
 use crate::studio::model::{Model, PickFor};
 use crate::studio::panel::{act_button, act_button_named, heading};
 use crate::studio::theme;
@@ -218,12 +219,13 @@ fn settings(ui: &mut Ui, model: &mut Model) {
         let usual = form.effort.settings();
         let label = ui.label("Rows of the light").on_hover_text("The light is twice as wide as high");
         let rows = form.light_rows.unwrap_or(usual.light_height);
-        let list = ComboBox::from_id_salt("light rows").selected_text(rows.to_string()).width(130.0).show_ui(ui, |ui| {
-            for rows in [16, 32, 64, 128] {
-                let text = format!("{} x {rows}", 2 * rows);
-                ui.selectable_value(&mut form.light_rows, Some(rows), text);
-            }
-        });
+        let list =
+            ComboBox::from_id_salt("light rows").selected_text(rows.to_string()).width(130.0).show_ui(ui, |ui| {
+                for rows in [16, 32, 64, 128] {
+                    let text = format!("{} x {rows}", 2 * rows);
+                    ui.selectable_value(&mut form.light_rows, Some(rows), text);
+                }
+            });
         list.response.labelled_by(label.id);
         ui.end_row();
         let label = ui.label("Pixels").on_hover_text("Pixels that are used, spread over the photos");
