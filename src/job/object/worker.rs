@@ -4,7 +4,7 @@ use super::look::{MaterialLook, Painter, epsilon_of};
 use super::{ObjectLook, ObjectNews, ObjectOutcome, ObjectParts, ObjectRequest, PhotoSeen, StartFollowed, Teller};
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::image::{Image, file};
-use crate::job::{Slot, background};
+use crate::job::Slot;
 use crate::light::Environment;
 use crate::neural;
 use crate::object::joint::{Estimate, Known, estimate};
@@ -149,7 +149,12 @@ impl Worker {
         let view = &views[0];
         std::thread::scope(|scope| {
             let painting = || {
-                background::run("patina-look", || self.paint_all(view, &newest, &rings));
+                // This thread gives way as the one it comes from does, and so do its own: less would starve it.
+                let pool = rayon::ThreadPoolBuilder::new().thread_name(|index| format!("patina-look-{index}")).build();
+                match pool {
+                    Ok(pool) => pool.install(|| self.paint_all(view, &newest, &rings)),
+                    Err(_) => self.paint_all(view, &newest, &rings),
+                }
             };
             let painter = std::thread::Builder::new().name("patina-look".into()).spawn_scoped(scope, painting);
             let found = work(&|reached| {
