@@ -17,7 +17,7 @@ const MARGIN: usize = 8;
 const PAPER: [u8; 3] = [34, 36, 40];
 const INK: [u8; 3] = [226, 228, 230];
 /// Difference angles at which lobes are drawn, in degrees.
-const DIFFERENCES: [f64; 3] = [5.0, 45.0, 75.0];
+pub const DIFFERENCES: [f64; 3] = [5.0, 45.0, 75.0];
 /// Points of a curve.
 const POINTS: usize = 181;
 

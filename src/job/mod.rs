@@ -10,8 +10,11 @@
 //! fits many times over and makes tables, [`contest`] holds methods against each other by the clock, [`hard`] on
 //! cases that break fits; [`scale`] and [`tracer_speed`] time parts; [`rivals`] fits reflectance models to measured tables.
 //! [`preview`] draws for a window beside a fit. After a fit, [`gallery`] makes what a user shows, [`gauge`] moves its
-//! scale, [`entanglement`] tells how much light is baked into the maps,
-//! [`regions`] reads measured materials for parts of a surface.
+//! scale, [`entanglement`] tells how much light is baked into the maps, [`regions`] reads measured materials for parts of
+//! a surface.
+//!
+//! [`object`] is the job of object mode, light and reflectance from photos of one object; [`materials`] its library of
+//! materials to look at.
 
 pub mod against_truth;
 pub mod background;
@@ -22,6 +25,8 @@ mod facts;
 pub mod gallery;
 pub mod gauge;
 pub mod hard;
+pub mod materials;
+pub mod object;
 pub mod open;
 pub mod outcome;
 pub mod pictures;

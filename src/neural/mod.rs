@@ -10,7 +10,8 @@
 //! * Training: [`library`] and [`target`] (what is learned), [`batch`] (the gradient of one step), [`train`], [`adam`],
 //!   [`run`] (a sitting, with checkpoints), [`weights`] (the file).
 //! * Use: [`model`] (reflectance from codes and colours, through [`lobes`], read between [`nodes`]), [`fit`] (to a table), [`sampler`] (for a
-//!   path tracer), [`embedding`] (the map of codes), [`source`] (reflectance by name), [`speed`].
+//!   path tracer), [`embedding`] (the map of codes), [`between`] (materials between those of the library), [`source`]
+//!   (reflectance by name), [`speed`].
 //!
 //! What is not claimed: a flow is reciprocal by the folded `phi_difference`, and the compact one has no seam there;
 //! neither keeps energy by construction, so albedo is measured ([`sampler::HalfVectorSampler::albedos`]), not promised.
@@ -19,6 +20,7 @@
 pub mod adam;
 pub mod architecture;
 pub mod batch;
+pub mod between;
 pub mod columns;
 pub mod dense;
 pub mod embedding;

@@ -190,6 +190,12 @@ impl FlowModel {
         points.iter().map(|point| point.and_then(|_| stored.next()).map_or([0.0; 3], value)).collect()
     }
 
+    /// Reads values in 1/sr between the decoded nodes, one at a time; 0 below the horizon.
+    pub fn reader(&self, parameters: &[f64]) -> impl Fn(HalfDifference) -> [f64; 3] + Send + Sync + use<> {
+        let (decoded, grid) = (self.decode(parameters), self.grid);
+        move |at| value_between(grid, &decoded.1, at)
+    }
+
     /// The whole table, exact at every cell; cells below the horizon are invalid.
     pub fn table(&self, parameters: &[f64]) -> MeasuredBrdf {
         let mut raw = vec![INVALID; 3 * CELL_COUNT];
@@ -241,6 +247,16 @@ impl FlowModel {
     }
 }
 
+/// The value in 1/sr between nodes of `log(1 + stored value)`; 0 below the horizon.
+fn value_between(grid: GridShape, nodes: &[[f32; 3]], at: HalfDifference) -> [f64; 3] {
+    let Some(tap) = grid.tap(at) else { return [0.0; 3] };
+    [0, 1, 2].map(|channel| {
+        let log: f32 =
+            tap.node.iter().zip(&tap.weight).map(|(&node, weight)| weight * nodes[node as usize][channel]).sum();
+        f64::from(log).exp_m1() * CHANNEL_SCALE[channel]
+    })
+}
+
 impl ReflectanceModel for FlowModel {
     fn name(&self) -> &str {
         "ibrdf"
@@ -264,17 +280,7 @@ impl ReflectanceModel for FlowModel {
         let decoded = self.decode(parameters);
         let nodes = &decoded.1;
         values.par_iter_mut().zip(at).with_min_len(2048).for_each(|(value, &at)| {
-            *value = [0.0; 3];
-            let Some(tap) = self.grid.tap(at) else { return };
-            for channel in 0..3 {
-                let log: f32 = tap
-                    .node
-                    .iter()
-                    .zip(&tap.weight)
-                    .map(|(&node, weight)| weight * nodes[node as usize][channel])
-                    .sum();
-                value[channel] = f64::from(log).exp_m1() * CHANNEL_SCALE[channel];
-            }
+            *value = value_between(self.grid, nodes, at);
         });
     }
 

@@ -103,6 +103,16 @@ impl NodeGrid {
         [cell, next, cell + across, next + across, cell + down, next + down, cell + down + across, next + down + across]
     }
 
+    /// The value of a table between its nodes, in 1/sr.
+    pub fn value(&self, table: &NodeTable, at: HalfDifference) -> [f64; 3] {
+        let place = self.place(at.theta_half as f32, at.theta_difference as f32, at.phi_difference as f32);
+        let mut sum = [0.0; 3];
+        for (corner, weight) in self.corners(place.cell).into_iter().zip(weights(place.fraction)) {
+            (0..3).for_each(|channel| sum[channel] += f64::from(table.values[corner][channel] * weight));
+        }
+        sum
+    }
+
     /// The values of a model at all nodes. What is negative or not finite becomes 0, the latter counted.
     pub fn tabulate(&self, model: &dyn ReflectanceModel, parameters: &[f64]) -> NodeTable {
         let mut values = vec![[0.0; 3]; self.len()];

@@ -6,8 +6,9 @@
 use super::geometry::{ObjectGeometry, Visibility};
 use super::nodes::{NodeGrid, NodeTable, weights};
 use super::transport::TexelDirections;
-use crate::image::{Image, RgbImage};
+use crate::image::{GreyImage, Image, RgbImage};
 use crate::light::Environment;
+use crate::math::luminance;
 use crate::measured::coordinates::HalfDifference;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -136,4 +137,16 @@ pub fn log_errors(geometry: &ObjectGeometry, picture: &RgbImage, truth: &RgbImag
     let raw = sums.iter().map(|sums| sums.1).sum::<f64>() / (3.0 * count);
     let aligned = sums.iter().map(|sums| sums.1 - sums.0 * sums.0 / count).sum::<f64>() / (3.0 * count);
     (raw.sqrt(), aligned.max(0.0).sqrt())
+}
+
+/// The logarithm of one picture over another, of their luminance, at each pixel of an object; NaN beside it. `epsilon`
+/// is added to both.
+pub fn log_error_map(geometry: &ObjectGeometry, picture: &RgbImage, truth: &RgbImage, epsilon: f32) -> GreyImage {
+    let mut map = Image::filled(geometry.width, geometry.height, f32::NAN);
+    for pixel in &geometry.pixels {
+        let place = (pixel.row as usize, pixel.column as usize);
+        let log = |image: &RgbImage| (luminance(image[place]).max(0.0) + epsilon).ln();
+        map[place] = log(picture) - log(truth);
+    }
+    map
 }

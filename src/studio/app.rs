@@ -3,7 +3,7 @@
 use super::act::{Act, keys, turns};
 use super::layout::Layout;
 use super::model::store::Store;
-use super::model::{FitStatus, Model};
+use super::model::{FitStatus, Model, Workspace};
 use super::pace::Pace;
 use super::panel::{self, Memory};
 use super::stage::{Stage, StageStatus};
@@ -20,6 +20,8 @@ pub struct Studio {
     pub memory: Memory,
     /// The arrangement of the panels.
     pub layout: Layout,
+    /// The same in object mode.
+    pub object_layout: Layout,
     theme_in_force: Option<super::model::store::ThemeChoice>,
     title_in_force: String,
     preferences_written: Instant,
@@ -75,7 +77,8 @@ impl Studio {
         } else {
             model.log.note("Nothing can draw in 3-D here: the stage stays empty, everything else works");
         }
-        let layout = Layout::from_text(&model.preferences.layout);
+        let layout = Layout::from_text(&model.preferences.layout, Workspace::Scene);
+        let object_layout = Layout::from_text(&model.preferences.object_layout, Workspace::Object);
         context.set_zoom_factor(model.preferences.zoom);
         if let Some(path) = &options.path {
             model.open(path.clone());
@@ -86,6 +89,7 @@ impl Studio {
             model,
             memory,
             layout,
+            object_layout,
             theme_in_force: None,
             title_in_force: String::new(),
             preferences_written: Instant::now(),
@@ -133,6 +137,7 @@ impl Studio {
     fn remember(&mut self) {
         self.preferences_written = Instant::now();
         self.model.preferences.layout = self.layout.to_text();
+        self.model.preferences.object_layout = self.object_layout.to_text();
         self.model.write_preferences();
     }
 
@@ -147,7 +152,13 @@ impl Studio {
 
     /// Draws everything.
     fn draw(&mut self, ui: &mut egui::Ui) {
-        if self.model.project.is_none() {
+        if self.model.workspace == Workspace::Object {
+            panel::menu::show(ui, &mut self.model);
+            panel::object::toolbar::show(ui, &mut self.model);
+            panel::status::show(ui, &mut self.model);
+            let (layout, model, memory) = (&mut self.object_layout, &mut self.model, &mut self.memory);
+            egui::CentralPanel::no_frame().show(ui, |ui| layout.show(ui, model, memory));
+        } else if self.model.project.is_none() {
             panel::menu::show(ui, &mut self.model);
             panel::status::show(ui, &mut self.model);
             egui::CentralPanel::default().show(ui, |ui| panel::welcome::show(ui, &mut self.model, &mut self.memory));
@@ -238,10 +249,17 @@ impl eframe::App for Studio {
         self.draw(ui);
         release_focus(&context);
         for act in std::mem::take(&mut self.model.acts) {
-            perform::perform(act, &mut self.model, &mut self.layout, &context);
+            let layout = match self.model.workspace {
+                Workspace::Scene => &mut self.layout,
+                Workspace::Object => &mut self.object_layout,
+            };
+            perform::perform(act, &mut self.model, layout, &context);
         }
         if let Some(panel) = self.model.activate.take() {
-            self.layout.activate(panel);
+            match panel.workspace(self.model.workspace) {
+                Workspace::Scene => self.layout.activate(panel),
+                Workspace::Object => self.object_layout.activate(panel),
+            }
         }
         self.take_up_sizes(&context);
         let seconds = context.input(|input| input.time);
@@ -258,8 +276,10 @@ impl eframe::App for Studio {
         // Zoom and size are taken up with every frame: here there is no window any more to ask.
         self.model.tasks.stop_all();
         self.model.fit.stop_and_wait();
+        self.model.object.stop_and_wait();
         self.model.preferences.running = None;
         self.model.preferences.layout = self.layout.to_text();
+        self.model.preferences.object_layout = self.object_layout.to_text();
         self.model.write_preferences();
     }
 }

@@ -1,7 +1,7 @@
 //! Which panels there are and how they are arranged; a person may drag them anywhere, and the arrangement is remembered.
 
 use super::act::Act;
-use super::model::Model;
+use super::model::{Model, Workspace};
 use super::panel::{self, Memory};
 use super::theme;
 use egui::{Color32, Stroke, Ui, Visuals, WidgetText};
@@ -36,10 +36,63 @@ pub enum Panel {
     Messages,
     /// Scores of a finished run.
     Scores,
+    /// Object mode: what is estimated, from what.
+    Object,
+    /// Object mode: photo and re-render.
+    ObjectPicture,
+    /// Object mode: the estimated reflectance.
+    Reflectance,
+    /// Object mode: the estimated light.
+    ObjectLight,
+    /// Object mode: the object under other lights.
+    Relit,
+    /// Object mode: the objective, term by term.
+    Objective,
+    /// Object mode: which starts explain the photo.
+    Starts,
+    /// The library of materials.
+    Materials,
+    /// The map of their codes.
+    MaterialMap,
+    /// The chosen material.
+    Material,
 }
 
 impl Panel {
-    /// All panels with their titles and the acts that show them.
+    /// The panels of object mode with their titles and the acts that show them.
+    pub const OBJECT: [(Panel, &str, Act); 11] = [
+        (Panel::Object, "Object", Act::PanelObject),
+        (Panel::ObjectPicture, "Re-render", Act::PanelObjectPicture),
+        (Panel::Materials, "Materials", Act::PanelMaterials),
+        (Panel::MaterialMap, "Map of codes", Act::PanelMaterialMap),
+        (Panel::Objective, "Objective", Act::PanelObjective),
+        (Panel::Starts, "Starts", Act::PanelStarts),
+        (Panel::Messages, "Messages", Act::PanelMessages),
+        (Panel::Reflectance, "Reflectance", Act::PanelReflectance),
+        (Panel::Material, "Material", Act::PanelMaterial),
+        (Panel::ObjectLight, "Estimated light", Act::PanelObjectLight),
+        (Panel::Relit, "Relit", Act::PanelRelit),
+    ];
+
+    /// The panels of a workspace.
+    pub fn of_workspace(workspace: Workspace) -> &'static [(Panel, &'static str, Act)] {
+        match workspace {
+            Workspace::Scene => &Panel::ALL,
+            Workspace::Object => &Panel::OBJECT,
+        }
+    }
+
+    /// The workspace a panel is shown in: this one, if it has it.
+    pub fn workspace(self, now: Workspace) -> Workspace {
+        let has = |workspace| Panel::of_workspace(workspace).iter().any(|(panel, ..)| *panel == self);
+        match (has(now), has(Workspace::Scene)) {
+            (true, _) => now,
+            (false, true) => Workspace::Scene,
+            (false, false) => Workspace::Object,
+        }
+    }
+
+    /// All panels of scene mode with their titles and the acts that show them.
     pub const ALL: [(Panel, &str, Act); 11] = [
         (Panel::Fit, "Fit", Act::PanelFit),
         (Panel::Views, "Photos", Act::PanelViews),
@@ -56,12 +109,13 @@ impl Panel {
 
     /// Its title.
     pub fn title(self) -> &'static str {
-        Panel::ALL.iter().find(|(panel, ..)| *panel == self).map_or("", |(_, title, _)| title)
+        let mut all = Panel::ALL.iter().chain(&Panel::OBJECT);
+        all.find(|(panel, ..)| *panel == self).map_or("", |(_, title, _)| title)
     }
 
     /// The panel that an act shows.
     pub fn of(act: Act) -> Option<Panel> {
-        Panel::ALL.iter().find(|(_, _, shows)| *shows == act).map(|(panel, ..)| *panel)
+        Panel::ALL.iter().chain(&Panel::OBJECT).find(|(_, _, shows)| *shows == act).map(|(panel, ..)| *panel)
     }
 }
 
@@ -70,18 +124,41 @@ pub struct Layout {
     tree: Tree<Panel>,
 }
 
+/// Groups of tabs, each a list of panels: left, upper and lower centre, upper and lower right.
+const SCENE_TABS: [&[Panel]; 5] = [
+    &[Panel::Fit, Panel::Views],
+    &[Panel::Stage, Panel::Photo],
+    &[Panel::Curves, Panel::Messages, Panel::Scores],
+    &[Panel::Maps, Panel::Light],
+    &[Panel::Relight, Panel::Record],
+];
+const OBJECT_TABS: [&[Panel]; 5] = [
+    &[Panel::Object],
+    &[Panel::ObjectPicture, Panel::Materials, Panel::MaterialMap],
+    &[Panel::Objective, Panel::Starts, Panel::Messages],
+    &[Panel::Reflectance, Panel::Material],
+    &[Panel::ObjectLight, Panel::Relit],
+];
+
 impl Default for Layout {
     fn default() -> Self {
+        Layout::of(Workspace::Scene)
+    }
+}
+
+impl Layout {
+    /// The first arrangement of a workspace.
+    pub fn of(workspace: Workspace) -> Self {
+        let (groups, name, heights) = match workspace {
+            Workspace::Scene => (SCENE_TABS, "layout", [0.7, 0.5]),
+            Workspace::Object => (OBJECT_TABS, "object layout", [0.64, 0.56]),
+        };
         let mut tiles = Tiles::default();
         let mut tabs = |panels: &[Panel]| {
             let panes = panels.iter().map(|&panel| tiles.insert_pane(panel)).collect();
             tiles.insert_tab_tile(panes)
         };
-        let left = tabs(&[Panel::Fit, Panel::Views]);
-        let stage = tabs(&[Panel::Stage, Panel::Photo]);
-        let below = tabs(&[Panel::Curves, Panel::Messages, Panel::Scores]);
-        let upper_right = tabs(&[Panel::Maps, Panel::Light]);
-        let lower_right = tabs(&[Panel::Relight, Panel::Record]);
+        let [left, stage, below, upper_right, lower_right] = groups.map(&mut tabs);
         let mut split = |direction: LinearDir, children: &[(TileId, f32)]| {
             let mut linear = Linear::new(direction, children.iter().map(|(child, _)| *child).collect());
             for (child, share) in children {
@@ -89,23 +166,22 @@ impl Default for Layout {
             }
             tiles.insert_new(Tile::Container(Container::Linear(linear)))
         };
-        let centre = split(LinearDir::Vertical, &[(stage, 0.7), (below, 0.3)]);
-        let right = split(LinearDir::Vertical, &[(upper_right, 0.5), (lower_right, 0.5)]);
+        let centre = split(LinearDir::Vertical, &[(stage, heights[0]), (below, 1.0 - heights[0])]);
+        let right = split(LinearDir::Vertical, &[(upper_right, heights[1]), (lower_right, 1.0 - heights[1])]);
         let root = split(LinearDir::Horizontal, &[(left, 0.21), (centre, 0.53), (right, 0.26)]);
-        let mut layout = Layout { tree: Tree::new(egui::Id::unique("layout"), root, tiles) };
-        for first in [Panel::Fit, Panel::Stage, Panel::Curves, Panel::Maps, Panel::Relight] {
-            layout.activate(first);
+        let mut layout = Layout { tree: Tree::new(egui::Id::unique(name), root, tiles) };
+        for first in groups.iter().filter_map(|group| group.first()) {
+            layout.activate(*first);
         }
         layout
     }
-}
 
-impl Layout {
     /// The arrangement that was remembered; the first one where nothing was, or where it lacks a panel.
-    pub fn from_text(text: &str) -> Self {
-        let Ok(tree) = serde_json::from_str::<Tree<Panel>>(text) else { return Layout::default() };
+    pub fn from_text(text: &str, workspace: Workspace) -> Self {
+        let Ok(tree) = serde_json::from_str::<Tree<Panel>>(text) else { return Layout::of(workspace) };
         let has = |panel: Panel| tree.tiles.tiles().any(|tile| matches!(tile, Tile::Pane(own) if *own == panel));
-        if Panel::ALL.iter().all(|(panel, ..)| has(*panel)) { Layout { tree } } else { Layout::default() }
+        let is_whole = Panel::of_workspace(workspace).iter().all(|(panel, ..)| has(*panel));
+        if is_whole { Layout { tree } } else { Layout::of(workspace) }
     }
 
     /// The arrangement as text.

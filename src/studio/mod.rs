@@ -1,5 +1,7 @@
 //! The window. It holds no algorithm: what it shows is made by the library, what it does goes through [`crate::job`].
 //!
+//! There are two workspaces: scenes, and object mode ([`model::Workspace`]).
+//!
 //! Read [`app`] first: one frame is news taken in, panels drawn, acts done. [`model`] is what the window knows, without a
 //! widget; [`act`] lists everything a person can do, once, for menus, palette, keys and help; [`perform`] does it.
 //! [`panel`] draws, one file a panel; [`layout`] arranges them; [`theme`] names every colour. [`stage`] draws the mesh in

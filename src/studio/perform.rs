@@ -1,11 +1,11 @@
 //! What acts do.
 
 use super::act::availability::availability;
-use super::act::{Act, LIST};
+use super::act::{Act, Group, LIST};
 use super::layout::{Layout, Panel};
 use super::model::edits::PhotoLook;
 use super::model::lights::LightName;
-use super::model::{Dialog, Model, PickFor, SaveWhat};
+use super::model::{Dialog, Model, PickFor, SaveWhat, Workspace};
 use super::stage::Layer;
 use crate::image::display::{DisplaySettings, ToneCurve};
 use egui::{Context, ViewportCommand};
@@ -13,7 +13,7 @@ use egui::{Context, ViewportCommand};
 /// Degrees by which a key turns the light.
 const TURN_DEGREES: f32 = 15.0;
 
-/// Does an act; one that cannot be done now says why instead.
+/// Does an act; one that cannot be done now says why instead. `layout` is that of the workspace that is shown.
 pub fn perform(act: Act, model: &mut Model, layout: &mut Layout, context: &Context) {
     if let Err(why) = availability(act, model) {
         model.log.note(format!("{}: {why}", act.bare_name()));
@@ -21,7 +21,8 @@ pub fn perform(act: Act, model: &mut Model, layout: &mut Layout, context: &Conte
     }
     if let Some(panel) = Panel::of(act) {
         model.switches.alone = false;
-        layout.activate(panel);
+        model.workspace = panel.workspace(model.workspace);
+        model.activate = Some(panel);
         return;
     }
     match act {
@@ -48,7 +49,7 @@ pub fn perform(act: Act, model: &mut Model, layout: &mut Layout, context: &Conte
         Act::ZoomOut => context.set_zoom_factor((context.zoom_factor() - 0.1).max(0.6)),
         Act::ZoomReset => context.set_zoom_factor(1.0),
         Act::HideInterface => model.switches.alone = !model.switches.alone,
-        Act::ResetLayout => *layout = Layout::default(),
+        Act::ResetLayout => *layout = Layout::of(model.workspace),
         Act::Start
         | Act::PauseOrGoOn
         | Act::Stop
@@ -56,7 +57,41 @@ pub fn perform(act: Act, model: &mut Model, layout: &mut Layout, context: &Conte
         | Act::Checkpoint
         | Act::LeaveOut
         | Act::SurfaceLayers => perform_on_fit(act, model),
+        _ if act.info().group == Group::Object => perform_on_object(act, model, context),
         _ => perform_on_view(act, model),
+    }
+}
+
+fn perform_on_object(act: Act, model: &mut Model, context: &Context) {
+    match act {
+        Act::SceneWorkspace => model.workspace = Workspace::Scene,
+        Act::ObjectWorkspace => {
+            model.workspace = Workspace::Object;
+            model.switches.alone = false;
+        }
+        Act::OpenPhoto => {
+            model.workspace = Workspace::Object;
+            model.dialog = Dialog::Path { purpose: PickFor::ObjectPhoto, text: String::new() };
+        }
+        Act::ObjectStart => {
+            model.workspace = Workspace::Object;
+            model.start_object();
+        }
+        Act::ObjectStop => model.object.stop(),
+        Act::ObjectRelight => {
+            model.relight_object();
+            model.activate = Some(Panel::Relit);
+        }
+        Act::ObjectSave => model.dialog = Dialog::Path { purpose: PickFor::ObjectResult, text: String::new() },
+        Act::ObjectReport => {
+            if let Some(folder) = model.object.outcome.as_ref().and_then(|outcome| outcome.folder.as_ref()) {
+                let url = format!("file://{}", folder.join("report.html").display());
+                context.open_url(egui::OpenUrl::new_tab(url));
+            }
+        }
+        Act::NextMaterial => model.step_material(1),
+        Act::PreviousMaterial => model.step_material(-1),
+        _ => {}
     }
 }
 

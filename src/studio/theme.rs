@@ -2,6 +2,7 @@
 
 use super::model::store::ThemeChoice;
 use crate::error::Severity;
+use crate::measured::Category;
 use egui::{Color32, Context, CornerRadius, Stroke, Theme, ThemePreference, Vec2, Visuals, vec2};
 
 /// Colours that mean something, beside those of egui.
@@ -21,7 +22,22 @@ pub struct Palette {
     pub stage: Color32,
     /// Lines of plots, in order.
     pub curves: [Color32; 5],
+    /// Lines of red, green and blue.
+    pub channels: [Color32; 3],
 }
+
+/// Kinds of materials on the map, in the order of [`Category::ALL`]; in every theme the same, as on the saved map.
+pub const KINDS: [Color32; 9] = [
+    Color32::from_rgb(78, 121, 167),
+    Color32::from_rgb(242, 142, 43),
+    Color32::from_rgb(225, 87, 89),
+    Color32::from_rgb(118, 183, 178),
+    Color32::from_rgb(89, 161, 79),
+    Color32::from_rgb(237, 201, 72),
+    Color32::from_rgb(176, 122, 161),
+    Color32::from_rgb(156, 117, 95),
+    Color32::from_rgb(136, 136, 136),
+];
 
 const DARK: Palette = Palette {
     accent: Color32::from_rgb(95, 190, 168),
@@ -37,6 +53,7 @@ const DARK: Palette = Palette {
         Color32::from_rgb(220, 130, 190),
         Color32::from_rgb(190, 195, 120),
     ],
+    channels: [Color32::from_rgb(240, 110, 100), Color32::from_rgb(110, 200, 110), Color32::from_rgb(120, 155, 250)],
 };
 
 const LIGHT: Palette = Palette {
@@ -53,6 +70,7 @@ const LIGHT: Palette = Palette {
         Color32::from_rgb(160, 40, 120),
         Color32::from_rgb(100, 105, 10),
     ],
+    channels: [Color32::from_rgb(190, 35, 30), Color32::from_rgb(25, 125, 40), Color32::from_rgb(40, 70, 200)],
 };
 
 const HIGH_CONTRAST: Palette = Palette {
@@ -69,6 +87,7 @@ const HIGH_CONTRAST: Palette = Palette {
         Color32::from_rgb(255, 120, 230),
         Color32::WHITE,
     ],
+    channels: [Color32::from_rgb(255, 110, 110), Color32::from_rgb(90, 255, 90), Color32::from_rgb(140, 180, 255)],
 };
 
 /// The palette of the theme in force.
@@ -91,6 +110,12 @@ impl Palette {
             Severity::Fatal => self.error,
         }
     }
+}
+
+/// The colour of a kind of materials.
+pub fn kind_colour(kind: Category) -> Color32 {
+    let place = Category::ALL.iter().position(|own| *own == kind).unwrap_or(KINDS.len() - 1);
+    KINDS[place.min(KINDS.len() - 1)]
 }
 
 /// Puts a theme in force.

@@ -7,7 +7,7 @@ use patina::studio::act::availability::availability;
 use patina::studio::act::{Act, ActInfo, Group, LIST};
 use patina::studio::layout::Panel;
 use patina::studio::model::starting::TITLE as STARTING;
-use patina::studio::model::{Dialog, FitStatus, LightName};
+use patina::studio::model::{Dialog, FitStatus, LightName, Workspace};
 use patina::studio::stage::Layer;
 
 /// The title of an act's menu.
@@ -23,6 +23,7 @@ fn open_menu(studio: &mut TestStudio, title: &str) {
 /// Brings about a state in which an act has something to do.
 fn give_it_work(studio: &mut TestStudio, act: Act) {
     let model = studio.model();
+    model.workspace = if act == Act::SceneWorkspace { Workspace::Object } else { Workspace::Scene };
     model.edits.layer = if act == Act::LayerNormal { Layer::Lit } else { Layer::Normal };
     model.edits.relight.first = LightName::Sky("noon".into());
     model.edits.relight.turn_degrees = 30.0;
@@ -60,8 +61,8 @@ fn everything(studio: &mut TestStudio) -> String {
     let fit = (&model.fit.status, model.fit.last_checkpoint, model.fit.losses.len());
     let tasks: Vec<String> = model.tasks.progress().into_iter().map(|(title, ..)| title).collect();
     format!(
-        "{asked:?} {closes} {zoom} {visible:?} {open:?} {fit:?} {tasks:?} {:?} {:?} {:?} {:?} {:?}",
-        model.edits, model.switches, model.dialog, model.preferences.theme, model.eye
+        "{asked:?} {closes} {zoom} {visible:?} {open:?} {fit:?} {tasks:?} {:?} {:?} {:?} {:?} {:?} {:?}",
+        model.workspace, model.edits, model.switches, model.dialog, model.preferences.theme, model.eye
     )
 }
 
@@ -139,7 +140,20 @@ fn every_act_does_something(way: Way) {
 }
 
 /// Acts that are grey while no fit is in progress.
-const NEED_A_FIT: [Act; 4] = [Act::PauseOrGoOn, Act::Stop, Act::StepOnce, Act::Checkpoint];
+const NEED_A_FIT: [Act; 11] = [
+    Act::PauseOrGoOn,
+    Act::Stop,
+    Act::StepOnce,
+    Act::Checkpoint,
+    // And those that need a photo of an object, a result, or the library.
+    Act::ObjectStart,
+    Act::ObjectStop,
+    Act::ObjectRelight,
+    Act::ObjectSave,
+    Act::ObjectReport,
+    Act::NextMaterial,
+    Act::PreviousMaterial,
+];
 
 #[test]
 fn every_act_does_something_from_its_menu() {
@@ -224,7 +238,7 @@ fn acts_that_cannot_be_done_are_grey_and_say_why() {
     first_page.frames(2);
     let at_first = grey_ones_say_why(&mut first_page);
     let with_run = grey_ones_say_why(&mut TestStudio::with_finished_run());
-    assert!(at_first > 40 && with_run < 12, "{at_first} on the first page, {with_run} on a run");
+    assert!(at_first > 40 && with_run < 19, "{at_first} on the first page, {with_run} on a run");
     let mut running = TestStudio::with_running_fit();
     running.click("Pause fit");
     running.wait("the pause", |model| model.fit.status == FitStatus::Paused);
@@ -246,6 +260,7 @@ fn every_panel_comes_by_its_tab_and_shows_what_is_its_own() {
         Panel::Curves => "Log axis",
         Panel::Messages => "Nothing was noticed",
         Panel::Scores => "Compare under other lights",
+        other => panic!("{other:?} is not of scene mode"),
     };
     studio.model().log.clear();
     for (panel, title, _) in Panel::ALL {
@@ -273,7 +288,7 @@ fn every_panel_comes_by_its_tab_and_shows_what_is_its_own() {
 }
 
 /// Acts that leave the window, or what is open.
-const LEAVING: [Act; 3] = [Act::Quit, Act::OpenDemo, Act::CloseProject];
+const LEAVING: [Act; 4] = [Act::Quit, Act::OpenDemo, Act::CloseProject, Act::ObjectWorkspace];
 
 /// Does every act once and holds that one that cannot be done says why.
 fn do_every_act(studio: &mut TestStudio) {
@@ -304,6 +319,7 @@ fn come_to_rest(studio: &mut TestStudio) {
 fn every_act_can_be_asked_for_on_the_first_page() {
     let mut studio = TestStudio::new();
     do_every_act(&mut studio);
+    studio.act(Act::SceneWorkspace);
     studio.act(Act::CloseProject);
     assert!(studio.log().contains("open a scene first"), "{}", studio.log());
     studio.control("Open the built-in demo");

@@ -2,7 +2,7 @@
 
 use super::support::TestStudio;
 use eframe::egui::accesskit::Role;
-use eframe::egui::{Key, Modifiers};
+use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2};
 use egui_kittest::Node;
 use egui_kittest::kittest::{By, NodeT, Queryable};
 
@@ -73,6 +73,17 @@ impl TestStudio {
         assert!(!node.accesskit_node().is_disabled(), "{node:?} is grey; {}", self.log());
         node.click();
         // A window over the window is measured in one frame and seen in the next.
+        self.frames(3);
+    }
+
+    /// Presses and releases the mouse at a place.
+    pub fn click_at(&mut self, at: Pos2) {
+        self.harness.hover_at(at);
+        self.frames(2);
+        for pressed in [true, false] {
+            let (button, modifiers) = (PointerButton::Primary, Modifiers::NONE);
+            self.harness.event(Event::PointerButton { pos: at, button, pressed, modifiers });
+        }
         self.frames(3);
     }
 

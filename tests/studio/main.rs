@@ -10,6 +10,7 @@ mod fit;
 mod hand;
 mod manners;
 mod memory;
+mod object;
 mod panels;
 mod pictures;
 mod relight;

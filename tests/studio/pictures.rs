@@ -2,12 +2,16 @@
 //! adapter rounds in its own way.
 
 use super::adapter::has_adapter;
+use super::object::write_sphere_photo;
 use super::support::{Key, Modifiers, Role, TestStudio, finished_run};
 use eframe::egui::{Event, PointerButton, Pos2, Rect};
 use egui_kittest::Harness;
 use image::RgbaImage;
+use patina::object::starts::ModelKind;
+use patina::studio::act::Act;
 use patina::studio::layout::Panel;
 use patina::studio::model::LightName;
+use patina::studio::model::object_form::Effort;
 use patina::studio::model::store::ThemeChoice;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -240,4 +244,68 @@ fn the_window_is_drawn_in_every_theme() {
 fn the_window_is_drawn_large_and_in_fine_pixels() {
     draw_in([1440.0, 900.0], 1.0, "1440", &THEMES);
     draw_in([1024.0, 640.0], 2.0, "1024_twice", &THEMES);
+}
+
+/// Clicks through object mode and draws it: what a person sees after an estimation, and of the library.
+#[test]
+fn object_mode_is_drawn_with_its_result_and_its_library() {
+    if !has_adapter() {
+        return;
+    }
+    let size = [1440.0, 900.0];
+    let builder = Harness::builder().with_size(size).with_render_cursor(false).wgpu();
+    let folder = Arc::new(tempfile::tempdir().unwrap());
+    let photo = folder.path().join("ball.exr");
+    // Pictures that are kept are to be looked at: larger, and by the model that the program takes by itself.
+    let is_kept = std::env::var_os("PATINA_WINDOW_PICTURES").is_some();
+    write_sphere_photo(&photo, if is_kept { 128 } else { 32 });
+    let mut studio = TestStudio::built(builder, folder, None);
+    studio.act(Act::ObjectWorkspace);
+    let empty = picture(&mut studio, "object_empty");
+    let form = &mut studio.model().edits.object;
+    (form.photos, form.effort) = (vec![photo], Effort::Quick);
+    if !is_kept {
+        (form.model, form.light_rows, form.pixels) = (ModelKind::CookTorrance, Some(16), Some(300));
+    }
+    studio.frames(2);
+    studio.act(Act::ObjectStart);
+    studio.wait("the first look", |model| model.object.look.is_some() || model.object.outcome.is_some());
+    picture(&mut studio, "object_running");
+    studio.wait("the relit pictures", |model| !model.object.relit.is_empty());
+    studio.act(Act::PanelRelit);
+    let window = Rect::from_min_size(Pos2::ZERO, size.into());
+    let whole = picture(&mut studio, "object_finished");
+    let changed = share_changed(&part(&empty, window, 1.0), &part(&whole, window, 1.0));
+    assert!(changed > 0.2, "only {changed} of the window changed");
+    for name in ["Photo of the object", "Re-render of the object", "Sphere of the estimated reflectance"] {
+        let rect = studio.control(name).rect();
+        let colours: std::collections::HashSet<_> = part(&whole, rect, 1.0).into_iter().collect();
+        assert!(colours.len() > 40, "{name}: {} colours in {rect:?}", colours.len());
+    }
+    studio.click("Log error");
+    studio.act(Act::PanelObjectLight);
+    studio.act(Act::PanelStarts);
+    picture(&mut studio, "object_log_error");
+
+    studio.act(Act::PanelMaterials);
+    studio.wait("the materials", |model| !model.materials.thumbnails.is_empty());
+    studio.act(Act::NextMaterial);
+    studio.wait("the material", |model| model.materials.shown.is_some());
+    studio.act(Act::PanelMaterial);
+    picture(&mut studio, "object_materials");
+    studio.act(Act::PanelMaterialMap);
+    let map = picture(&mut studio, "object_map");
+    let rect = studio.control("Map of the materials").rect();
+    let colours: std::collections::HashSet<_> = part(&map, rect, 1.0).into_iter().collect();
+    assert!(colours.len() > 500, "{} colours on the map", colours.len());
+    for (theme, word) in THEMES {
+        studio.model().preferences.theme = theme;
+        picture(&mut studio, &format!("object_{word}"));
+    }
+    // No tab reaches out of the window.
+    for (_, title, act) in Panel::OBJECT {
+        studio.act(act);
+        let rect = studio.controls(title).last().unwrap().rect();
+        assert!(rect.right() <= size[0] && rect.bottom() <= size[1], "{title} at {rect:?}");
+    }
 }

@@ -77,6 +77,7 @@ impl Drop for TestStudio {
         let model = &mut self.harness.state_mut().model;
         model.tasks.stop_all();
         model.fit.stop_and_wait();
+        model.object.stop_and_wait();
     }
 }
 
@@ -208,7 +209,8 @@ impl TestStudio {
                 return;
             }
             // Where nothing works any more, nothing will come either.
-            let is_at_rest = !model.fit.status.is_live() && !model.tasks.is_busy();
+            let is_at_work = model.fit.status.is_live() || model.object.status.is_live();
+            let is_at_rest = !is_at_work && !model.tasks.is_busy();
             let patience = if is_at_rest { PATIENCE_AT_REST } else { PATIENCE };
             assert!(began.elapsed() < patience, "{what} did not come; {:?}, {}", model.fit.status, self.log());
             std::thread::sleep(Duration::from_millis(5));

@@ -1,7 +1,7 @@
 //! Whether an act can be done now, and why not.
 
-use super::Act;
-use crate::studio::model::{FitStatus, Model};
+use super::{Act, Group};
+use crate::studio::model::{FitStatus, Model, Workspace};
 
 /// `Ok` when the act can be done; otherwise why not, as a short sentence without a full stop.
 pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
@@ -10,6 +10,9 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
     let has_views = project.is_some_and(|project| project.view_count() > 0);
     let has_maps = project.is_some_and(|project| project.maps.is_some());
     let status = &model.fit.status;
+    if model.workspace == Workspace::Object && is_of_scenes(act) {
+        return Err("this is for scenes: go to scene mode first");
+    }
     match act {
         Act::OpenFolder
         | Act::OpenDemo
@@ -26,7 +29,40 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
         | Act::ResetDisplay
         | Act::NextCurve
         | Act::FalseColour
-        | Act::Stripes => Ok(()),
+        | Act::Stripes
+        | Act::OpenPhoto
+        | Act::PanelObject
+        | Act::PanelObjectPicture
+        | Act::PanelReflectance
+        | Act::PanelObjectLight
+        | Act::PanelRelit
+        | Act::PanelObjective
+        | Act::PanelStarts
+        | Act::PanelMaterials
+        | Act::PanelMaterialMap
+        | Act::PanelMaterial => Ok(()),
+        Act::SceneWorkspace => need(model.workspace == Workspace::Object, "this is scene mode"),
+        Act::ObjectWorkspace => need(model.workspace == Workspace::Scene, "this is object mode"),
+        Act::ObjectStart => {
+            need(!model.object.status.is_live(), "an estimation is in progress")?;
+            need(!model.edits.object.photos.is_empty(), "add a photo of an object first")?;
+            let outcome = model.object.outcome.as_ref();
+            need(outcome.is_none_or(|own| own.folder.is_some()), "the last result is not on disk yet: save it first")
+        }
+        Act::ObjectStop => need(model.object.status.is_live(), "no estimation is in progress"),
+        Act::ObjectRelight | Act::ObjectSave => need(model.object.outcome.is_some(), "nothing was estimated yet"),
+        Act::ObjectReport => {
+            let folder = model.object.outcome.as_ref().and_then(|own| own.folder.as_ref());
+            need(folder.is_some(), "the report is written when an estimation is done")
+        }
+        Act::NextMaterial | Act::PreviousMaterial => {
+            need(model.materials.library.is_some(), "show the materials first")
+        }
+        Act::ExposureAuto if model.workspace == Workspace::Object => {
+            need(!model.object.photos.is_empty(), "no photo was read yet")
+        }
+        Act::ResetLayout if model.workspace == Workspace::Object => Ok(()),
+        Act::PanelMessages if model.workspace == Workspace::Object => Ok(()),
         Act::Undo => need(model.history.can_undo(&model.edits), "nothing was changed"),
         Act::Redo => need(model.history.can_redo(&model.edits), "nothing was taken back"),
         Act::Start => {
@@ -72,4 +108,12 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
         }
         _ => need(project.is_some(), "open a scene first"),
     }
+}
+
+/// Whether an act means nothing in object mode, so that its key there is not pressed in vain.
+fn is_of_scenes(act: Act) -> bool {
+    let group = act.info().group;
+    let in_group = matches!(group, Group::Fit | Group::View) || group == Group::Light && act != Act::AddLight;
+    let further = [Act::SavePicture, Act::SaveTurntable, Act::SaveLightStrip, Act::OpenReport, Act::HideInterface];
+    in_group || further.contains(&act)
 }

@@ -16,7 +16,8 @@ pub fn pressed(context: &Context) -> Vec<Act> {
     let mut acts = Vec::new();
     context.input_mut(|input| {
         for (shortcut, act) in shortcuts {
-            let belongs_to_text = typing && (!shortcut.modifiers.command || matches!(act, Act::Undo | Act::Redo));
+            let is_of_text = matches!(act, Act::Undo | Act::Redo | Act::NextMaterial | Act::PreviousMaterial);
+            let belongs_to_text = typing && (!shortcut.modifiers.command || is_of_text);
             let works_control = shortcut.modifiers.is_none() && CONTROL_KEYS.contains(&shortcut.logical_key);
             let is_free = !(belongs_to_text || on_control && works_control);
             if is_free && input.consume_shortcut(&shortcut) {

@@ -75,6 +75,26 @@ pub enum Act {
     ZoomReset,
     HideInterface,
     ResetLayout,
+    SceneWorkspace,
+    ObjectWorkspace,
+    OpenPhoto,
+    ObjectStart,
+    ObjectStop,
+    ObjectRelight,
+    ObjectSave,
+    ObjectReport,
+    NextMaterial,
+    PreviousMaterial,
+    PanelObject,
+    PanelObjectPicture,
+    PanelReflectance,
+    PanelObjectLight,
+    PanelRelit,
+    PanelObjective,
+    PanelStarts,
+    PanelMaterials,
+    PanelMaterialMap,
+    PanelMaterial,
     PanelFit,
     PanelViews,
     PanelStage,
@@ -103,19 +123,22 @@ pub enum Group {
     Display,
     /// Light to look at the materials in.
     Light,
+    /// Object mode.
+    Object,
     /// Panels, themes, help.
     Window,
 }
 
 impl Group {
     /// All menus in order, with their titles.
-    pub const ALL: [(Group, &str); 7] = [
+    pub const ALL: [(Group, &str); 8] = [
         (Group::File, "File"),
         (Group::Edit, "Edit"),
         (Group::Fit, "Fit"),
         (Group::View, "View"),
         (Group::Display, "Display"),
         (Group::Light, "Light"),
+        (Group::Object, "Object"),
         (Group::Window, "Window"),
     ];
 }
@@ -218,6 +241,27 @@ pub const LIST: &[ActInfo] = &[
     info(Act::AddLight, Group::Light, "Add light…", "Puts an HDR map on the shelf.", with(CTRL, Key::L)),
     info(Act::LightStrip, Group::Light, "Strip of lights", "Shows the stage's view, path traced, under every light of the shelf.", key(Key::Y)),
     info(Act::LightBackground, Group::Light, "Light as background", "Shows the light behind the surface.", key(Key::H)),
+
+    info(Act::ObjectWorkspace, Group::Object, "Object mode", "Light and measured reflectance from photos of one object.", key(Key::F3)),
+    info(Act::SceneWorkspace, Group::Object, "Scene mode", "Maps and light from photos of a place.", key(Key::F2)),
+    info(Act::OpenPhoto, Group::Object, "Add photo of an object…", "Adds a photo of one object to those that light and reflectance are estimated from.", with(CTRL_SHIFT, Key::O)),
+    info(Act::ObjectStart, Group::Object, "Estimate light and reflectance", "Estimates what lit the object and what it is made of.", with(CTRL, Key::E)),
+    info(Act::ObjectStop, Group::Object, "Stop estimation", "Ends the estimation within a step; what was reached is written.", with(CTRL_SHIFT, Key::E)),
+    info(Act::ObjectRelight, Group::Object, "Relight the object", "Shows object and sphere under every light of the shelf.", None),
+    info(Act::ObjectSave, Group::Object, "Save result to…", "Writes the result once more, to another folder.", None),
+    info(Act::ObjectReport, Group::Object, "Show the object's report", "Opens the report of the estimation in the browser.", None),
+    info(Act::NextMaterial, Group::Object, "Next material", "Shows the next material of the library.", with(CTRL, Key::ArrowRight)),
+    info(Act::PreviousMaterial, Group::Object, "Previous material", "Shows the material before.", with(CTRL, Key::ArrowLeft)),
+    info(Act::PanelObject, Group::Object, "Panel: object", "Shows what is estimated, and from what.", None),
+    info(Act::PanelObjectPicture, Group::Object, "Panel: re-render", "Shows the photo of the object beside its re-render.", None),
+    info(Act::PanelReflectance, Group::Object, "Panel: reflectance", "Shows lobes and sphere of the estimated reflectance.", None),
+    info(Act::PanelObjectLight, Group::Object, "Panel: estimated light", "Shows the light that was estimated from the object.", None),
+    info(Act::PanelRelit, Group::Object, "Panel: relit", "Shows the object under the lights of the shelf.", None),
+    info(Act::PanelObjective, Group::Object, "Panel: objective", "Shows the terms of the objective over the steps.", None),
+    info(Act::PanelStarts, Group::Object, "Panel: starts", "Shows which starts explain the photo as well, and what the photo leaves open.", None),
+    info(Act::PanelMaterials, Group::Object, "Panel: materials", "Shows a sphere of every material of the library.", key(Key::F4)),
+    info(Act::PanelMaterialMap, Group::Object, "Panel: map of codes", "Shows the map of the materials' codes.", None),
+    info(Act::PanelMaterial, Group::Object, "Panel: material", "Shows lobes and sphere of the chosen material.", None),
 
     info(Act::Palette, Group::Window, "All acts…", "Finds an act by its name.", with(CTRL, Key::K)),
     info(Act::Help, Group::Window, "Keys and help", "Lists every act and its key.", key(Key::F1)),

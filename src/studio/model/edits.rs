@@ -1,6 +1,7 @@
 //! What undo takes back: settings, lights, display, layer. Where the eye stands is not among them.
 
 use super::lights::LightName;
+use super::object_form::ObjectForm;
 use crate::fit::FitSettings;
 use crate::image::display::DisplaySettings;
 use crate::studio::stage::Layer;
@@ -66,6 +67,8 @@ pub struct Edits {
     pub relight: Relight,
     /// The photo against the stage.
     pub photo: PhotoLook,
+    /// What an estimation from photos of one object is asked for.
+    pub object: ObjectForm,
 }
 
 impl Default for Edits {
@@ -76,6 +79,7 @@ impl Default for Edits {
             layer: Layer::Lit,
             relight: Relight::default(),
             photo: PhotoLook::Off,
+            object: ObjectForm::default(),
         }
     }
 }

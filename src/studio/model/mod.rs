@@ -2,13 +2,20 @@
 //!
 //! [`Model`] joins the parts: [`project`] is what is open, [`fit`] the job, [`edits`] what undo covers, [`lights`] the
 //! shelf, [`tasks`] work beside the window, [`log`] what was noticed, [`store`] what is remembered. [`opening`] and
-//! [`starting`] are how a folder becomes a project and a project a fit, [`viewing`] where the eye stands. Panels read the model and queue acts; they change
+//! [`starting`] are how a folder becomes a project and a project a fit, [`viewing`] where the eye stands, [`dialogs`] what
+//! is asked in windows over the window. In object mode [`object_form`] is what is asked for, [`object`] the estimation,
+//! [`estimating`] how one becomes the other, [`materials`] the library. Panels read the model and queue acts; they change
 //! nothing but [`Edits`] directly.
 
+pub mod dialogs;
 pub mod edits;
+pub mod estimating;
 pub mod fit;
 pub mod lights;
 pub mod log;
+pub mod materials;
+pub mod object;
+pub mod object_form;
 pub mod opening;
 pub mod project;
 pub mod starting;
@@ -16,6 +23,7 @@ pub mod store;
 pub mod tasks;
 pub mod viewing;
 
+pub use dialogs::{Dialog, PickFor, SaveRequest, SaveWhat};
 pub use edits::Edits;
 pub use fit::{FitControl, FitStatus};
 pub use lights::LightName;
@@ -33,6 +41,16 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use store::{Preferences, Store};
 use tasks::{Tasks, Wake};
+
+/// Which half of the studio the window shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Workspace {
+    /// Maps and light from photos of a place.
+    #[default]
+    Scene,
+    /// Light and measured reflectance from photos of one object.
+    Object,
+}
 
 /// What a task brings.
 pub enum Done {
@@ -56,68 +74,14 @@ pub enum Done {
     Strip(Vec<(LightName, Arc<crate::image::RgbImage>)>),
     /// Pictures under other lights were compared with the truth.
     Entangled(Box<crate::job::entanglement::Entanglement>),
-}
-
-/// What a path is picked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PickFor {
-    /// To open a scene or run folder.
-    Open,
-    /// To put a light on the shelf.
-    Light,
-    /// To write new runs into.
-    RunsFolder,
-    /// To save a picture.
-    Save,
-}
-
-/// A window over the window.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub enum Dialog {
-    /// None.
-    #[default]
-    None,
-    /// Finds acts by name.
-    Palette(String),
-    /// Lists acts and keys.
-    Help,
-    /// Asks for the path of a scene, run or light.
-    Path {
-        /// What for.
-        purpose: PickFor,
-        /// What was typed.
-        text: String,
-    },
-    /// Asks how and where to save.
-    Save(SaveRequest),
-}
-
-/// What is saved, and how.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SaveRequest {
-    /// What is saved.
-    pub what: SaveWhat,
-    /// Where to; a file for a picture, a folder for several.
-    pub path: String,
-    /// Width in pixels.
-    pub width: usize,
-    /// Height in pixels.
-    pub height: usize,
-    /// Paths a pixel.
-    pub samples: usize,
-    /// Number of frames of a turntable.
-    pub frames: usize,
-}
-
-/// What can be saved from the stage.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SaveWhat {
-    /// One picture.
-    Picture,
-    /// A round about the scene.
-    Turntable,
-    /// The view under every light of the shelf.
-    Strip,
+    /// The estimated object under the lights of the shelf.
+    ObjectRelit(Vec<object::RelitObject>),
+    /// The result of an estimation was written to a folder.
+    ObjectSaved(PathBuf),
+    /// The library of materials with its thumbnails.
+    MaterialsDrawn(Arc<crate::job::materials::Materials>, Vec<crate::image::RgbImage>),
+    /// The chosen material.
+    MaterialShown(Box<crate::job::materials::MaterialShown>),
 }
 
 /// Switches of the stage that undo does not cover.
@@ -167,6 +131,12 @@ pub struct Cursor {
 
 /// Everything the window knows.
 pub struct Model {
+    /// Which half of the studio is shown.
+    pub workspace: Workspace,
+    /// The estimation of object mode.
+    pub object: object::ObjectControl,
+    /// The library of materials.
+    pub materials: materials::MaterialBrowser,
     /// What is open.
     pub project: Option<Project>,
     /// The fit.
@@ -218,6 +188,9 @@ pub struct Model {
     /// Called before each step of a fit with the number of steps done, on its thread; for `patina bench studio`.
     #[doc(hidden)]
     pub before_step: Option<Arc<dyn Fn(usize) + Send + Sync>>,
+    /// Called after each round of an estimation with its number, on its thread; a seam for tests of faults.
+    #[doc(hidden)]
+    pub after_round: Option<Arc<dyn Fn(usize) + Send + Sync>>,
 }
 
 impl Model {
@@ -233,6 +206,9 @@ impl Model {
         let mut history = History::default();
         history.restart(&edits);
         let mut model = Model {
+            workspace: Workspace::Scene,
+            object: object::ObjectControl::default(),
+            materials: materials::MaterialBrowser::default(),
             project: None,
             fit: FitControl::default(),
             edits,
@@ -258,6 +234,7 @@ impl Model {
             light_was_chosen_for_us: None,
             wake,
             before_step: None,
+            after_round: None,
         };
         for path in model.preferences.lights.clone() {
             model.add_light(path);
@@ -282,6 +259,7 @@ impl Model {
             }
         }
         changed |= self.fit.poll(&mut self.log);
+        changed |= self.poll_object();
         self.take_back_refused();
         self.remember_run();
         changed
@@ -322,44 +300,11 @@ impl Model {
                     project.entanglement = Some(Arc::from(table));
                 }
             }
+            Done::ObjectRelit(relit) => self.object.relit = relit,
+            Done::ObjectSaved(folder) => self.object_was_saved(folder),
+            Done::MaterialsDrawn(library, pictures) => self.materials_were_drawn(library, pictures),
+            Done::MaterialShown(shown) => self.materials.shown = Some(Arc::from(shown)),
         }
-    }
-
-    fn picked(&mut self, purpose: PickFor, path: PathBuf) {
-        match purpose {
-            PickFor::Open => self.open(path),
-            PickFor::Light => self.add_light(path),
-            PickFor::RunsFolder => self.preferences.runs_folder = path,
-            PickFor::Save => {
-                if let Dialog::Save(request) = &mut self.dialog {
-                    request.path = path.display().to_string();
-                }
-            }
-        }
-    }
-
-    /// Reads an HDR map and puts it on the shelf.
-    pub fn add_light(&mut self, path: PathBuf) {
-        self.tasks.spawn(format!("Reading {}", path.display()), move |_| {
-            lights::read(&path).map(|light| Done::LightRead(Box::new(light)))
-        });
-    }
-
-    /// Opens the system's file dialog on a thread of its own.
-    pub fn pick(&mut self, purpose: PickFor) {
-        self.tasks.spawn("Choosing", move |_| {
-            let dialog = rfd::FileDialog::new();
-            let path = match purpose {
-                PickFor::Open => dialog.set_title("Open a scene or run folder").pick_folder(),
-                PickFor::RunsFolder => dialog.set_title("Folder for new runs").pick_folder(),
-                PickFor::Light => dialog
-                    .set_title("Add an HDR map")
-                    .add_filter("HDR maps", &["hdr", "exr", "pfm", "png", "jpg"])
-                    .pick_file(),
-                PickFor::Save => dialog.set_title("Save picture").add_filter("Pictures", &["png", "exr"]).save_file(),
-            };
-            Ok(Done::Picked(purpose, path))
-        });
     }
 
     /// The newest snapshot becomes what the panels show; whether it is another than before.
@@ -405,6 +350,10 @@ impl Model {
 
     /// Words for the window's title.
     pub fn window_title(&self) -> String {
+        if self.workspace == Workspace::Object {
+            let name = self.object.photos.first().map_or(String::new(), |photo| format!(" - {}", photo.name));
+            return format!("{}{name} - Patina", self.object.status.words());
+        }
         let Some(project) = &self.project else { return "Patina".into() };
         match &self.fit.status {
             FitStatus::Running | FitStatus::Pausing | FitStatus::Paused if self.fit.steps_total > 0 => {

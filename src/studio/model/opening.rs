@@ -4,7 +4,7 @@
 use super::lights::{LightName, ShelfLight};
 use super::log::Message;
 use super::project::Atlas;
-use super::{Cursor, Done, Edits, Model, Project, StageSwitches};
+use super::{Cursor, Done, Edits, Model, Project, StageSwitches, Workspace};
 use crate::error::{Finding, Severity};
 use crate::export::RunFolder;
 use crate::image::RgbImage;
@@ -51,13 +51,18 @@ pub struct RunRead {
 }
 
 impl Model {
-    /// Opens a scene or run folder.
+    /// Opens a scene or run folder; a picture is a photo for object mode.
     pub fn open(&mut self, path: PathBuf) {
+        if super::object_form::is_photo(&path) && path.is_file() {
+            self.workspace = Workspace::Object;
+            return self.object_dropped(&path);
+        }
         self.open_with(path, ReadSettings::default());
     }
 
     /// Opens a scene that is to be read in a certain way, or a run folder.
     pub fn open_with(&mut self, path: PathBuf, read: ReadSettings) {
+        self.workspace = Workspace::Scene;
         self.close();
         self.log.dismiss();
         let path = std::path::absolute(&path).unwrap_or(path);
@@ -83,6 +88,7 @@ impl Model {
 
     /// Photographs and opens the built-in scene.
     pub fn open_demo(&mut self) {
+        self.workspace = Workspace::Scene;
         self.close();
         self.tasks.spawn(TITLE, move |context| {
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
@@ -101,8 +107,12 @@ impl Model {
         });
     }
 
-    /// Takes in what was dropped on the window: a picture is a light, anything else a scene or run.
+    /// Takes in what was dropped on the window: a picture is a light, anything else a scene or run. In object mode it is
+    /// what [`Model::object_dropped`] takes it for.
     pub fn dropped(&mut self, path: PathBuf) {
+        if self.workspace == Workspace::Object {
+            return self.object_dropped(&path);
+        }
         let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
         match ending.as_str() {
             "hdr" | "exr" | "pfm" | "png" | "jpg" | "jpeg" => self.add_light(path),
@@ -118,7 +128,7 @@ impl Model {
         self.cursor = None;
         self.shelf.forget_scene();
         self.switches = StageSwitches { traced: self.switches.traced, ..StageSwitches::default() };
-        self.edits = Edits { display: self.edits.display, ..Edits::default() };
+        self.edits = Edits { display: self.edits.display, object: self.edits.object.clone(), ..Edits::default() };
         self.history.restart(&self.edits);
     }
 

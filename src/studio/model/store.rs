@@ -76,6 +76,8 @@ pub struct Preferences {
     pub window_size: [f32; 2],
     /// Arrangement of the panels, as the layout library stores it; empty for the first arrangement.
     pub layout: String,
+    /// The same in object mode.
+    pub object_layout: String,
     /// How often the window follows a running fit.
     pub follow: Follow,
     /// The run that was in progress when this was written; a later start finds it here after a crash.
@@ -106,6 +108,7 @@ impl Default for Preferences {
             display: DisplaySettings::default(),
             window_size: [1440.0, 900.0],
             layout: String::new(),
+            object_layout: String::new(),
             follow: Follow::Live,
             running: None,
         }

@@ -93,6 +93,12 @@ impl Model {
 
     /// Brings the bright end of the chosen photo into range.
     pub fn measure_exposure(&mut self) {
+        if self.workspace == super::Workspace::Object {
+            if let Some(photo) = self.object.photos.get(self.object.chosen_photo) {
+                self.edits.display.exposure_stops = crate::image::histogram::auto_exposure(&photo.radiance);
+            }
+            return;
+        }
         let Some(project) = &self.project else { return };
         if let Some(small) = project.thumbnails.get(project.chosen_view) {
             self.edits.display.exposure_stops = crate::image::histogram::auto_exposure(small.as_ref());

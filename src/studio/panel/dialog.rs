@@ -133,6 +133,8 @@ fn path(ui: &mut Ui, model: &mut Model, purpose: PickFor, text: &mut String) -> 
     ui.set_width(520.0);
     let (title, hint) = match purpose {
         PickFor::Light => ("Add an HDR map to the shelf", "/home/me/lights/garden.hdr"),
+        PickFor::ObjectPhoto => ("Add a photo of an object", "/home/me/photos/ball.exr"),
+        PickFor::ObjectResult => ("Save the result to a folder", "/home/me/results/ball"),
         _ => ("Open a scene or a run", "/home/me/scenes/place"),
     };
     ui.heading(title);
@@ -148,6 +150,7 @@ fn path(ui: &mut Ui, model: &mut Model, purpose: PickFor, text: &mut String) -> 
         if ui.add_enabled(typed, Button::new("Open this")).clicked() || (enter && typed) {
             match purpose {
                 PickFor::Light => model.add_light(text.trim().into()),
+                PickFor::ObjectPhoto | PickFor::ObjectResult => model.picked(purpose, text.trim().into()),
                 _ => model.open(text.trim().into()),
             }
             done = true;

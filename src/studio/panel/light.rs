@@ -32,6 +32,18 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut LightMemory) {
         return empty(ui, "No light yet", "The fitted environment appears with the first steps of the fit");
     };
     let truth = model.shelf.find(&LightName::Truth).map(|light| Arc::clone(&light.environment));
+    draw(ui, model, memory, "Environment", &environment, truth);
+}
+
+/// Draws an environment under a label, beside a truth where one is known.
+pub fn draw(
+    ui: &mut Ui,
+    model: &mut Model,
+    memory: &mut LightMemory,
+    label: &str,
+    environment: &Arc<Environment>,
+    truth: Option<Arc<Environment>>,
+) {
     ui.horizontal_wrapped(|ui| {
         if truth.is_some() {
             ui.checkbox(&mut memory.against_truth, "Against the truth")
@@ -50,7 +62,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut LightMemory) {
             .weak(),
         );
     });
-    let source = Source::from(kept(&mut memory.picture, &environment));
+    let source = Source::from(kept(&mut memory.picture, environment));
     let comparison = truth.filter(|_| memory.against_truth).map(|truth| Comparison {
         other: Source::from(kept(&mut memory.truth, &truth)),
         mode: Compare::Wipe(memory.wipe.unwrap_or(0.5)),
@@ -60,7 +72,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut LightMemory) {
     let width = ui.available_width();
     let height = (width / 2.0).min(ui.available_height() * 0.62).max(60.0);
     ui.allocate_ui(vec2(width, height), |ui| {
-        let response = picture::show(ui, "Environment", &source, &model.edits.display, &mut memory.view, &overlay);
+        let response = picture::show(ui, label, &source, &model.edits.display, &mut memory.view, &overlay);
         memory.wipe = response.wipe.or(memory.wipe);
         if let Some(place) = response.hovered {
             let direction = direction_of_angles(
@@ -73,7 +85,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut LightMemory) {
                 picture::describe(place, response.value, &[("azimuth", azimuth), ("elevation", elevation)]);
         }
     });
-    balls(ui, model, memory, &environment);
+    balls(ui, model, memory, environment);
 }
 
 /// The pixels of a light behind a pointer that stays while the light does.

@@ -1,9 +1,12 @@
-//! The menu bar, drawn from the list of acts.
+//! The menu bar, drawn from the list of acts; at its right, which half of the studio is shown.
 
 use super::act_line;
-use crate::studio::act::{Group, LIST};
-use crate::studio::model::Model;
-use egui::Ui;
+use crate::studio::act::{Act, Group, LIST};
+use crate::studio::model::{Model, Workspace};
+use egui::{Align, Button, Layout, Ui};
+
+/// Room that the switch of workspaces takes, in points.
+const ROOM: f32 = 220.0;
 
 /// Draws the menu bar.
 pub fn show(ui: &mut Ui, model: &mut Model) {
@@ -20,6 +23,21 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
                     }
                 });
             }
+            // In a narrow window the menus come first; the switch is in the menu of object mode too.
+            if ui.available_width() < ROOM {
+                return;
+            }
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                for (act, workspace) in
+                    [(Act::ObjectWorkspace, Workspace::Object), (Act::SceneWorkspace, Workspace::Scene)]
+                {
+                    let is_on = model.workspace == workspace;
+                    let button = ui.add(Button::selectable(is_on, act.name())).on_hover_text(act.info().help);
+                    if button.clicked() && !is_on {
+                        model.act(act);
+                    }
+                }
+            });
         });
     });
 }

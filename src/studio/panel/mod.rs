@@ -12,6 +12,7 @@ pub mod light;
 pub mod maps;
 pub mod menu;
 pub mod messages;
+pub mod object;
 pub mod photo;
 pub mod reading;
 pub mod record;
@@ -53,6 +54,8 @@ pub struct Memory {
     pub record: record::RecordMemory,
     /// The shelf.
     pub relight: relight::RelightMemory,
+    /// The panels of object mode.
+    pub object: object::ObjectMemory,
     /// The first page.
     pub welcome: welcome::WelcomeMemory,
 }
@@ -76,6 +79,7 @@ pub fn show(panel: Panel, ui: &mut Ui, model: &mut Model, memory: &mut Memory) {
             Panel::Curves => curves::show(ui, model, &mut memory.curves),
             Panel::Messages => messages::show(ui, model),
             Panel::Scores => scores::show(ui, model),
+            _ => object::show(panel, ui, model, &mut memory.object),
         }
     });
 }

@@ -2,7 +2,7 @@
 
 use crate::insight::report::number;
 use crate::studio::act::Act;
-use crate::studio::model::{FitStatus, Model};
+use crate::studio::model::{FitStatus, Model, Workspace};
 use crate::studio::theme;
 use egui::{Align, Layout, ProgressBar, RichText, Ui};
 
@@ -28,6 +28,9 @@ fn left(ui: &mut Ui, model: &mut Model) {
             model.log.note(format!("Stopped: {title}"));
         }
         return;
+    }
+    if model.workspace == Workspace::Object {
+        return super::object::toolbar::status(ui, model);
     }
     if model.project.is_none() {
         return;

@@ -129,7 +129,8 @@ fn photo(ui: &mut Ui, model: &mut Model) {
     }
 }
 
-fn display(ui: &mut Ui, model: &mut Model) {
+/// Exposure, tone curve and marks.
+pub(super) fn display(ui: &mut Ui, model: &mut Model) {
     ui.label("Exposure");
     let stops = &mut model.edits.display.exposure_stops;
     ui.add(DragValue::new(stops).speed(0.05).range(-20.0..=20.0).max_decimals(2).suffix(" stops"))

@@ -17,7 +17,7 @@ pub struct WelcomeMemory {
 }
 
 /// What a scene folder may be, with what it must hold.
-const KINDS: [(&str, &str); 4] = [
+const KINDS: [(&str, &str); 5] = [
     (
         "A BlendedMVS scene",
         "cams/ with 00000000_cam.txt …, blended_images/ with the photos, textured_mesh/ or mesh.obj; blended masks if there are any",
@@ -25,6 +25,10 @@ const KINDS: [(&str, &str); 4] = [
     ("An exchange folder", "scene.json with cameras, mesh.obj, views/ with EXR or PNG pictures"),
     ("Your own photos", "scene.toml that names a mesh (OBJ or PLY), a list of photos and their calibrated cameras"),
     ("A run of Patina", "what a fit left behind: maps, light, report, checkpoint; an unfinished one can go on"),
+    (
+        "One photo of an object",
+        "object mode: a sphere, or a mesh with its camera; finds the light and a measured reflectance",
+    ),
 ];
 
 /// Draws the page.
@@ -59,6 +63,17 @@ fn page(ui: &mut Ui, model: &mut Model, memory: &mut WelcomeMemory) {
             model.pick(PickFor::Open);
         }
         ui.label(RichText::new("or drop one here").weak());
+    });
+    ui.add_space(6.0);
+    ui.horizontal(|ui| {
+        let object = Button::new(RichText::new("One photo of an object…").size(16.0)).min_size(vec2(230.0, 40.0));
+        if ui.add(object).on_hover_text(Act::ObjectWorkspace.info().help).clicked() {
+            model.act(Act::ObjectWorkspace);
+        }
+        let materials = Button::new(RichText::new("Library of materials").size(16.0)).min_size(vec2(190.0, 40.0));
+        if ui.add(materials).on_hover_text(Act::PanelMaterials.info().help).clicked() {
+            model.act(Act::PanelMaterials);
+        }
     });
     ui.add_space(8.0);
     ui.horizontal(|ui| {
@@ -168,7 +183,7 @@ pub fn drop_hint(context: &Context) {
     let painter = context.layer_painter(LayerId::new(Order::Foreground, Id::unique("drop hint")));
     let area = context.content_rect();
     painter.rect_filled(area, 0.0, Color32::from_black_alpha(170));
-    let text = "Drop a scene or run folder to open it, an HDR map to put it on the shelf";
+    let text = "Drop a scene or run folder to open it, an HDR map to put it on the shelf; in object mode photos, masks, mesh, camera";
     let font = TextStyle::Heading.resolve(&context.global_style());
     painter.text(area.center(), Align2::CENTER_CENTER, text, font, Color32::WHITE);
 }

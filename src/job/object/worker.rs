@@ -1,0 +1,261 @@
+//! The thread of an estimation, and the one that paints beside it.
+
+use super::look::{MaterialLook, Painter, epsilon_of};
+use super::{ObjectLook, ObjectNews, ObjectOutcome, ObjectParts, ObjectRequest, PhotoSeen, StartFollowed, Teller};
+use crate::error::{Error, ErrorKind, Finding, Result, Severity};
+use crate::image::{Image, file};
+use crate::job::Slot;
+use crate::light::Environment;
+use crate::neural;
+use crate::object::joint::{Estimate, Known, estimate};
+use crate::object::nodes::{NodeGrid, NodeTable};
+use crate::object::picture::log_error_map;
+use crate::object::prior::LogLight;
+use crate::object::progress::{ObjectEvent, ObjectiveRow};
+use crate::object::read::read_views;
+use crate::object::split::{Gauge, SplitSpread};
+use crate::object::starts::{ModelKind, StartedModel};
+use crate::object::{ObjectView, result_folder};
+use crossbeam_channel::{Receiver, bounded};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+/// Pixels of the object in a look, at most.
+const LOOK_PIXELS: usize = 6_000;
+
+/// The state after a round, kept in case it is the last.
+#[derive(Clone)]
+struct Reached {
+    round: usize,
+    light: LogLight,
+    table: NodeTable,
+    parameters: Vec<f64>,
+}
+
+/// The work.
+pub(super) struct Worker {
+    pub request: ObjectRequest,
+    pub teller: Teller,
+    pub looks: Arc<Slot<ObjectLook>>,
+    pub stop: Arc<AtomicBool>,
+    pub after_round: Option<Box<dyn Fn(usize) + Send + Sync>>,
+}
+
+impl Worker {
+    /// Does all of it. An error means that nothing was reached.
+    pub fn run(self) -> Result<()> {
+        let began = Instant::now();
+        let settings = &self.request.settings;
+        settings.validate()?;
+        result_folder::prepare(&self.request.output)?;
+        self.stage("reading photos and shape");
+        let (views, mut findings) = read_views(&self.request.files)?;
+        if views.is_empty() {
+            return Err(Error::new(ErrorKind::Missing, "there is no photo").remedy("name at least one photo"));
+        }
+        self.teller.send(ObjectNews::Read(views.iter().map(seen).collect()));
+        let mut known = Known::default();
+        if let Some(path) = &self.request.light {
+            let (light, mut noticed) = Environment::read(path)?;
+            findings.append(&mut noticed);
+            known.light = Some(light);
+        }
+        let model = self.model()?;
+        self.check_stop()?;
+
+        let reached: Mutex<Option<Reached>> = Mutex::default();
+        let rows: Mutex<Vec<ObjectiveRow>> = Mutex::default();
+        let outcome = self.painted_beside(&views, |paint| {
+            let watch = |event: ObjectEvent| match event {
+                ObjectEvent::Stage(stage) => self.stage(stage),
+                ObjectEvent::Row(row) => {
+                    rows.lock().unwrap_or_else(PoisonError::into_inner).push(row);
+                    self.teller.send(ObjectNews::Row(row));
+                }
+                ObjectEvent::State { light, table, parameters } => {
+                    let mut slot = reached.lock().unwrap_or_else(PoisonError::into_inner);
+                    let round = slot.as_ref().map_or(1, |own| own.round + 1);
+                    let now =
+                        Reached { round, light: light.clone(), table: table.clone(), parameters: parameters.to_vec() };
+                    paint(now.clone());
+                    *slot = Some(now);
+                    drop(slot);
+                    if let Some(after_round) = &self.after_round {
+                        after_round(round);
+                    }
+                }
+            };
+            let work = || estimate(&views, &model, &known, settings, &self.stop, &watch);
+            std::panic::catch_unwind(std::panic::AssertUnwindSafe(work))
+                .unwrap_or_else(|panic| Err(super::panicked(&*panic)))
+        });
+        let rows = rows.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let reached = reached.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let (mut found, is_whole) = match (outcome, reached) {
+            (Ok(found), _) => (found, true),
+            (Err(error), None) => return Err(error),
+            (Err(error), Some(reached)) => {
+                if error.kind() != ErrorKind::Stopped {
+                    self.teller.send(ObjectNews::Trouble(error));
+                }
+                (self.partial(reached, rows, began.elapsed().as_secs_f64()), false)
+            }
+        };
+        found.findings.splice(0..0, findings);
+        for finding in &found.findings {
+            self.teller.send(ObjectNews::Finding(finding.clone()));
+        }
+        let parts = Arc::new(ObjectParts::new(views, model, found, settings.clone()));
+        let outcome = Box::new(self.finish(parts));
+        self.teller.send(match is_whole {
+            true => ObjectNews::Finished(outcome),
+            false => ObjectNews::Ended(Some(outcome)),
+        });
+        Ok(())
+    }
+
+    fn stage(&self, stage: &str) {
+        self.teller.send(ObjectNews::Stage(stage.into()));
+    }
+
+    fn check_stop(&self) -> Result<()> {
+        match self.stop.load(Ordering::Relaxed) {
+            true => Err(Error::new(ErrorKind::Stopped, "the estimation was stopped")),
+            false => Ok(()),
+        }
+    }
+
+    /// The model; the neural one with the weights that come with the program.
+    fn model(&self) -> Result<StartedModel> {
+        let (request, settings) = (&self.request, &self.request.settings);
+        match request.model {
+            ModelKind::Ibrdf => {
+                let trained = Arc::new(neural::shipped()?);
+                Ok(StartedModel::neural(trained, request.lobes.clamp(1, 3), settings.code_weight, &[]))
+            }
+            kind => StartedModel::of(kind, None, request.lobes, settings),
+        }
+    }
+
+    /// Runs the estimation with a function that paints a state on a thread beside it, the newest one only.
+    fn painted_beside(
+        &self,
+        views: &[ObjectView],
+        work: impl FnOnce(&(dyn Fn(Reached) + Sync)) -> Result<Estimate>,
+    ) -> Result<Estimate> {
+        let newest: Mutex<Option<Reached>> = Mutex::default();
+        let (bell, rings) = bounded::<()>(1);
+        let view = &views[0];
+        std::thread::scope(|scope| {
+            let painting = || {
+                // This thread gives way as the one it comes from does, and so do its own: less would starve it.
+                let pool = rayon::ThreadPoolBuilder::new().thread_name(|index| format!("patina-look-{index}")).build();
+                match pool {
+                    Ok(pool) => pool.install(|| self.paint_all(view, &newest, &rings)),
+                    Err(_) => self.paint_all(view, &newest, &rings),
+                }
+            };
+            let painter = std::thread::Builder::new().name("patina-look".into()).spawn_scoped(scope, painting);
+            let found = work(&|reached| {
+                *newest.lock().unwrap_or_else(PoisonError::into_inner) = Some(reached);
+                // A bell that rings already is enough.
+                let _ = bell.try_send(());
+            });
+            drop(bell);
+            if let Ok(painter) = painter {
+                // Without its pictures an estimation is as good: a panic of the painter is a message.
+                if let Err(panic) = painter.join() {
+                    self.teller.send(ObjectNews::Trouble(super::panicked(&*panic)));
+                }
+            }
+            found
+        })
+    }
+
+    fn paint_all(&self, view: &ObjectView, newest: &Mutex<Option<Reached>>, rings: &Receiver<()>) {
+        let settings = &self.request.settings;
+        let mut painter = None;
+        while rings.recv().is_ok() {
+            let Some(reached) = newest.lock().unwrap_or_else(PoisonError::into_inner).take() else { continue };
+            let painter = painter.get_or_insert_with(|| {
+                Painter::new(view, NodeGrid::new(settings.nodes), settings.shadows, LOOK_PIXELS)
+            });
+            self.looks.put(painter.paint(reached.round, reached.light.environment(), &reached.table));
+            self.teller.wake();
+        }
+    }
+
+    /// What was reached before the end.
+    fn partial(&self, reached: Reached, rows: Vec<ObjectiveRow>, seconds: f64) -> Estimate {
+        let rounds = reached.round;
+        let message = format!("the estimation ended after {rounds} rounds: this is what it had reached");
+        let look = self.looks.newest();
+        Estimate {
+            parameters: reached.parameters,
+            table: reached.table,
+            light: reached.light,
+            start: "not followed to the end".into(),
+            candidates: Vec::new(),
+            rows,
+            picture_log_rmse: look.map_or(0.0, |(_, look)| look.log_rmse),
+            findings: vec![
+                Finding::new(Severity::Warning, "object-ended-early", message)
+                    .remedy("start again for a result that has converged"),
+            ],
+            seconds,
+        }
+    }
+
+    /// Renders and writes; what cannot be written is told, and kept.
+    fn finish(&self, parts: Arc<ObjectParts>) -> ObjectOutcome {
+        self.stage("rendering and writing the result");
+        let request = &self.request;
+        let grid = NodeGrid::new(request.settings.nodes);
+        let written = parts.write(&request.output, &request.relights);
+        let mut rerenders = Vec::new();
+        let mut log_errors = Vec::new();
+        for (index, view) in parts.views.iter().enumerate() {
+            if let Ok(picture) = file::read_rgb(&request.output.join(format!("rerender_{index}.exr")))
+                && written.is_ok()
+            {
+                let epsilon = epsilon_of(&view.geometry, &view.photo.radiance);
+                log_errors.push(Arc::new(log_error_map(&view.geometry, &picture, &view.photo.radiance, epsilon)));
+                rerenders.push(Arc::new(picture));
+            }
+        }
+        let folder = match written {
+            Ok(()) => Some(request.output.clone()),
+            Err(error) => {
+                self.teller.send(ObjectNews::Trouble(error.remedy("save the result to another folder")));
+                None
+            }
+        };
+        let found = &parts.estimate;
+        let spread = SplitSpread::of(&found.candidates);
+        let best = found.candidates.first().map_or(0.0, |best| best.evidence);
+        let starts = found.candidates.iter().map(|candidate| StartFollowed {
+            name: candidate.name.clone(),
+            objective: candidate.total(),
+            nats_behind: candidate.evidence - best,
+            is_as_good: spread.starts.contains(&candidate.name),
+        });
+        let starts = starts.collect();
+        let material = Arc::new(MaterialLook::of(&parts.reflectance(), None));
+        let light = Arc::new(found.light.environment());
+        let gauge = Gauge::of(&found.light, &grid, &found.table);
+        ObjectOutcome { folder, rerenders, log_errors, starts, material, light, gauge, spread, parts }
+    }
+}
+
+fn seen(view: &ObjectView) -> PhotoSeen {
+    let mut is_object = Image::filled(view.geometry.width, view.geometry.height, false);
+    for pixel in &view.geometry.pixels {
+        is_object[(pixel.row as usize, pixel.column as usize)] = true;
+    }
+    PhotoSeen {
+        name: view.photo.name.clone(),
+        radiance: Arc::new(view.photo.radiance.clone()),
+        is_object: Arc::new(is_object),
+    }
+}

@@ -1,0 +1,135 @@
+//! Windows over the window: which there are, and what becomes of a path that is typed or picked in one.
+
+use super::{Done, Model, lights};
+use std::path::PathBuf;
+
+/// What a path is picked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PickFor {
+    /// To open a scene or run folder.
+    Open,
+    /// To put a light on the shelf.
+    Light,
+    /// To write new runs into.
+    RunsFolder,
+    /// To save a picture.
+    Save,
+    /// A photo of an object.
+    ObjectPhoto,
+    /// A mask of such a photo.
+    ObjectMask,
+    /// The mesh of the object.
+    ObjectMesh,
+    /// A camera of such a photo.
+    ObjectCamera,
+    /// The light of the object, where it is known.
+    ObjectLight,
+    /// A folder for the result of an estimation.
+    ObjectResult,
+}
+
+/// Endings of pictures that are read.
+const PHOTOS: &[&str] = &["exr", "hdr", "pfm", "png", "jpg", "jpeg"];
+
+/// A window over the window.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Dialog {
+    /// None.
+    #[default]
+    None,
+    /// Finds acts by name.
+    Palette(String),
+    /// Lists acts and keys.
+    Help,
+    /// Asks for the path of a scene, run or light.
+    Path {
+        /// What for.
+        purpose: PickFor,
+        /// What was typed.
+        text: String,
+    },
+    /// Asks how and where to save.
+    Save(SaveRequest),
+}
+
+/// What is saved, and how.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SaveRequest {
+    /// What is saved.
+    pub what: SaveWhat,
+    /// Where to; a file for a picture, a folder for several.
+    pub path: String,
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// Paths a pixel.
+    pub samples: usize,
+    /// Number of frames of a turntable.
+    pub frames: usize,
+}
+
+/// What can be saved from the stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SaveWhat {
+    /// One picture.
+    Picture,
+    /// A round about the scene.
+    Turntable,
+    /// The view under every light of the shelf.
+    Strip,
+}
+
+impl Model {
+    /// Takes in a path that was chosen or typed.
+    pub fn picked(&mut self, purpose: PickFor, path: PathBuf) {
+        match purpose {
+            PickFor::Open => self.open(path),
+            PickFor::Light => self.add_light(path),
+            PickFor::RunsFolder => self.preferences.runs_folder = path,
+            PickFor::ObjectPhoto => self.edits.object.photos.push(path),
+            PickFor::ObjectMask => self.edits.object.masks.push(path),
+            PickFor::ObjectCamera => self.edits.object.cameras.push(path),
+            PickFor::ObjectMesh => self.edits.object.mesh = path.display().to_string(),
+            PickFor::ObjectLight => self.edits.object.light = path.display().to_string(),
+            PickFor::ObjectResult => self.save_object(path),
+            PickFor::Save => {
+                if let Dialog::Save(request) = &mut self.dialog {
+                    request.path = path.display().to_string();
+                }
+            }
+        }
+    }
+
+    /// Reads an HDR map and puts it on the shelf.
+    pub fn add_light(&mut self, path: PathBuf) {
+        self.tasks.spawn(format!("Reading {}", path.display()), move |_| {
+            lights::read(&path).map(|light| Done::LightRead(Box::new(light)))
+        });
+    }
+
+    /// Opens the system's file dialog on a thread of its own.
+    pub fn pick(&mut self, purpose: PickFor) {
+        self.tasks.spawn("Choosing", move |_| {
+            let dialog = rfd::FileDialog::new();
+            let path = match purpose {
+                PickFor::Open => dialog.set_title("Open a scene or run folder").pick_folder(),
+                PickFor::RunsFolder => dialog.set_title("Folder for new runs").pick_folder(),
+                PickFor::Light => dialog
+                    .set_title("Add an HDR map")
+                    .add_filter("HDR maps", &["hdr", "exr", "pfm", "png", "jpg"])
+                    .pick_file(),
+                PickFor::Save => dialog.set_title("Save picture").add_filter("Pictures", &["png", "exr"]).save_file(),
+                PickFor::ObjectPhoto => {
+                    dialog.set_title("Photo of the object").add_filter("Photos", PHOTOS).pick_file()
+                }
+                PickFor::ObjectMask => dialog.set_title("Mask of the photo").add_filter("Masks", PHOTOS).pick_file(),
+                PickFor::ObjectMesh => dialog.set_title("Mesh").add_filter("Meshes", &["obj", "ply"]).pick_file(),
+                PickFor::ObjectCamera => dialog.set_title("Camera").add_filter("Cameras", &["json", "txt"]).pick_file(),
+                PickFor::ObjectLight => dialog.set_title("Known light").add_filter("HDR maps", PHOTOS).pick_file(),
+                PickFor::ObjectResult => dialog.set_title("Folder for the result").pick_folder(),
+            };
+            Ok(Done::Picked(purpose, path))
+        });
+    }
+}

@@ -1,0 +1,151 @@
+//! From what is asked to a job, from its result to relit pictures, and from a dropped file to what is asked.
+
+use super::lights::LightName;
+use super::object::RelitObject;
+use super::object_form::is_photo;
+use super::{Done, Model, store};
+use crate::job::object::{self, ObjectJobOptions, ObjectOutcome, ObjectRequest};
+use crate::light::Environment;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Title of the task that shows the object under the lights of the shelf.
+pub const RELIGHT_TITLE: &str = "Relighting the object";
+/// Lights that are written into a result folder, at most.
+const MOST_RELIGHTS: usize = 8;
+
+impl Model {
+    /// Starts an estimation of what is asked for.
+    pub fn start_object(&mut self) {
+        let form = &self.edits.object;
+        let files = match form.files() {
+            Ok(files) => files,
+            Err(error) => return self.log.error(&error),
+        };
+        let stem = files.photos.first().and_then(|photo| photo.file_stem()).unwrap_or_default().to_string_lossy();
+        let output = store::new_run_folder(&self.runs_folder(), &format!("object {stem}"));
+        let settings = form.settings();
+        let light = form.light.trim();
+        let request = ObjectRequest {
+            files,
+            light: (!light.is_empty()).then(|| light.into()),
+            model: form.model,
+            lobes: form.lobes,
+            relights: self.named_lights(),
+            output,
+            settings: settings.clone(),
+        };
+        let options = ObjectJobOptions {
+            wake: Some(Arc::clone(&self.wake)),
+            after_round: self.after_round.clone().map(|own| Box::new(move |round| own(round)) as _),
+        };
+        match object::start(request, options) {
+            Ok(job) => {
+                self.tasks.stop(RELIGHT_TITLE);
+                self.log.dismiss();
+                self.object.begin(job, settings.outer_loops);
+            }
+            Err(error) => self.log.error(&error),
+        }
+    }
+
+    /// Lights of the shelf that are none of a scene's, with names that suit files.
+    fn named_lights(&self) -> Vec<(String, Arc<Environment>)> {
+        let own = self.shelf.lights().iter().filter(|light| is_free(&light.name));
+        let safe = |name: String| name.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
+        own.take(MOST_RELIGHTS).map(|light| (safe(light.name.label()), Arc::clone(&light.environment))).collect()
+    }
+
+    /// Takes in what the estimation told; a new result is shown under the lights of the shelf.
+    pub(super) fn poll_object(&mut self) -> bool {
+        let (changed, came) = self.object.poll(&mut self.log);
+        if came {
+            self.relight_object();
+        }
+        changed
+    }
+
+    /// Shows object and sphere under every light of the shelf, each brought to the brightness of the estimated one.
+    pub fn relight_object(&mut self) {
+        let Some(outcome) = self.object.outcome.clone() else { return };
+        let lights: Vec<(LightName, Arc<Environment>)> = self
+            .shelf
+            .lights()
+            .iter()
+            .filter(|light| is_free(&light.name))
+            .map(|light| (light.name.clone(), Arc::clone(&light.environment)))
+            .collect();
+        self.tasks.stop(RELIGHT_TITLE);
+        self.tasks.spawn(RELIGHT_TITLE, move |context| {
+            let maps: Vec<&Environment> = lights.iter().map(|(_, light)| light.as_ref()).collect();
+            context.tell("the object", 0.0);
+            let pictures = outcome.parts.relit(&maps);
+            let mut relit = Vec::new();
+            for (index, ((name, light), picture)) in lights.iter().zip(pictures).enumerate() {
+                context.check()?;
+                context.tell("spheres", index as f32 / lights.len() as f32);
+                let sphere = object::look::sphere_of(&outcome.parts.reflectance(), 96, Some(light));
+                let factor = crate::image::histogram::auto_exposure(&picture).exp2();
+                relit.push(RelitObject {
+                    name: name.clone(),
+                    object: Arc::new(picture.map(|rgb| *rgb * factor)),
+                    sphere: Arc::new(sphere),
+                });
+            }
+            Ok(Done::ObjectRelit(relit))
+        });
+    }
+
+    /// Writes the result once more, to a folder of a person's choice.
+    pub fn save_object(&mut self, folder: PathBuf) {
+        let Some(outcome) = self.object.outcome.clone() else { return };
+        let relights = self.named_lights();
+        self.tasks.spawn("Saving the result", move |_| {
+            outcome.parts.write(&folder, &relights)?;
+            Ok(Done::ObjectSaved(folder))
+        });
+    }
+
+    pub(super) fn object_was_saved(&mut self, folder: PathBuf) {
+        self.log.note(format!("Saved {}", folder.display()));
+        if let Some(outcome) = &mut self.object.outcome
+            && outcome.folder.is_none()
+        {
+            *outcome = Arc::new(ObjectOutcome { folder: Some(folder), ..(**outcome).clone() });
+        }
+    }
+
+    /// Takes in a file that was dropped on object mode, by its ending and its name.
+    pub fn object_dropped(&mut self, path: &Path) {
+        let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
+        let form = &mut self.edits.object;
+        let what = match ending.as_str() {
+            "obj" | "ply" => {
+                (form.mesh, form.is_sphere) = (path.display().to_string(), false);
+                "the mesh"
+            }
+            "json" | "txt" => {
+                form.cameras.push(path.into());
+                form.is_sphere = false;
+                "a camera file"
+            }
+            "hdr" => return self.add_light(path.into()),
+            _ if is_photo(path) && name.contains("mask") => {
+                form.masks.push(path.into());
+                "a mask"
+            }
+            _ if is_photo(path) => {
+                form.photos.push(path.into());
+                "a photo of the object"
+            }
+            _ => return self.open(path.into()),
+        };
+        self.log.note(format!("{} is {what}", path.display()));
+    }
+}
+
+/// Whether a light is none of a scene's: built in, or of a file.
+pub fn is_free(name: &LightName) -> bool {
+    matches!(name, LightName::Sky(_) | LightName::File(_))
+}

@@ -1,0 +1,65 @@
+//! Which starts explain the photo as well, what it leaves open, and what was noticed.
+
+use crate::studio::model::Model;
+use crate::studio::model::log::Message;
+use crate::studio::panel::{empty, heading, messages};
+use crate::studio::theme;
+use egui::{Grid, RichText, ScrollArea, Ui};
+
+/// Draws the panel.
+pub fn show(ui: &mut Ui, model: &mut Model) {
+    let findings: Vec<Message> = model.object.findings.iter().map(Message::from).collect();
+    let Some(outcome) = model.object.outcome.clone() else {
+        return empty(
+            ui,
+            "No result yet",
+            "Here it says which starts explain the photo as well, and what it leaves open",
+        );
+    };
+    let colours = theme::palette(ui.visuals());
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        let (spread, gauge) = (&outcome.spread, &outcome.gauge);
+        heading(ui, "What the photo leaves open");
+        ui.label(match spread.starts.len() {
+            0 => "The starts were not followed to the end".into(),
+            1 => "One start alone explains the photo; the others are at least 12 nats behind".into(),
+            count => format!(
+                "{count} starts explain the photo about as well: they differ by {:.2} in the logarithm of the light and \
+                 by {:.2} in that of the reflectance",
+                spread.light, spread.reflectance
+            ),
+        });
+        let [red, green, blue] = gauge.largest_factor;
+        ui.label(RichText::new(format!(
+            "No photo tells the level: reflectance may be multiplied by up to {red:.1} (red), {green:.1} (green), \
+             {blue:.1} (blue), and the light divided by it"
+        )).weak());
+        if !outcome.starts.is_empty() {
+            heading(ui, "Starts that were followed");
+            Grid::new("starts").striped(true).num_columns(4).spacing([18.0, 4.0]).show(ui, |ui| {
+                for title in ["Start", "Nats behind", "Objective", ""] {
+                    ui.label(RichText::new(title).weak());
+                }
+                ui.end_row();
+                for start in &outcome.starts {
+                    ui.label(&start.name);
+                    ui.label(format!("{:.1}", start.nats_behind))
+                        .on_hover_text("Difference of the logarithm of the evidence to the best: likelihood under any light");
+                    ui.label(format!("{:.4}", start.objective)).on_hover_text("At low resolution");
+                    ui.label(match start.is_as_good {
+                        true => RichText::new("as good").color(colours.good),
+                        false => RichText::new(""),
+                    });
+                    ui.end_row();
+                }
+            });
+        }
+        heading(ui, "Noticed");
+        if findings.is_empty() {
+            ui.label(RichText::new("Nothing").weak());
+        }
+        for (index, message) in findings.iter().enumerate() {
+            ui.push_id(index, |ui| messages::line(ui, model, message));
+        }
+    });
+}
