@@ -227,7 +227,9 @@ impl Worker {
         let folder = match written {
             Ok(()) => Some(request.output.clone()),
             Err(error) => {
-                self.teller.send(ObjectNews::Trouble(error.remedy("save the result to another folder")));
+                let message = format!("the result could not be written: {}", error.message());
+                let told = Error::new(error.kind(), message).at(error.place().clone());
+                self.teller.send(ObjectNews::Trouble(told.remedy("it is kept in memory: save it to another folder")));
                 None
             }
         };

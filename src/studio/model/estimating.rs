@@ -141,7 +141,7 @@ impl Model {
             }
             _ => return self.open(path.into()),
         };
-        self.log.note(format!("{} is {what}", path.display()));
+        self.log.note(format!("Taken as {what}: {}", path.display()));
     }
 }
 

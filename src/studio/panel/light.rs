@@ -2,6 +2,7 @@
 
 use super::empty;
 use crate::image::RgbImage;
+use crate::image::display::DisplaySettings;
 use crate::light::Environment;
 use crate::light::ball::{matte_ball, mirror_ball};
 use crate::math::sphere::direction_of_angles;
@@ -32,10 +33,11 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut LightMemory) {
         return empty(ui, "No light yet", "The fitted environment appears with the first steps of the fit");
     };
     let truth = model.shelf.find(&LightName::Truth).map(|light| Arc::clone(&light.environment));
-    draw(ui, model, memory, "Environment", &environment, truth);
+    let display = model.edits.display;
+    draw(ui, model, memory, "Environment", &environment, truth, &display);
 }
 
-/// Draws an environment under a label, beside a truth where one is known.
+/// Draws an environment under a label in a display of its own, beside a truth where one is known.
 pub fn draw(
     ui: &mut Ui,
     model: &mut Model,
@@ -43,6 +45,7 @@ pub fn draw(
     label: &str,
     environment: &Arc<Environment>,
     truth: Option<Arc<Environment>>,
+    display: &DisplaySettings,
 ) {
     ui.horizontal_wrapped(|ui| {
         if truth.is_some() {
@@ -72,7 +75,7 @@ pub fn draw(
     let width = ui.available_width();
     let height = (width / 2.0).min(ui.available_height() * 0.62).max(60.0);
     ui.allocate_ui(vec2(width, height), |ui| {
-        let response = picture::show(ui, label, &source, &model.edits.display, &mut memory.view, &overlay);
+        let response = picture::show(ui, label, &source, display, &mut memory.view, &overlay);
         memory.wipe = response.wipe.or(memory.wipe);
         if let Some(place) = response.hovered {
             let direction = direction_of_angles(
@@ -85,7 +88,7 @@ pub fn draw(
                 picture::describe(place, response.value, &[("azimuth", azimuth), ("elevation", elevation)]);
         }
     });
-    balls(ui, model, memory, environment);
+    balls(ui, display, memory, environment);
 }
 
 /// The pixels of a light behind a pointer that stays while the light does.
@@ -100,7 +103,7 @@ fn kept(slot: &mut Option<(Arc<Environment>, Arc<RgbImage>)>, environment: &Arc<
     picture
 }
 
-fn balls(ui: &mut Ui, model: &Model, memory: &mut LightMemory, environment: &Arc<Environment>) {
+fn balls(ui: &mut Ui, display: &DisplaySettings, memory: &mut LightMemory, environment: &Arc<Environment>) {
     if memory.balls.as_ref().is_none_or(|(own, _)| !Arc::ptr_eq(own, environment)) {
         let pose = glam::Quat::IDENTITY;
         let mirror = Arc::new(mirror_ball(environment, BALL_SIDE, pose));
@@ -120,7 +123,7 @@ fn balls(ui: &mut Ui, model: &Model, memory: &mut LightMemory, environment: &Arc
                     ui.allocate_ui(vec2(side, side), |ui| {
                         let source = Source::from(Arc::clone(picture));
                         let overlay = Overlay { without_numbers: true, ..Overlay::default() };
-                        picture::show(ui, name, &source, &model.edits.display, view, &overlay);
+                        picture::show(ui, name, &source, display, view, &overlay);
                     });
                     ui.label(RichText::new(label).small().weak());
                 });

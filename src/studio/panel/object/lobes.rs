@@ -5,7 +5,7 @@ use crate::job::object::MaterialLook;
 use crate::studio::picture::{self, Overlay, PictureView, Source};
 use crate::studio::theme;
 use egui::{Ui, vec2};
-use egui_plot::{GridMark, HoverPosition, Line, Plot, PlotPoints};
+use egui_plot::{GridMark, HoverPosition, Line, Plot, PlotPoints, uniform_grid_spacer};
 use std::sync::Arc;
 
 /// Values below this are not drawn: black has no place on a logarithmic axis.
@@ -55,6 +55,7 @@ fn curves(ui: &mut Ui, name: &str, look: &MaterialLook, behind: Option<&Material
     Plot::new(format!("lobes of the {name}"))
         .set_margin_fraction(vec2(0.02, 0.08))
         .x_axis_label("half angle, degrees")
+        .x_grid_spacer(uniform_grid_spacer(|_| [10.0, 30.0, 90.0]))
         .y_axis_label("reflectance, 1/sr")
         .y_axis_formatter(|mark: GridMark, _: &_| number(10f64.powf(mark.value)))
         .label_formatter(|hover: &HoverPosition<'_>| {

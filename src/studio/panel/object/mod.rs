@@ -26,7 +26,7 @@ pub struct ObjectMemory {
     picture: picture::PictureMemory,
     reflectance: lobes::LobesMemory,
     material: lobes::LobesMemory,
-    light: crate::studio::panel::light::LightMemory,
+    light: light::ObjectLightMemory,
     relit: relit::RelitMemory,
     objective: objective::ObjectiveMemory,
     materials: materials::MaterialsMemory,

@@ -23,6 +23,9 @@ enum Show {
     LogError,
 }
 
+/// The pixels of an object, and those beside it.
+type Hatched = (Arc<Image<bool>>, Arc<Image<bool>>);
+
 /// What the panel keeps.
 #[derive(Default)]
 pub struct PictureMemory {
@@ -31,7 +34,7 @@ pub struct PictureMemory {
     wipe: Option<f32>,
     view: PictureView,
     error_view: PictureView,
-    hatched: Option<(Arc<Image<bool>>, Arc<Image<bool>>)>,
+    hatched: Option<Hatched>,
 }
 
 /// Draws the panel.
