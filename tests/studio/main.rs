@@ -1,6 +1,6 @@
 //! The window as a person uses it, found by labels, without a display.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::disallowed_methods)]
 
 mod acts;
 #[path = "../common/adapter.rs"]
