@@ -303,9 +303,10 @@ mod tests {
                 [a.rmse_linear - exact.rmse_linear, a.psnr_srgb_db - exact.psnr_srgb_db, a.ssim_srgb - exact.ssim_srgb]
             };
             let (without, with) = (off(halves), off(as_it_is));
+            // Encoding bends noise and similarity is a ratio: a part of it stays in both.
             assert!(without[0].abs() < 0.1 * with[0].abs(), "{without:?} {with:?}");
             assert!(
-                without[1].abs() < 0.15 * with[1].abs() && without[2].abs() < 0.15 * with[2].abs(),
+                without[1].abs() < 0.25 * with[1].abs() && without[2].abs() < 0.25 * with[2].abs(),
                 "{without:?} {with:?}"
             );
         }

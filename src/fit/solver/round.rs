@@ -12,11 +12,6 @@ use crate::render::cached::{CachedTransport, PointLight, ShadingPoint, ViewFootp
 /// Widths that are looked at: evenly in the logarithm, closer where lobes are wide.
 pub const WIDTHS: [f32; MOST_NODES] = [0.02, 0.04, 0.075, 0.12, 0.18, 0.26, 0.37, 0.52, 0.73, 1.0];
 
-/// Residual of a block whose pixels are independent evidence of the light, relative to the mean of the photos. The noise
-/// of blocks that fit worse counts by its square. On `saharov_bmvs` (a quarter of the photos' size) held-out views came
-/// from 22.3 to 23.0 dB, aligned; on the exchange scene `toys` nothing changed by more than a hundredth of itself.
-const GOOD_FIT: f64 = 0.04;
-
 /// What all blocks of a round share.
 pub struct Round<'a> {
     /// The cache.
@@ -212,9 +207,6 @@ impl Round<'_> {
     /// units of the block's noise.
     pub fn rows(&self, block: &Block, work: &BlockWork, shape: &LightShape, made: &mut [BlockRows; 3]) {
         let Some(prior) = work.prior else { return };
-        // A block that fits badly is wrong in ways that its pixels share: it says less than so many pixels would.
-        let misfit = prior.noise / (GOOD_FIT * f64::from(self.observations.mean).max(1e-6));
-        let noise = prior.noise * misfit.max(1.0);
         let used: Vec<usize> = (0..work.used.len()).filter(|&index| work.terms[index].weight > 0.02).collect();
         let cells = block.cell_count;
         let unknowns = cells + 3;
@@ -252,7 +244,7 @@ impl Round<'_> {
             }
             let around = self.transport.lobe_surroundings(self.at_points, point);
             let direct = self.interpolate(&self.at_points.direct, observation);
-            let scale = f64::from(term.weight.sqrt()) / noise;
+            let scale = f64::from(term.weight.sqrt()) / prior.noise;
             for (c, rows) in made.iter_mut().enumerate() {
                 let rho = solution.cells[usize::from(term.cell)][c];
                 let specular = solution.specular[c];

@@ -18,13 +18,6 @@ const MOST_BACKGROUND: usize = 20_000;
 /// Mean reflectance that fixes the scale between surface and light: nothing in the photos of a diffuse surface does, see
 /// [`crate::fit::gauge`]. That of the measured start.
 const HELD_REFLECTANCE: f64 = 0.5;
-/// It is held lower where the brightest surface would need more reflectance than this: cut off there, it would be
-/// explained by lobes.
-const MOST_REFLECTANCE: f64 = 0.9;
-/// Which share of the surface is not the brightest.
-const BRIGHT_QUANTILE: f64 = 0.97;
-/// A point that sees less of a constant light than this says nothing of its reflectance.
-const LEAST_SHARE_OF_LIGHT: f32 = 0.05;
 /// Texels along a block's side, and along a cell's, in the rounds that look for the light.
 const ROUND_BLOCK: (usize, usize) = (8, 2);
 /// The same where maps are made.
@@ -168,29 +161,7 @@ fn gauge(
         }
     }
     let [row, ..] = transport.direct_backward(&times_used);
-    let held = held_reflectance(transport, footprints, observations);
-    (row, photo.map(|mean| (mean / held).max(1e-9)))
-}
-
-/// [`HELD_REFLECTANCE`], or less when, under a constant light, the brightest surface would have more than
-/// [`MOST_REFLECTANCE`].
-fn held_reflectance(transport: &CachedTransport, footprints: &[ViewFootprints], observations: &Observations) -> f64 {
-    let white = transport.basis.planes(&vec![[1.0; 3]; transport.basis.count()]);
-    let arriving = transport.direct(&white);
-    let mut apparent: Vec<f32> = observations
-        .list
-        .iter()
-        .map(|observation| {
-            let view = &footprints[observation.view as usize];
-            let lit = view.lit_of(&view.points[observation.point as usize]);
-            let share: f32 = lit.iter().map(|&(index, weight)| weight * arriving[index as usize][0]).sum();
-            observation.radiance.iter().sum::<f32>() / 3.0 / share.max(LEAST_SHARE_OF_LIGHT)
-        })
-        .collect();
-    let mean = apparent.iter().map(|&value| f64::from(value)).sum::<f64>() / apparent.len() as f64;
-    let place = ((apparent.len() - 1) as f64 * BRIGHT_QUANTILE) as usize;
-    let bright = f64::from(*apparent.select_nth_unstable_by(place, f32::total_cmp).1);
-    if mean > 0.0 && bright > 0.0 { HELD_REFLECTANCE.min(MOST_REFLECTANCE * mean / bright) } else { HELD_REFLECTANCE }
+    (row, photo.map(|mean| (mean / HELD_REFLECTANCE).max(1e-9)))
 }
 
 /// Pixels that show nothing but background, thinned out evenly.
