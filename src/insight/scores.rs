@@ -296,20 +296,17 @@ mod tests {
         let exact = score_view(&photo, &truth, &states, None, 0.0).unwrap();
         let halves = score_halves(&photo, [&first, &second], &states, None, 0.0).unwrap();
         let as_it_is = score_view(&photo, &mean_of([&first, &second]), &states, None, 0.0).unwrap();
-        for (exact, halves, as_it_is) in
-            [(exact.raw, halves.raw, as_it_is.raw), (exact.aligned, halves.aligned, as_it_is.aligned)]
-        {
-            let off = |a: PictureScore| {
-                [a.rmse_linear - exact.rmse_linear, a.psnr_srgb_db - exact.psnr_srgb_db, a.ssim_srgb - exact.ssim_srgb]
-            };
-            let (without, with) = (off(halves), off(as_it_is));
-            // Encoding bends noise and similarity is a ratio: a part of it stays in both.
-            assert!(without[0].abs() < 0.1 * with[0].abs(), "{without:?} {with:?}");
-            assert!(
-                without[1].abs() < 0.25 * with[1].abs() && without[2].abs() < 0.25 * with[2].abs(),
-                "{without:?} {with:?}"
-            );
-        }
+        let off = |a: PictureScore, exact: PictureScore| {
+            [a.rmse_linear - exact.rmse_linear, a.psnr_srgb_db - exact.psnr_srgb_db, a.ssim_srgb - exact.ssim_srgb]
+        };
+        let (without, with) = (off(halves.raw, exact.raw), off(as_it_is.raw, exact.raw));
+        assert!(without[0].abs() < 0.1 * with[0].abs(), "{without:?} {with:?}");
+        // Encoding bends noise and similarity is a ratio: a part of it stays in both.
+        assert!(without[1].abs() < 0.25 * with[1].abs(), "{without:?} {with:?}");
+        assert!(without[2].abs() < 0.25 * with[2].abs(), "{without:?} {with:?}");
+        // After the best factor nearly nothing but noise is left: decibels of nothing are not compared.
+        let (without, with) = (off(halves.aligned, exact.aligned), off(as_it_is.aligned, exact.aligned));
+        assert!(without[0].abs() < 0.1 * with[0].abs(), "{without:?} {with:?}");
     }
 
     #[test]
