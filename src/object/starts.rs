@@ -29,7 +29,7 @@ pub struct StartedModel {
     pub prior: ParameterPrior,
 }
 
-/// Names of strengths and widths of the starts of [`lobes`].
+/// Names of strengths and widths of the starts of `lobes`.
 const WIDTHS: [(f64, &str); 5] =
     [(0.02, "mirror"), (0.06, "polished"), (0.15, "glossy"), (0.3, "satin"), (0.6, "rough")];
 const BALANCES: [(f64, f64, f64, &str); 4] =
