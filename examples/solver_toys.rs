@@ -7,7 +7,7 @@
 //! are the solver's own; scoring is left out.
 
 use glam::Vec3;
-use patina::fit::solver::{Solver, SolverSettings};
+use patina::fit::solver::{Estimate, Solver, SolverSettings};
 use patina::image::{Image, RgbImage};
 use patina::insight::truth::{environment_errors, map_errors};
 use patina::light::Environment;
@@ -91,7 +91,7 @@ fn main() -> Result<()> {
         lights.log_rmse.aligned,
         lights.brightest_angle_degrees.unwrap_or(f64::NAN)
     );
-    let deviations = solver.estimate.deviations(settings.map_size);
+    let deviations = Estimate::deviations(&solver.estimate.texels, &solver.estimate.variances, settings.map_size);
     let seen = truth.texels_seen.pixels();
     let share = |inside: &dyn Fn(usize) -> bool| {
         let all = (0..seen.len()).filter(|&texel| seen[texel]);

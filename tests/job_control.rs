@@ -13,7 +13,6 @@ use patina::fit::settings::{BackgroundEvidence, Consistency, Start, Steps};
 use patina::fit::{FitSettings, FitState, Fitter, Preset, ViewUse, checkpoint};
 use patina::insight::ReportData;
 use patina::job::open::{self, OpenStage, PathKind};
-use patina::job::prepare::Prepared;
 use patina::job::{Command, Event, JobHandle, JobOptions, RunSettings, start_with};
 use patina::render::Surface;
 use patina::render::first_hits::PixelFilter;
@@ -31,14 +30,7 @@ static GO: AtomicBool = AtomicBool::new(false);
 /// Five views, the last held out; photographed once for all tests.
 fn scene() -> (Arc<Scene>, Arc<Surface>) {
     static SCENE: OnceLock<(Arc<Scene>, Arc<Surface>)> = OnceLock::new();
-    SCENE
-        .get_or_init(|| {
-            let trial = Trial { cameras: around(5, 35.0), ..Default::default() };
-            let mut scene = trial.photographed();
-            scene.views[4].held_out = true;
-            (Arc::new(scene), trial.surface())
-        })
-        .clone()
+    SCENE.get_or_init(|| last_held_out(5)).clone()
 }
 
 fn base() -> FitSettings {
@@ -220,18 +212,6 @@ impl Gate {
     fn one(&self) {
         self.go.send(()).unwrap();
     }
-}
-
-fn job(fitter: Fitter, folder: &Path, options: JobOptions) -> JobHandle {
-    let prepared = Prepared {
-        scene: Arc::clone(fitter.scene()),
-        surface: Arc::clone(fitter.surface()),
-        quality: None,
-        findings: Vec::new(),
-        timings: Vec::new(),
-    };
-    let settings = RunSettings { fit: fitter.settings().clone(), ..Default::default() };
-    start_with(prepared, fitter, settings, RunFolder::create(folder).unwrap(), options).unwrap()
 }
 
 /// Takes up what a folder holds.

@@ -21,14 +21,7 @@ static GO: AtomicBool = AtomicBool::new(false);
 /// Seven views, the last held out; photographed once for all tests.
 fn scene() -> (Arc<Scene>, Arc<Surface>) {
     static SCENE: OnceLock<(Arc<Scene>, Arc<Surface>)> = OnceLock::new();
-    SCENE
-        .get_or_init(|| {
-            let trial = Trial { cameras: around(7, 35.0), ..Default::default() };
-            let mut scene = trial.photographed();
-            scene.views[6].held_out = true;
-            (Arc::new(scene), trial.surface())
-        })
-        .clone()
+    SCENE.get_or_init(|| last_held_out(7)).clone()
 }
 
 fn base() -> FitSettings {
@@ -38,18 +31,6 @@ fn base() -> FitSettings {
 fn new_fitter(settings: &FitSettings) -> Fitter {
     let (scene, surface) = scene();
     Fitter::new(scene, surface, settings.clone(), None).unwrap()
-}
-
-fn job(fitter: Fitter, folder: &Path, options: JobOptions) -> JobHandle {
-    let prepared = Prepared {
-        scene: Arc::clone(fitter.scene()),
-        surface: Arc::clone(fitter.surface()),
-        quality: None,
-        findings: Vec::new(),
-        timings: Vec::new(),
-    };
-    let settings = RunSettings { fit: fitter.settings().clone(), ..Default::default() };
-    start_with(prepared, fitter, settings, RunFolder::create(folder).unwrap(), options).unwrap()
 }
 
 #[test]

@@ -47,14 +47,8 @@ impl Fitter {
 
     /// Standard deviations of the maps' values given the light, as maps: only the solver knows them, and only at its end.
     pub fn deviations(&self) -> Option<MaterialMaps> {
-        self.knows_deviations().then(|| {
-            let estimate = Estimate {
-                texels: self.state.texels.clone(),
-                variances: self.state.moments.second.clone(),
-                ..Estimate::default()
-            };
-            estimate.deviations(self.state.map_size)
-        })
+        self.knows_deviations()
+            .then(|| Estimate::deviations(&self.state.texels, &self.state.moments.second, self.state.map_size))
     }
 
     fn knows_deviations(&self) -> bool {

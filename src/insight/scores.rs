@@ -66,6 +66,25 @@ impl AlignmentSums {
         sums
     }
 
+    /// The sums of a picture whose pixels have this variance, estimated from groups of paths: the expected square of a
+    /// mean of paths is too large by it. `None` takes nothing off.
+    pub fn without_variance(
+        photo: &RgbImage,
+        picture: &RgbImage,
+        variance: Option<&RgbImage>,
+        counted: &Image<bool>,
+    ) -> Self {
+        let mut sums = AlignmentSums::of(photo, [picture, picture], counted);
+        let variances = variance.into_iter().flat_map(|variance| variance.pixels().iter().zip(counted.pixels()));
+        for (variance, _) in variances.filter(|(_, counted)| **counted) {
+            for channel in 0..3 {
+                sums.picture_squared[channel] -= f64::from(variance[channel]);
+                sums.squared_difference -= f64::from(variance[channel]);
+            }
+        }
+        sums
+    }
+
     /// Adds the sums of another picture.
     pub fn add(&mut self, other: &AlignmentSums) {
         self.pixels += other.pixels;

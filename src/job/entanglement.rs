@@ -133,7 +133,7 @@ impl Compare<'_> {
         picture: &PictureSettings,
     ) -> Result<ViewScores> {
         let ours = drawn(self.surface, &target.camera, lit, target.view as u32, picture, self.stop)?;
-        let coverage = ours.coverage.map(|&coverage| coverage >= 0.999);
+        let coverage = ours.fully_covered();
         score_view(other, &ours.radiance, states, Some(&coverage), self.exposure_stops)
     }
 

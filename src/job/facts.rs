@@ -6,14 +6,10 @@ use crate::atlas::AtlasQuality;
 use crate::error::{Finding, Severity};
 use crate::export::RunResult;
 use crate::fit::settings::BackgroundEvidence;
-use crate::fit::solver::TransportError;
 use crate::fit::{Fitter, ViewUse};
 use crate::image::Image;
 use crate::insight::report::data::{Fact, NonFiniteCount, ReportData, SettingLine, TexelCounts};
-use crate::math::sphere::solid_angle_of_texel;
 use crate::scene::{Background, Scene};
-use glam::DVec3;
-use std::f64::consts::PI;
 
 pub(super) fn describe(
     fitter: &Fitter,
@@ -91,75 +87,6 @@ fn atlas_facts(quality: &AtlasQuality) -> Vec<Fact> {
         fact("overlapping texels", quality.overlapping_texels.to_string()),
         fact("flipped triangles", quality.flipped_triangles.to_string()),
     ]
-}
-
-/// What the solver tells beside its maps: its error of transport, how lobes are shared, how sure it is. Empty under Adam.
-pub(super) fn solver_facts(fitter: &Fitter, transport: Option<TransportError>) -> Vec<Fact> {
-    let fact = |name: &str, value: String| Fact { name: name.into(), value };
-    let mut facts = Vec::new();
-    if let Some(error) = transport {
-        facts.push(fact(
-            "cached transport against the path tracer",
-            format!(
-                "{:.2} % relative RMSE, bias {:+.2} %, over {} pixels of {} paths",
-                100.0 * error.relative_rmse,
-                100.0 * error.bias,
-                error.pixels,
-                error.samples
-            ),
-        ));
-    }
-    if let Some(shares) = fitter.light_evidence() {
-        let (height, width) = (shares.height(), shares.width());
-        let mut mean = DVec3::ZERO;
-        for (texel, share) in shares.pixels().iter().enumerate() {
-            mean += share.as_dvec3() * solid_angle_of_texel(texel / width, width, height) / (4.0 * PI);
-        }
-        facts.push(fact(
-            "what the light is known by",
-            format!(
-                "highlights {:.0} %, background {:.0} %, diffuse light and shadows {:.0} %, belief that skies are smooth \
-                 {:.0} % (means over the sphere; environment_evidence.exr has each texel)",
-                100.0 * mean.x,
-                100.0 * mean.y,
-                100.0 * mean.z,
-                100.0 * (1.0 - mean.element_sum())
-            ),
-        ));
-    }
-    let (Some(sharing), Some(deviations)) = (fitter.lobe_sharing(), fitter.deviations()) else { return facts };
-    let solved: Vec<usize> = (0..sharing.pixels().len()).filter(|&texel| sharing.pixels()[texel] > 0.0).collect();
-    if solved.is_empty() {
-        return facts;
-    }
-    let share = |of: &dyn Fn(f32) -> bool| {
-        let count = solved.iter().filter(|&&texel| of(sharing.pixels()[texel])).count();
-        100.0 * count as f64 / solved.len() as f64
-    };
-    facts.push(fact(
-        "specular lobes",
-        format!(
-            "{:.0} % of the texels share one with at least 63 others, {:.0} % with fewer, {:.0} % have one of their own",
-            share(&|count| count >= 64.0),
-            share(&|count| (2.0..64.0).contains(&count)),
-            share(&|count| count < 2.0)
-        ),
-    ));
-    let median = |of: &dyn Fn(usize) -> f32| {
-        let mut values: Vec<f32> = solved.iter().map(|&texel| of(texel)).collect();
-        let middle = values.len() / 2;
-        *values.select_nth_unstable_by(middle, f32::total_cmp).1
-    };
-    facts.push(fact(
-        "median standard deviation given the light",
-        format!(
-            "diffuse {:.3}, specular {:.3}, roughness {:.3}",
-            median(&|texel| deviations.diffuse.pixels()[texel].element_sum() / 3.0),
-            median(&|texel| deviations.specular.pixels()[texel].element_sum() / 3.0),
-            median(&|texel| deviations.roughness.pixels()[texel])
-        ),
-    ));
-    facts
 }
 
 fn evidence(scene: &Scene, settings: &RunSettings) -> String {

@@ -38,6 +38,7 @@ mod save;
 pub mod scale;
 pub mod shown;
 pub mod slot;
+mod solver_told;
 pub mod study;
 pub mod tracer_speed;
 mod view;

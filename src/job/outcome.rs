@@ -1,10 +1,11 @@
 //! What a finished fit leaves behind: maps, scores, pictures, report.
 
 use super::against_truth::truth_errors;
-use super::facts::{describe, solver_facts};
+use super::facts::describe;
 use super::pictures::parameters;
 use super::prepare::{Prepared, RunSettings, covered, timed};
 use super::shown::{exposure_of, relit_strips, score_views};
+use super::solver_told::SolverTold;
 use crate::atlas::{dilate, nearest_covered};
 use crate::error::{Error, ErrorKind, Result};
 use crate::export::{LossRow, RunFolder, RunResult};
@@ -58,15 +59,8 @@ pub fn write(
     let environment = fitter.environment();
     let result = RunResult { maps, environment, mesh: surface.mesh().clone(), times_seen };
     timed(&mut timings, "write maps", || folder.write_result(&result))?;
-    if let Some(deviations) = fitter.deviations() {
-        folder.write_deviations(&deviations)?;
-    }
-    if let Some(sharing) = fitter.lobe_sharing() {
-        folder.write_lobe_sharing(&sharing)?;
-    }
-    if let Some(shares) = fitter.light_evidence() {
-        folder.write_light_evidence(&shares)?;
-    }
+    let told = SolverTold::of(fitter);
+    told.write(folder)?;
     folder.write_loss(&loss_rows(fitter.state()))?;
 
     tell("pictures of the views");
@@ -82,7 +76,7 @@ pub fn write(
 
     let mut data = describe(fitter, &prepared, settings, &result, &covered);
     let transport = timed(&mut timings, "check of transport", || fitter.transport_error(stop));
-    data.scene_facts.extend(solver_facts(fitter, transport));
+    data.scene_facts.extend(told.facts(transport));
     data.views = views
         .iter()
         .map(|view| {

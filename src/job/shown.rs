@@ -59,10 +59,8 @@ pub fn in_halves(settings: &PictureSettings, draw: impl Fn(&PictureSettings) -> 
 
 /// Pixels that surface covers wholly in both halves.
 pub fn fully_covered(halves: &[Picture; 2]) -> Image<bool> {
-    let [first, second] = halves.each_ref().map(|half| &half.coverage);
-    Image::from_fn(first.width(), first.height(), |row, column| {
-        first[(row, column)] >= 0.999 && second[(row, column)] >= 0.999
-    })
+    let [first, second] = halves.each_ref().map(Picture::fully_covered);
+    Image::from_fn(first.width(), first.height(), |row, column| first[(row, column)] && second[(row, column)])
 }
 
 pub(super) fn score_views(

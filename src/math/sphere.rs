@@ -50,6 +50,13 @@ pub struct BilinearTap {
 /// The tap of a direction in a `width x height` map: wraps in phi, clamps at the poles.
 pub fn tap_of_direction(direction: Vec3, width: usize, height: usize) -> BilinearTap {
     let (phi, theta) = angles_of_direction(direction);
+    tap_of_angles(phi, theta, width, height)
+}
+
+/// The tap of a direction by its angles, see [`angles_of_direction`], in a `width x height` map: wraps in phi, clamps at
+/// the poles.
+#[inline]
+pub fn tap_of_angles(phi: f32, theta: f32, width: usize, height: usize) -> BilinearTap {
     let x = phi * (width as f32 / TAU) - 0.5;
     let y = theta * (height as f32 / PI) - 0.5;
     let (x_floor, y_floor) = (x.floor(), y.floor());

@@ -3,7 +3,7 @@
 //! Nothing is stored between pixels, so a picture may have any size. [`render`] uses the nodes of a fit; [`render_exact`]
 //! asks the reflectance itself at every part of every texel, and is what studies photograph with.
 
-use super::geometry::{ObjectGeometry, Visibility};
+use super::geometry::{ObjectGeometry, ObjectPixel, Visibility};
 use super::nodes::{NodeGrid, NodeTable, weights};
 use super::transport::TexelDirections;
 use crate::image::{GreyImage, Image, RgbImage};
@@ -25,35 +25,20 @@ pub fn render(
     table: &NodeTable,
     lights: &[&Environment],
 ) -> Vec<RgbImage> {
-    let parts: Vec<Vec<Vec3>> = geometry
-        .pixels
-        .par_chunks(CHUNK)
-        .enumerate()
-        .map(|(chunk, pixels)| {
-            let mut values = Vec::with_capacity(pixels.len() * lights.len());
-            for (offset, pixel) in pixels.iter().enumerate() {
-                let mut sums = vec![DVec3::ZERO; lights.len()];
-                let is_visible =
-                    |texel: usize| visibility.is_none_or(|bits| bits.is_visible(chunk * CHUNK + offset, texel));
-                directions.for_each_part(pixel, is_visible, |texel, weight, (half, difference, azimuth)| {
-                    let place = grid.place(half, difference, azimuth);
-                    let mut value = Vec3::ZERO;
-                    for (corner, share) in grid.corners(place.cell).into_iter().zip(weights(place.fraction)) {
-                        value += Vec3::from_array(table.values[corner]) * share;
-                    }
-                    for (sum, light) in sums.iter_mut().zip(lights) {
-                        *sum += (value * light.radiance.pixels()[texel] * weight).as_dvec3();
-                    }
-                });
-                values.extend(sums.iter().map(|sum| sum.as_vec3()));
+    pictures(geometry, visibility, lights.len(), |pixel, is_visible, results| {
+        let mut sums = vec![DVec3::ZERO; lights.len()];
+        directions.for_each_part(pixel, is_visible, |texel, weight, (half, difference, azimuth)| {
+            let place = grid.place(half, difference, azimuth);
+            let mut value = Vec3::ZERO;
+            for (corner, share) in grid.corners(place.cell).into_iter().zip(weights(place.fraction)) {
+                value += Vec3::from_array(table.values[corner]) * share;
             }
-            values
-        })
-        .collect();
-    let values: Vec<Vec3> = parts.into_iter().flatten().collect();
-    (0..lights.len())
-        .map(|light| picture_of(geometry, values.iter().skip(light).step_by(lights.len().max(1)).copied()))
-        .collect()
+            for (sum, light) in sums.iter_mut().zip(lights) {
+                *sum += (value * light.radiance.pixels()[texel] * weight).as_dvec3();
+            }
+        });
+        results.extend(sums.iter().map(|sum| sum.as_vec3()));
+    })
 }
 
 /// Writes the reflectance at many places, in 1/sr.
@@ -68,48 +53,53 @@ pub fn render_exact(
     evaluate: &ReflectanceAt,
     lights: &[&Environment],
 ) -> Vec<RgbImage> {
+    pictures(geometry, visibility, lights.len(), |pixel, is_visible, results| {
+        let (mut at, mut places) = (Vec::new(), Vec::new());
+        directions.for_each_part(pixel, is_visible, |texel, weight, (half, difference, azimuth)| {
+            at.push(HalfDifference {
+                theta_half: f64::from(half),
+                theta_difference: f64::from(difference),
+                phi_difference: f64::from(azimuth),
+            });
+            places.push((texel, f64::from(weight)));
+        });
+        let mut values = vec![[0.0; 3]; at.len()];
+        evaluate(&at, &mut values);
+        for light in lights {
+            let radiance = light.radiance.pixels();
+            let sum: DVec3 = values
+                .iter()
+                .zip(&places)
+                .map(|(value, &(texel, weight))| DVec3::from_array(*value) * radiance[texel].as_dvec3() * weight)
+                .sum();
+            results.push(sum.as_vec3());
+        }
+    })
+}
+
+/// Pictures under so many lights: `shade` is given a pixel and which texels of the light it sees, and pushes its radiance
+/// under each of them.
+fn pictures(
+    geometry: &ObjectGeometry,
+    visibility: Option<&Visibility>,
+    lights: usize,
+    shade: impl Fn(&ObjectPixel, &dyn Fn(usize) -> bool, &mut Vec<Vec3>) + Sync,
+) -> Vec<RgbImage> {
     let parts: Vec<Vec<Vec3>> = geometry
         .pixels
         .par_chunks(CHUNK)
         .enumerate()
         .map(|(chunk, pixels)| {
-            let (mut at, mut places, mut values) = (Vec::new(), Vec::new(), Vec::new());
-            let mut results = Vec::with_capacity(pixels.len() * lights.len());
+            let mut results = Vec::with_capacity(pixels.len() * lights);
             for (offset, pixel) in pixels.iter().enumerate() {
-                at.clear();
-                places.clear();
-                let is_visible =
-                    |texel: usize| visibility.is_none_or(|bits| bits.is_visible(chunk * CHUNK + offset, texel));
-                directions.for_each_part(pixel, is_visible, |texel, weight, (half, difference, azimuth)| {
-                    at.push(HalfDifference {
-                        theta_half: f64::from(half),
-                        theta_difference: f64::from(difference),
-                        phi_difference: f64::from(azimuth),
-                    });
-                    places.push((texel, f64::from(weight)));
-                });
-                values.clear();
-                values.resize(at.len(), [0.0; 3]);
-                evaluate(&at, &mut values);
-                for light in lights {
-                    let radiance = light.radiance.pixels();
-                    let sum: DVec3 = values
-                        .iter()
-                        .zip(&places)
-                        .map(|(value, &(texel, weight))| {
-                            DVec3::from_array(*value) * radiance[texel].as_dvec3() * weight
-                        })
-                        .sum();
-                    results.push(sum.as_vec3());
-                }
+                let index = chunk * CHUNK + offset;
+                shade(pixel, &|texel| visibility.is_none_or(|bits| bits.is_visible(index, texel)), &mut results);
             }
             results
         })
         .collect();
     let values: Vec<Vec3> = parts.into_iter().flatten().collect();
-    (0..lights.len())
-        .map(|light| picture_of(geometry, values.iter().skip(light).step_by(lights.len().max(1)).copied()))
-        .collect()
+    (0..lights).map(|light| picture_of(geometry, values.iter().skip(light).step_by(lights.max(1)).copied())).collect()
 }
 
 fn picture_of(geometry: &ObjectGeometry, values: impl Iterator<Item = Vec3>) -> RgbImage {

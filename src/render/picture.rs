@@ -62,6 +62,13 @@ pub struct Picture {
     pub non_finite_pixels: usize,
 }
 
+impl Picture {
+    /// Pixels that surface covers wholly.
+    pub fn fully_covered(&self) -> Image<bool> {
+        self.coverage.map(|&coverage| coverage >= 0.999)
+    }
+}
+
 /// Renders a view by path tracing. Stops early, with black pixels, when `stop` is set.
 pub fn render(
     surface: &Surface,

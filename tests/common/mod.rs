@@ -6,8 +6,11 @@
 
 use glam::Vec3;
 use patina::Result;
+use patina::export::RunFolder;
 use patina::fit::{FitSettings, FitState, Fitter, StepOutcome};
 use patina::image::Image;
+use patina::job::prepare::Prepared;
+use patina::job::{JobHandle, JobOptions, RunSettings, start_with};
 use patina::light::Environment;
 use patina::material::Material;
 use patina::material::texels::{PyramidWeights, Texel, TexelPyramid};
@@ -16,6 +19,7 @@ use patina::render::{Parameters, Surface};
 use patina::scene::synthetic::layout::{PartChart, lay_out};
 use patina::scene::synthetic::shapes;
 use patina::scene::{Background, Camera, Mesh, Photo, PixelState, Scene, View};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -245,4 +249,25 @@ pub fn assert_learned(fitter: &Fitter) {
     // Below the second number photos are explained to a few percent, and the loss of two samples a pixel is noise.
     assert!(last < 0.9 * first || last.abs() < 2e-3, "the loss went from {first} to {last}");
     assert!(fitter.state().non_finite.is_empty(), "{:?}", fitter.state().non_finite);
+}
+
+/// A scene with so many views around it, the last held out, and its surface.
+pub fn last_held_out(views: usize) -> (Arc<Scene>, Arc<Surface>) {
+    let trial = Trial { cameras: around(views, 35.0), ..Default::default() };
+    let mut scene = trial.photographed();
+    scene.views[views - 1].held_out = true;
+    (Arc::new(scene), trial.surface())
+}
+
+/// Starts a job that goes on with a fit.
+pub fn job(fitter: Fitter, folder: &Path, options: JobOptions) -> JobHandle {
+    let prepared = Prepared {
+        scene: Arc::clone(fitter.scene()),
+        surface: Arc::clone(fitter.surface()),
+        quality: None,
+        findings: Vec::new(),
+        timings: Vec::new(),
+    };
+    let settings = RunSettings { fit: fitter.settings().clone(), ..Default::default() };
+    start_with(prepared, fitter, settings, RunFolder::create(folder).unwrap(), options).unwrap()
 }

@@ -7,7 +7,7 @@
 //! six sums, and cells add up. At each width a bounded 2 x 2 system per channel gives rho and F0; the width is one for
 //! all channels, found by looking at all nodes and refined by a parabola.
 
-use super::cell_sums::{Sums, ridge, system};
+use super::cell_sums::{System, ridge, system};
 
 /// Light at one pixel: what multiplies the unknowns.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -77,8 +77,8 @@ pub fn solve_block(
     if weight <= 0.0 {
         return None;
     }
-    let mut scratch = vec![Sums::default(); cell_count];
-    let cost_at = |node: usize, scratch: &mut [Sums]| -> f64 {
+    let mut scratch = vec![System::default(); cell_count];
+    let cost_at = |node: usize, scratch: &mut [System]| -> f64 {
         let prior_cost = ((log_widths[node] - prior.log_width.0) / prior.log_width.1).powi(2);
         (0..3)
             .map(|channel| {
@@ -236,7 +236,7 @@ mod tests {
         let truth = ([0.3, 0.5, 0.2], [0.05, 0.2, 0.6], -1.0);
         let terms = pixels(&log_widths, truth, 0.05);
         let prior = prior();
-        let mut cells = vec![Sums::default(); 6];
+        let mut cells = vec![System::default(); 6];
         for channel in 0..3 {
             let at = |term: &PixelTerms| (term.base[1][channel], term.grazing[1][channel]);
             let ([rho, specular], _) = system(&terms, channel, at, &prior, &mut cells).solve();

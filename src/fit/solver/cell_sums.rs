@@ -4,18 +4,7 @@
 
 use super::block::{BlockPrior, PixelTerms};
 
-/// The six sums of a cell and channel.
-#[derive(Clone, Copy, Default)]
-pub(super) struct Sums {
-    pub(super) ee: f64,
-    pub(super) es: f64,
-    pub(super) ss: f64,
-    pub(super) ey: f64,
-    pub(super) sy: f64,
-    pub(super) yy: f64,
-}
-
-/// A 2 x 2 system in (rho, F0) and its constant.
+/// A 2 x 2 system in (rho, F0) and its constant: the six sums of a channel, of a cell or of a block.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct System {
     pub(super) ee: f64,
@@ -28,7 +17,7 @@ pub(super) struct System {
 
 impl System {
     /// Adds a cell with its deviation eliminated; `ridge` is the variance of the noise over that of deviations.
-    fn add(&mut self, cell: &Sums, ridge: f64) {
+    fn add(&mut self, cell: &System, ridge: f64) {
         let keep = if ridge.is_finite() { 1.0 / (ridge + cell.ee) } else { 0.0 };
         self.ee += cell.ee - cell.ee * cell.ee * keep;
         self.es += cell.es - cell.es * cell.ee * keep;
@@ -79,9 +68,9 @@ pub(super) fn system(
     channel: usize,
     at: impl Fn(&PixelTerms) -> (f32, f32),
     prior: &BlockPrior,
-    cells: &mut [Sums],
+    cells: &mut [System],
 ) -> System {
-    cells.fill(Sums::default());
+    cells.fill(System::default());
     for term in terms {
         let (base, grazing) = at(term);
         let weight = f64::from(term.weight);

@@ -42,11 +42,6 @@ impl BlockRows {
         self.columns.resize(total * unknowns, 0.0);
     }
 
-    /// The row of an observation over the light.
-    pub fn row_mut(&mut self, observation: usize) -> &mut [f32] {
-        &mut self.rows[observation * self.light_count..(observation + 1) * self.light_count]
-    }
-
     /// Sets the row of an observation: what a unit of each coefficient sends to it through the lobe and diffusely.
     pub fn set_row(&mut self, observation: usize, lobe: impl Iterator<Item = f32>, diffuse: impl Iterator<Item = f32>) {
         let range = observation * self.light_count..(observation + 1) * self.light_count;
@@ -170,9 +165,7 @@ mod tests {
             let own: Vec<f64> = (0..light).map(|_| f64::from(number() as f32)).collect();
             let columns: Vec<f64> = (0..unknowns).map(|_| number()).collect();
             let right = number();
-            for (entry, value) in rows.row_mut(i).iter_mut().zip(&own) {
-                *entry = *value as f32;
-            }
+            rows.set_row(i, own.iter().map(|&value| value as f32), own.iter().map(|_| 0.0));
             for (unknown, &value) in columns.iter().enumerate() {
                 rows.set_unknown(i, unknown, value);
             }

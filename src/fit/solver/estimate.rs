@@ -76,11 +76,11 @@ impl Estimate {
         }
     }
 
-    /// Standard deviations of the maps' values, of this size: how far a value may be off given the light that was found.
+    /// Standard deviations of the values of maps of this size, by [`Estimate::texels`] and [`Estimate::variances`]: how far a value may be off given the light that was found.
     /// A texel that was not solved for has those of what is believed of any surface.
-    pub fn deviations(&self, map_size: usize) -> MaterialMaps {
+    pub fn deviations(texels: &[Texel<f32>], variances: &[Texel<f32>], map_size: usize) -> MaterialMaps {
         let deviation = |texel: usize, number: usize| {
-            let own = self.variances[texel];
+            let own = variances[texel];
             if own[7] > 0.0 && own[number] > 0.0 { own[number].sqrt() } else { UNKNOWN_DEVIATION[number] }
         };
         let colour = |first: usize| {
@@ -94,7 +94,7 @@ impl Estimate {
             // r = a^2, so dr = 2 r d(ln a).
             roughness: Image::from_fn(map_size, map_size, |row, column| {
                 let texel = row * map_size + column;
-                2.0 * (2.0 * self.texels[texel][6]).exp() * deviation(texel, 6)
+                2.0 * (2.0 * texels[texel][6]).exp() * deviation(texel, 6)
             }),
         }
     }

@@ -175,16 +175,7 @@ impl Judge {
             let ours = render(&self.surface, &self.scene.views[view].camera, lit, view as u32, &settings, stop);
             *broken += ours.non_finite_pixels as u64;
             let counted = truth.map(|pixel| pixel.is_finite());
-            let mut own = AlignmentSums::of(&truth, [&ours.radiance; 2], &counted);
-            if let Some(variance) = &ours.variance {
-                for (variance, _) in variance.pixels().iter().zip(counted.pixels()).filter(|(_, counted)| **counted) {
-                    for channel in 0..3 {
-                        own.picture_squared[channel] -= f64::from(variance[channel]);
-                        own.squared_difference -= f64::from(variance[channel]);
-                    }
-                }
-            }
-            total.add(&own);
+            total.add(&AlignmentSums::without_variance(&truth, &ours.radiance, ours.variance.as_ref(), &counted));
         }
         total.squared_difference = total.squared_difference.max(0.0);
         total

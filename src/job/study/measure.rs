@@ -138,18 +138,9 @@ fn sums(
     let mut total = AlignmentSums::default();
     for (view, truth) in pictures {
         let ours = render(fitter.surface(), &scene.views[view].camera, lit, view as u32, &settings, stop);
-        let covered = ours.coverage.map(|&coverage| coverage >= 0.999);
+        let covered = ours.fully_covered();
         let counted = counted_pixels(&scene.views[view].states, Some(&covered));
-        let mut own = AlignmentSums::of(&truth, [&ours.radiance; 2], &counted);
-        if let Some(variance) = &ours.variance {
-            for (variance, _) in variance.pixels().iter().zip(counted.pixels()).filter(|(_, counted)| **counted) {
-                for channel in 0..3 {
-                    own.picture_squared[channel] -= f64::from(variance[channel]);
-                    own.squared_difference -= f64::from(variance[channel]);
-                }
-            }
-        }
-        total.add(&own);
+        total.add(&AlignmentSums::without_variance(&truth, &ours.radiance, ours.variance.as_ref(), &counted));
     }
     total.squared_difference = total.squared_difference.max(0.0);
     total

@@ -7,7 +7,7 @@
 use super::light_basis::LightBasis;
 use super::lobe_sum::{LobePlace, LobeSums};
 use crate::math::frame::Frame;
-use crate::math::sphere::BilinearTap;
+use crate::math::sphere::{BilinearTap, tap_of_angles};
 use glam::Vec3;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::OnceLock;
@@ -77,23 +77,7 @@ fn angle_of(y: f32, x: f32) -> f32 {
 fn tap_at(direction: Vec3, width: usize, height: usize) -> BilinearTap {
     let phi = angle_of(direction.x, -direction.z);
     let theta = angle_of((direction.x * direction.x + direction.z * direction.z).sqrt(), direction.y);
-    let x = phi * (width as f32 / TAU) - 0.5;
-    let y = theta * (height as f32 / PI) - 0.5;
-    let (x_floor, y_floor) = (x.floor(), y.floor());
-    let (x_fraction, y_fraction) = (x - x_floor, y - y_floor);
-    let column = |x: i32| x.rem_euclid(width as i32) as u32;
-    let row = |y: i32| y.clamp(0, height as i32 - 1) as u32 * width as u32;
-    let (left, right) = (column(x_floor as i32), column(x_floor as i32 + 1));
-    let (upper, lower) = (row(y_floor as i32), row(y_floor as i32 + 1));
-    BilinearTap {
-        index: [upper + left, upper + right, lower + left, lower + right],
-        weight: [
-            (1.0 - x_fraction) * (1.0 - y_fraction),
-            x_fraction * (1.0 - y_fraction),
-            (1.0 - x_fraction) * y_fraction,
-            x_fraction * y_fraction,
-        ],
-    }
+    tap_of_angles(phi, theta, width, height)
 }
 
 fn for_each_place(basis: &LightBasis, place: &LobePlace, width: f32, count: usize, mut visit: impl FnMut(&Place)) {

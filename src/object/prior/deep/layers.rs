@@ -5,6 +5,7 @@
 use super::planes::Planes;
 use crate::neural::product::{Rows, multiply};
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Pixels of one product, about.
 const PIXELS_A_TASK: usize = 2048;
@@ -44,6 +45,11 @@ impl Convolution {
         (planes.height / self.stride, planes.width / self.stride)
     }
 
+    /// What taps read: the planes, padded when there are three taps a side.
+    fn source<'a>(&self, planes: &'a Planes) -> Cow<'a, Planes> {
+        if self.side == 3 { Cow::Owned(planes.padded()) } else { Cow::Borrowed(planes) }
+    }
+
     fn rows_a_task(&self, width: usize) -> usize {
         (PIXELS_A_TASK / width).max(1)
     }
@@ -72,13 +78,7 @@ impl Convolution {
     /// The convolution of planes whose sides are multiples of the stride.
     pub fn forward(&self, weights: &[f32], planes: &Planes) -> Planes {
         let (height, width) = self.size(planes);
-        let padded;
-        let source = if self.side == 3 {
-            padded = planes.padded();
-            &padded
-        } else {
-            planes
-        };
+        let source = &*self.source(planes);
         let (matrix, offsets) = weights.split_at(self.outputs * self.columns());
         let rows_a_task = self.rows_a_task(width);
         let firsts: Vec<usize> = (0..height).step_by(rows_a_task).collect();
@@ -109,13 +109,7 @@ impl Convolution {
     /// Adds the derivatives by the weights to `d_weights` and returns those by the planes that came in.
     pub fn backward(&self, weights: &[f32], planes: &Planes, d_result: &Planes, d_weights: &mut [f32]) -> Planes {
         let (height, width) = self.size(planes);
-        let padded;
-        let source = if self.side == 3 {
-            padded = planes.padded();
-            &padded
-        } else {
-            planes
-        };
+        let source = &*self.source(planes);
         let matrix = &weights[..self.outputs * self.columns()];
         let rows_a_task = self.rows_a_task(width);
         let firsts: Vec<usize> = (0..height).step_by(rows_a_task).collect();
