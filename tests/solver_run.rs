@@ -8,11 +8,9 @@ use common::*;
 use patina::export::RunFolder;
 use patina::fit::settings::{BackgroundEvidence, Start};
 use patina::fit::{FitSettings, Fitter, Method, StepOutcome, checkpoint};
-use patina::job::prepare::Prepared;
-use patina::job::{Event, JobHandle, JobOptions, RunSettings, start_with};
+use patina::job::{Event, JobOptions, RunSettings};
 use patina::render::Surface;
 use patina::scene::{Background, Scene};
-use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
