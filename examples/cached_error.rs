@@ -1,16 +1,20 @@
 //! Error of cached transport against the path tracer, over its settings.
 //!
-//! `cargo run --release --no-default-features --example cached_error -- [FOLDER|demo] [samples] [grids]`
+//! `cargo run --release --no-default-features --example cached_error -- [FOLDER|demo] [samples] [grids] [PICTURES]`
 //!
 //! The squared error is the product of the differences to two independent pictures of the path tracer, so that their
-//! noise does not count. Prints the error relative to the root mean square of the picture, and what the cache took.
+//! noise does not count. Prints the error relative to the root mean square of the picture, and what the cache took. With
+//! a fourth argument the pictures go to that folder: the cache's, the path tracer's, the difference and its square.
 
+use glam::Vec3;
 use patina::Result;
+use patina::image::{Image, RgbImage, file};
 use patina::material::texels::{PyramidWeights, TexelPyramid, texels_from_maps};
 use patina::render::cached::{CachedSettings, CachedTransport, FootprintSettings, ViewFootprints};
 use patina::render::picture::{PictureSettings, render};
 use patina::render::{Parameters, Surface};
 use patina::scene::{ReadSettings, demo, read};
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -20,6 +24,7 @@ fn main() -> Result<()> {
     let samples: usize = arguments.get(1).and_then(|value| value.parse().ok()).unwrap_or(128);
     let grids: Vec<usize> =
         arguments.get(2).map_or("128,256", String::as_str).split(',').filter_map(|value| value.parse().ok()).collect();
+    let pictures = arguments.get(3).map(PathBuf::from);
     let scene = if source == "demo" {
         demo::build(&demo::DemoSettings::default())?.scene
     } else {
@@ -68,6 +73,7 @@ fn main() -> Result<()> {
                 let at = transport.point_light(&light, &reflectance);
                 let lit = began.elapsed().as_secs_f64();
                 let (mut squared, mut power, mut bias, mut mean) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
+                let (mut of_kind, mut counts) = ([0.0f64; 3], [0usize; 3]);
                 let (mut hits, mut shading, mut shaded) = (0.0, 0.0, 0usize);
                 for (&view, [first, second]) in views.iter().zip(&references) {
                     let began = Instant::now();
@@ -83,11 +89,34 @@ fn main() -> Result<()> {
                     let picture = transport.picture(&footprints, texels, &light, &at);
                     shading += began.elapsed().as_secs_f64();
                     shaded += footprints.points.len();
-                    for ((own, first), second) in picture.iter().zip(first.pixels()).zip(second.pixels()) {
+                    if let Some(folder) = &pictures {
+                        write_pictures(
+                            &folder.join(format!("view{view}")),
+                            max_bounces,
+                            lobe_strength,
+                            grid,
+                            &picture,
+                            [first, second],
+                        )?;
+                    }
+                    let mut pieces = vec![0usize; picture.len()];
+                    for point in &footprints.points {
+                        pieces[point.pixel as usize] += 1;
+                    }
+                    for (pixel, ((own, first), second)) in
+                        picture.iter().zip(first.pixels()).zip(second.pixels()).enumerate()
+                    {
+                        let kind = match (footprints.escaped[pixel] > 0.0, pieces[pixel]) {
+                            (true, _) => 0,
+                            (_, 0 | 1) => 1,
+                            _ => 2,
+                        };
+                        counts[kind] += 1;
                         for channel in 0..3 {
                             let own = f64::from(own[channel]);
                             let (a, b) = (f64::from(first[channel]), f64::from(second[channel]));
                             squared += (own - a) * (own - b);
+                            of_kind[kind] += (own - a) * (own - b);
                             power += a * b;
                             bias += own - 0.5 * (a + b);
                             mean += 0.5 * (a + b);
@@ -103,8 +132,36 @@ fn main() -> Result<()> {
                     transport.grid.points.len(),
                     transport.visibility.rays as f64 * 1e-6,
                 );
+                let [rim, inside, edges] = of_kind.map(|sum| (sum / power).max(0.0).sqrt());
+                println!(
+                    "    of it rims {rim:.4} ({}), inside {inside:.4} ({}), edges {edges:.4} ({})",
+                    counts[0], counts[1], counts[2]
+                );
             }
         }
     }
     Ok(())
+}
+
+fn write_pictures(
+    folder: &Path,
+    max_bounces: usize,
+    lobe_strength: f32,
+    grid: usize,
+    own: &[[f32; 3]],
+    [first, second]: [&RgbImage; 2],
+) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|error| patina::Error::writing(folder, error))?;
+    let mean = |texel: usize| 0.5 * (first.pixels()[texel] + second.pixels()[texel]);
+    let width = first.width();
+    let picture =
+        |of: &dyn Fn(usize) -> Vec3| Image::from_fn(width, first.height(), |row, column| of(row * width + column));
+    let name = |what: &str| folder.join(format!("hits{max_bounces}_lobe{lobe_strength}_grid{grid}_{what}.exr"));
+    file::write_exr_rgb(&name("cache"), &picture(&|texel| Vec3::from_array(own[texel])))?;
+    file::write_exr_rgb(&name("paths"), &picture(&mean))?;
+    let own = |texel: usize| Vec3::from_array(own[texel]);
+    file::write_exr_rgb(&name("difference"), &picture(&|texel| own(texel) - mean(texel)))?;
+    // Without noise, of either sign where there is nothing else.
+    let squared = |texel: usize| (own(texel) - first.pixels()[texel]) * (own(texel) - second.pixels()[texel]);
+    file::write_exr_rgb(&name("squared_difference"), &picture(&squared))
 }

@@ -76,6 +76,13 @@ fn main() -> Result<()> {
         );
     });
     let (maps, light) = (solver.maps(), solver.environment());
+    if let Some(folder) = value("maps") {
+        let folder = std::path::Path::new(&folder);
+        std::fs::create_dir_all(folder).map_err(|error| Error::writing(folder, error))?;
+        patina::image::file::write_exr_rgb(&folder.join("diffuse.exr"), &maps.diffuse)?;
+        patina::image::file::write_exr_rgb(&folder.join("specular.exr"), &maps.specular)?;
+        patina::image::file::write_exr_grey(&folder.join("roughness.exr"), &maps.roughness)?;
+    }
     let errors = map_errors(&maps, &truth.maps, &truth.texels_seen)?;
     let lights = environment_errors(&light, &truth.environment)?;
     println!(

@@ -87,3 +87,23 @@ fn images_of_different_sizes_are_an_error_and_tiny_ones_are_not() {
     let grey = GreyImage::filled(2, 2, 0.5);
     assert!((rmse_grey(&grey, &GreyImage::filled(2, 2, 0.25), None).unwrap() - 0.25).abs() < 1e-12);
 }
+
+#[test]
+fn an_error_below_the_noise_is_not_reported_as_none() {
+    use patina::image::metrics::scores_without_noise;
+    let mut random = patina::math::random::SequentialRandom::new(8);
+    let truth = Image::from_fn(48, 48, |row, column| Vec3::splat(0.4 + 0.004 * (row as f32 - 0.5 * column as f32)));
+    // Half of these pictures have more noise in the mean of their halves than in the halves' difference.
+    for _ in 0..12 {
+        let mut noisy = || truth.map(|&value| value + 0.05 * (random.next_number() - 0.5));
+        let (first, second) = (noisy(), noisy());
+        let half_of = |sign: f32| {
+            let pixels = first.pixels().iter().zip(second.pixels()).map(|(a, b)| 0.5 * (*a + sign * *b));
+            Image::from_pixels(48, 48, pixels.collect())
+        };
+        let score = scores_without_noise(&half_of(1.0), Some(&half_of(-1.0)), &truth, None).unwrap();
+        // The noise of the mean is .0102 a channel; without it next to nothing is left, but never nothing at all.
+        assert!(score.rmse > 0.0 && score.rmse < 0.004, "{}", score.rmse);
+        assert!(score.psnr.is_finite() && score.ssim <= 1.0 && score.ssim > 0.9, "{} {}", score.psnr, score.ssim);
+    }
+}

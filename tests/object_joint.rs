@@ -265,7 +265,8 @@ fn a_stop_ends_the_work_and_is_said() {
             stop.store(true, Ordering::Relaxed);
         }
     };
-    let error = estimate(&[view], &model, &Known::default(), &small(), &stop, &watch).unwrap_err();
+    let settings = ObjectSettings { followed: 1, pixels: 200, ..small() };
+    let error = estimate(&[view], &model, &Known::default(), &settings, &stop, &watch).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Stopped);
 }
 

@@ -120,18 +120,33 @@ fn references(folder: &std::path::Path, sub: &str, scene: &Scene, view: usize) -
 }
 
 #[test]
+fn a_picture_agrees_with_mitsubas_at_one_and_three_surface_hits() {
+    agree_with_mitsuba(&[0], 4);
+}
+
+#[test]
+#[ignore = "slow: two views at four times the samples"]
 fn pictures_agree_with_mitsuba_at_one_and_three_surface_hits() {
+    agree_with_mitsuba(&[0, 1], 16);
+}
+
+/// Compares views by their numbers, of `samples` samples a pixel in each of eight groups.
+fn agree_with_mitsuba(views: &[usize], samples: usize) {
     let Some(folder) = toys() else { return };
     let settings = ReadSettings { hold_out_every: 0, ..ReadSettings::default() };
     let scene = read(&folder, &settings).unwrap();
     let surface = Surface::new(scene.mesh.clone()).unwrap();
     let parameters = parameters(&scene, true);
-    let views = [0, 1].map(|name| scene.views.iter().position(|view| view.name.ends_with(&format!("{name:04}"))));
+    let views: Vec<usize> = views
+        .iter()
+        .filter_map(|name| scene.views.iter().position(|view| view.name.ends_with(&format!("{name:04}"))))
+        .collect();
+    assert!(!views.is_empty());
     let groups: usize = std::env::var("PATINA_TOYS_GROUPS").map_or(8, |groups| groups.parse().unwrap());
     for (sub, max_bounces, reference_samples) in [("views_d2", 1, 256), ("views", 3, 1024)] {
-        for view in views.into_iter().flatten() {
+        for &view in &views {
             let picture_settings = PictureSettings {
-                samples: 8,
+                samples,
                 groups,
                 max_bounces,
                 background_visible: false,
@@ -142,7 +157,7 @@ fn pictures_agree_with_mitsuba_at_one_and_three_surface_hits() {
             let stop = AtomicBool::new(false);
             let picture = render(&surface, &camera, &parameters, view as u32, &picture_settings, &stop);
             let reference = references(&folder, sub, &scene, view);
-            let own = compare(&picture, 8 * groups, &reference, reference_samples);
+            let own = compare(&picture, samples * groups, &reference, reference_samples);
             println!("{sub} view {view}: {own:?}");
             assert_eq!(picture.non_finite_pixels, 0);
             assert!(own.values > 20_000, "{sub} view {view}: {own:?}");
@@ -161,14 +176,14 @@ fn interpolating_the_logarithm_of_the_width_changes_pictures_by_less_than_a_thou
     let settings = ReadSettings { max_views: 2, hold_out_every: 0, ..ReadSettings::default() };
     let scene = read(&folder, &settings).unwrap();
     let surface = Surface::new(scene.mesh.clone()).unwrap();
+    let both = [false, true].map(|resample| parameters(&scene, resample));
     for max_bounces in [1, 3] {
         let picture_settings =
-            PictureSettings { samples: 16, max_bounces, background_visible: false, ..PictureSettings::default() };
-        let [ours, theirs] = [false, true].map(|resample| {
+            PictureSettings { samples: 8, max_bounces, background_visible: false, ..PictureSettings::default() };
+        let [ours, theirs] = both.each_ref().map(|parameters| {
             let stop = AtomicBool::new(false);
             let camera = scene.views[0].camera;
-            let parameters = parameters(&scene, resample);
-            let picture = render(&surface, &camera, &parameters, 0, &picture_settings, &stop);
+            let picture = render(&surface, &camera, parameters, 0, &picture_settings, &stop);
             picture.radiance.pixels().iter().map(|pixel| pixel.as_dvec3()).sum::<DVec3>().element_sum()
         });
         // The same random numbers: next to all of the noise cancels.

@@ -7,6 +7,7 @@ use crate::object::joint::{Known, estimate};
 use crate::object::prior::LightPriorKind;
 use crate::object::progress::ObjectEvent;
 use crate::object::read::{ObjectFiles, read_views};
+use crate::object::result_read::ObjectInputs;
 use crate::object::settings::{LightMethod, ObjectSettings};
 use crate::object::starts::{ModelKind, StartedModel};
 use crate::object::{result_folder, split, study};
@@ -149,7 +150,14 @@ pub fn object(options: &ObjectOptions, json: bool) -> Result<()> {
     };
     let mut found = estimate(&views, &model, &known, &settings, &stop, &watch)?;
     found.findings.splice(0..0, findings);
-    result_folder::write(&options.output, &views, &model, &found, &settings, &relights)?;
+    let inputs = ObjectInputs {
+        files,
+        light: options.env.clone(),
+        model: options.model,
+        lobes: options.lobes,
+        weights: options.weights.clone(),
+    };
+    result_folder::write(&options.output, &views, &model, &found, &settings, &inputs, &relights)?;
     if json {
         let line = serde_json::json!({
             "event": "finished", "run": options.output, "start": found.start, "seconds": found.seconds,

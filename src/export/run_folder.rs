@@ -143,6 +143,40 @@ impl RunFolder {
         file::write_exr_grey(&self.file("lobe_sharing.exr"), sharing)
     }
 
+    /// Reads standard deviations of the maps; `None` where a run has none.
+    ///
+    /// # Errors
+    /// Files that cannot be read.
+    pub fn read_deviations(&self) -> Result<Option<MaterialMaps>> {
+        const FILES: [&str; 3] = ["diffuse_deviation.exr", "specular_deviation.exr", "roughness_deviation.exr"];
+        if FILES.iter().any(|name| !self.file(name).is_file()) {
+            return Ok(None);
+        }
+        Ok(Some(MaterialMaps {
+            diffuse: self.read_rgb(FILES[0])?,
+            specular: self.read_rgb(FILES[1])?,
+            roughness: self.read_grey(FILES[2])?,
+        }))
+    }
+
+    /// Reads what each texel of the light is known by; `None` where a run does not say.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn read_light_evidence(&self) -> Result<Option<RgbImage>> {
+        let name = "environment_evidence.exr";
+        self.file(name).is_file().then(|| self.read_rgb(name)).transpose()
+    }
+
+    /// Reads the number of texels that share each texel's lobe; `None` where a run does not say.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn read_lobe_sharing(&self) -> Result<Option<GreyImage>> {
+        let name = "lobe_sharing.exr";
+        self.file(name).is_file().then(|| self.read_grey(name)).transpose()
+    }
+
     /// Reads the result. Before anything is read, all missing files are named in one error.
     pub fn read_result(&self) -> Result<RunResult> {
         let missing: Vec<&str> = RESULT_FILES.into_iter().filter(|name| !self.file(name).is_file()).collect();

@@ -56,7 +56,9 @@ pub fn scores(estimate: &RgbImage, truth: &RgbImage, mask: Option<&Image<bool>>)
 
 /// The scores that an estimate would have without its noise. `half_difference` is half the difference of two estimates
 /// with independent noise whose mean is `estimate`: its square is, in the mean, the variance of the noise, and is taken off
-/// squared differences and off the estimate's variance in windows of the similarity. Error: images of different sizes.
+/// squared differences and off the estimate's variance in windows of the similarity. An error too small to be told from
+/// that noise counts as large as one standard error of the difference: the root mean square error is never below what the
+/// samples can show, and the ratio never infinite on account of noise. Error: images of different sizes.
 pub fn scores_without_noise(
     estimate: &RgbImage,
     half_difference: Option<&RgbImage>,
@@ -70,11 +72,14 @@ pub fn scores_without_noise(
     }
     let mut squares = Squares::default();
     for index in counted.indices() {
+        let before = squares.difference;
         squares.add(estimate.pixels()[index].as_dvec3(), truth.pixels()[index].as_dvec3());
         if let Some(noise) = half_difference {
             squares.difference -= noise.pixels()[index].as_dvec3().length_squared();
+            squares.power += (squares.difference - before).powi(2);
         }
     }
+    squares.rise_to_one_standard_error();
     let rmse = squares.rmse();
     let noise = half_difference.map(luminance_or_zero);
     Ok(Scores {
@@ -128,6 +133,8 @@ struct Squares {
     difference: f64,
     truth: f64,
     pixels: usize,
+    /// Sum of the squares of what each pixel added to `difference`, where noise was taken off.
+    power: f64,
 }
 
 impl Squares {
@@ -135,6 +142,12 @@ impl Squares {
         self.difference += (estimate - truth).length_squared();
         self.truth += truth.length_squared();
         self.pixels += 1;
+    }
+
+    /// Where noise was taken off, the sum is known to about the root of the sum of its parts' variances.
+    fn rise_to_one_standard_error(&mut self) {
+        let variance = self.power - self.difference.powi(2) / self.pixels.max(1) as f64;
+        self.difference = self.difference.max(variance.max(0.0).sqrt());
     }
 
     fn rmse(&self) -> f64 {
@@ -215,9 +228,12 @@ fn ssim_map_without_noise(first: &GreyImage, half_difference: Option<&GreyImage>
         [x, y, x * x - noise * noise, y * y, x * y]
     });
     blurred(&moments).map(|&[mean_x, mean_y, square_x, square_y, product]| {
-        let variance_x = (square_x - mean_x * mean_x).max(0.0);
         let variance_y = (square_y - mean_y * mean_y).max(0.0);
         let covariance = product - mean_x * mean_y;
+        // However much noise is taken off, no variance is less than what goes along with the other image.
+        let least =
+            if half_difference.is_some() && variance_y > 0.0 { covariance * covariance / variance_y } else { 0.0 };
+        let variance_x = (square_x - mean_x * mean_x).max(least);
         // SSIM = (2 mu_x mu_y + C1)(2 sigma_xy + C2) / ((mu_x^2 + mu_y^2 + C1)(sigma_x^2 + sigma_y^2 + C2))
         (2.0 * mean_x * mean_y + C1) * (2.0 * covariance + C2)
             / ((mean_x * mean_x + mean_y * mean_y + C1) * (variance_x + variance_y + C2))

@@ -38,7 +38,7 @@ mod save;
 pub mod scale;
 pub mod shown;
 pub mod slot;
-mod solver_told;
+pub mod solver_told;
 pub mod study;
 pub mod tracer_speed;
 mod view;
@@ -46,6 +46,7 @@ pub mod worker;
 
 pub use prepare::RunSettings;
 pub use slot::Slot;
+pub use solver_told::SolverTold;
 pub use worker::{JobHandle, JobOptions, Wake, start, start_with};
 
 use crate::error::{Error, Finding};
@@ -147,4 +148,6 @@ pub struct Snapshot {
     pub log_gains: Vec<f32>,
     /// Disagreement of the views at each texel in the last step; `None` without consistency.
     pub agreement: Option<Arc<GreyImage>>,
+    /// What the solver tells beside them.
+    pub told: SolverTold,
 }

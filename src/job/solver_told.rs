@@ -11,26 +11,43 @@ use crate::material::MaterialMaps;
 use crate::math::sphere::solid_angle_of_texel;
 use glam::DVec3;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
-/// Asked once of a fit that is done; everything is `None` under Adam.
-pub(super) struct SolverTold {
-    deviations: Option<MaterialMaps>,
-    lobe_sharing: Option<GreyImage>,
-    light_evidence: Option<RgbImage>,
+/// What is told of maps and light; everything is `None` under Adam. Large parts are shared, so that a copy costs little.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SolverTold {
+    /// Standard deviations of the maps' values given the light, in their units; known once the maps are made.
+    pub deviations: Option<Arc<MaterialMaps>>,
+    /// Number of texels that share a texel's lobe, 0 where none was found; known once the maps are made.
+    pub lobe_sharing: Option<Arc<GreyImage>>,
+    /// What each texel of the light is known by: [`Fitter::light_evidence`].
+    pub light_evidence: Option<Arc<RgbImage>>,
 }
 
 impl SolverTold {
     /// Asks a fit.
     pub fn of(fitter: &Fitter) -> Self {
         SolverTold {
-            deviations: fitter.deviations(),
-            lobe_sharing: fitter.lobe_sharing(),
-            light_evidence: fitter.light_evidence(),
+            deviations: fitter.deviations().map(Arc::new),
+            lobe_sharing: fitter.lobe_sharing().map(Arc::new),
+            light_evidence: fitter.light_evidence().map(Arc::new),
         }
     }
 
+    /// Reads what a finished run of the solver left in its folder; a file that is not there is `None`.
+    ///
+    /// # Errors
+    /// Files that are there and cannot be read.
+    pub fn read(folder: &RunFolder) -> Result<Self> {
+        Ok(SolverTold {
+            deviations: folder.read_deviations()?.map(Arc::new),
+            lobe_sharing: folder.read_lobe_sharing()?.map(Arc::new),
+            light_evidence: folder.read_light_evidence()?.map(Arc::new),
+        })
+    }
+
     /// Writes what there is into the run folder.
-    pub fn write(&self, folder: &RunFolder) -> Result<()> {
+    pub(super) fn write(&self, folder: &RunFolder) -> Result<()> {
         if let Some(deviations) = &self.deviations {
             folder.write_deviations(deviations)?;
         }
@@ -44,7 +61,7 @@ impl SolverTold {
     }
 
     /// The facts of the report, with the error of transport. Empty under Adam.
-    pub fn facts(&self, transport: Option<TransportError>) -> Vec<Fact> {
+    pub(super) fn facts(&self, transport: Option<TransportError>) -> Vec<Fact> {
         let fact = |name: &str, value: String| Fact { name: name.into(), value };
         let mut facts = Vec::new();
         if let Some(error) = transport {
@@ -60,20 +77,13 @@ impl SolverTold {
             ));
         }
         if let Some(shares) = &self.light_evidence {
-            let (height, width) = (shares.height(), shares.width());
-            let mut mean = DVec3::ZERO;
-            for (texel, share) in shares.pixels().iter().enumerate() {
-                mean += share.as_dvec3() * solid_angle_of_texel(texel / width, width, height) / (4.0 * PI);
-            }
+            let mean = mean_shares(shares).map(|share| 100.0 * share);
             facts.push(fact(
             "what the light is known by",
             format!(
                 "highlights {:.0} %, background {:.0} %, diffuse light and shadows {:.0} %, belief that skies are smooth \
                  {:.0} % (means over the sphere; environment_evidence.exr has each texel)",
-                100.0 * mean.x,
-                100.0 * mean.y,
-                100.0 * mean.z,
-                100.0 * (1.0 - mean.element_sum())
+                mean[0], mean[1], mean[2], mean[3]
             ),
         ));
         }
@@ -110,4 +120,15 @@ impl SolverTold {
         ));
         facts
     }
+}
+
+/// Means over the sphere of what the texels of a light are known by: highlights, background, diffuse light and shadows,
+/// belief. They add up to 1.
+pub fn mean_shares(shares: &RgbImage) -> [f64; 4] {
+    let (height, width) = (shares.height(), shares.width());
+    let mut mean = DVec3::ZERO;
+    for (texel, share) in shares.pixels().iter().enumerate() {
+        mean += share.as_dvec3() * solid_angle_of_texel(texel / width, width, height) / (4.0 * PI);
+    }
+    [mean.x, mean.y, mean.z, 1.0 - mean.element_sum()]
 }

@@ -2,9 +2,10 @@
 
 use super::open::{OpenStage, Tell, open_scene_of, surface_of, told};
 use super::prepare::RunSettings;
+use super::solver_told::SolverTold;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::export::RunFolder;
-use crate::fit::{LossRow, checkpoint};
+use crate::fit::{LossRow, Method, checkpoint};
 use crate::image::{GreyImage, Image};
 use crate::insight::report::data::ReportData;
 use crate::light::Environment;
@@ -34,6 +35,8 @@ pub struct OpenedRun {
     pub report: Option<ReportData>,
     /// In how many photographs each texel was seen; `None` for a run that has not ended.
     pub times_seen: Option<GreyImage>,
+    /// What the solver tells beside maps and light; empty for a run that has not ended, and under Adam.
+    pub told: SolverTold,
     /// What could not be opened beside that.
     pub findings: Vec<Finding>,
     /// Whether the fit has ended and these are its results; otherwise `resume` goes on.
@@ -82,6 +85,14 @@ pub fn view_run(folder: &RunFolder, moved_scene: Option<&Path>, stop: &AtomicBoo
         let surface = told(OpenStage::Tracer, stop, tell, || surface_of(folder))?;
         (maps, environment, None, surface)
     };
+    // Files of the solver in the folder of another method are those of an earlier run.
+    let told = if is_finished && settings.fit.method == Method::Solver {
+        let told =
+            SolverTold::read(folder).map_err(|error| findings.push(finding_of("uncertainty-unreadable", &error)));
+        told.unwrap_or_default()
+    } else {
+        SolverTold::default()
+    };
     let report = if is_finished {
         folder.read_report_json().map_err(|error| findings.push(finding_of("report-unreadable", &error))).ok()
     } else {
@@ -107,6 +118,7 @@ pub fn view_run(folder: &RunFolder, moved_scene: Option<&Path>, stop: &AtomicBoo
         losses,
         report,
         times_seen,
+        told,
         findings,
         is_finished,
         can_resume,

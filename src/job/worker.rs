@@ -3,7 +3,7 @@
 use super::outcome;
 use super::prepare::{Prepared, RunSettings};
 use super::save::Saver;
-use super::{Command, Event, Progress, Slot, Snapshot};
+use super::{Command, Event, Progress, Slot, Snapshot, SolverTold};
 use crate::error::{Error, ErrorKind, Finding, Result, Severity, text_of_panic};
 use crate::export::RunFolder;
 use crate::fit::{FitSettings, Fitter, LossRow, Method, StepOutcome};
@@ -339,6 +339,7 @@ impl Worker {
             view_rmse: self.fitter.figures().view_rmse.clone(),
             log_gains: state.log_gains.clone(),
             agreement: self.fitter.figures().agreement.clone(),
+            told: SolverTold::of(&self.fitter),
         });
         self.teller.wake();
     }

@@ -237,7 +237,9 @@ mod tests {
             Ok(MeasuredBrdf::from_fn(|at| [0.1 + strength * (-(at.theta_half / 0.2).powi(2)).exp(); 3]))
         };
         let models = [Rival::Bivariate, Rival::Ward];
-        let (settings, stop) = (ModelFitSettings::default(), AtomicBool::new(false));
+        // Few steps: what is asked is which rows there are.
+        let settings = ModelFitSettings { followed: 1, scouting_steps: 2, steps: 4, ..Default::default() };
+        let stop = AtomicBool::new(false);
         let mut told = 0;
         let mut study = |known: &[RivalRow], stop: &AtomicBool| {
             rival_table(&["steel", "red-fabric"], &models, known, &table_of, &settings, stop, &mut |_| {
@@ -260,10 +262,10 @@ mod tests {
 
     #[test]
     fn keys_name_models() {
+        let table = MeasuredBrdf::from_fn(|_| [0.2; 3]);
         for rival in Rival::ALL {
             assert_eq!(Rival::of_key(rival.key()).unwrap(), rival);
-            let table = MeasuredBrdf::from_fn(|_| [0.2; 3]);
-            let settings = ModelFitSettings { scouting_steps: 1, steps: 1, ..Default::default() };
+            let settings = ModelFitSettings { followed: 1, scouting_steps: 1, steps: 1, ..Default::default() };
             assert_eq!(rival.fit(&table, &settings).unwrap().model.name(), rival.name());
         }
         assert!(Rival::of_key("phong").unwrap_err().remedy_text().contains("dsbrdf"));

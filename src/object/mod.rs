@@ -14,7 +14,7 @@
 //! | [`split`] | what the photo leaves open |
 //! | [`picture`] | re-renders and relit pictures |
 //! | [`settings`], [`progress`] | what is asked, what is told |
-//! | [`read`](mod@read), [`result_folder`], [`page`] | files that are read, what is left on disk |
+//! | [`read`](mod@read), [`result_folder`], [`result_read`], [`page`] | files that are read, what is left on disk, that read again |
 //! | [`study`] | the experiments of the paper |
 //!
 //! Any [`ReflectanceModel`](crate::measured::model::ReflectanceModel) can be estimated: it is asked for its values at
@@ -38,6 +38,7 @@ pub mod progress;
 pub mod read;
 pub mod reflectance_step;
 pub mod result_folder;
+pub mod result_read;
 pub mod screen;
 pub mod settings;
 pub mod split;

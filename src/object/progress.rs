@@ -2,7 +2,7 @@
 
 use super::nodes::NodeTable;
 use super::prior::LogLight;
-use crate::error::Result;
+use crate::error::{Error, ErrorKind, Place, Result};
 use std::path::Path;
 
 /// Which unknown a step was on.
@@ -91,4 +91,37 @@ pub fn write_rows(path: &Path, rows: &[ObjectiveRow]) -> Result<()> {
         );
     }
     crate::files::write_bytes(path, text.as_bytes())
+}
+
+/// Reads the rows of a `loss.csv`.
+///
+/// # Errors
+/// `Missing` without the file, `Malformed` with the line that cannot be read.
+pub fn read_rows(path: &Path) -> Result<Vec<ObjectiveRow>> {
+    let text = std::fs::read_to_string(path).map_err(|source| Error::reading(path, source))?;
+    let rows = text.lines().enumerate().skip(1).filter(|(_, line)| !line.trim().is_empty());
+    rows.map(|(index, line)| {
+        row_of(line).ok_or_else(|| {
+            Error::new(ErrorKind::Malformed, "this is no row of the objective")
+                .at(Place::Line(path.into(), index + 1))
+                .remedy("delete the line, or copy the folder anew")
+        })
+    })
+    .collect()
+}
+
+fn row_of(line: &str) -> Option<ObjectiveRow> {
+    let [step, round, kind, _, data, light_prior, code_prior, seconds, not_finite] =
+        <[&str; 9]>::try_from(line.split(',').map(str::trim).collect::<Vec<_>>()).ok()?;
+    let kinds = [StepKind::Start, StepKind::Light, StepKind::Reflectance];
+    Some(ObjectiveRow {
+        step: step.parse().ok()?,
+        round: round.parse().ok()?,
+        kind: kinds.into_iter().find(|own| own.label() == kind)?,
+        data: data.parse().ok()?,
+        light_prior: light_prior.parse().ok()?,
+        code_prior: code_prior.parse().ok()?,
+        seconds: seconds.parse().ok()?,
+        not_finite: not_finite.parse().ok()?,
+    })
 }

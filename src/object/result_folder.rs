@@ -17,6 +17,7 @@ use super::observations::ObjectView;
 use super::page::{self, Shown};
 use super::picture::render;
 use super::progress::write_rows;
+use super::result_read::ObjectInputs;
 use super::settings::ObjectSettings;
 use super::split::{Gauge, SplitSpread};
 use super::starts::StartedModel;
@@ -46,7 +47,7 @@ pub fn prepare(folder: &Path) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|source| Error::writing(folder, source))
 }
 
-/// Renders, and writes everything. `relights` are other lights with their names.
+/// Renders, and writes everything. `inputs` is what was estimated from; `relights` are other lights with their names.
 ///
 /// # Errors
 /// Files that cannot be written.
@@ -56,6 +57,7 @@ pub fn write(
     model: &StartedModel,
     estimate: &Estimate,
     settings: &ObjectSettings,
+    inputs: &ObjectInputs,
     relights: &[(String, Environment)],
 ) -> Result<()> {
     let grid = NodeGrid::new(settings.nodes);
@@ -82,8 +84,10 @@ pub fn write(
         "split": spread,
         "followed": estimate.candidates.iter().map(|candidate| serde_json::json!({
             "start": candidate.name, "objective": candidate.total(), "parameters": candidate.parameters,
+            "evidence": candidate.evidence,
         })).collect::<Vec<_>>(),
         "findings": estimate.findings,
+        "inputs": inputs.absolute(),
     });
     crate::files::write_bytes(&folder.join(MARK), format!("{json:#}\n").as_bytes())?;
 

@@ -12,7 +12,7 @@ use super::screen::Candidate;
 const AS_GOOD: f64 = 12.0;
 
 /// The level of a light, per channel, and the range that physics leaves for it.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Gauge {
     /// Geometric mean of the radiance over the sphere.
     pub light_mean: [f64; 3],
@@ -65,7 +65,7 @@ pub fn albedo(grid: &NodeGrid, table: &NodeTable, theta: f32) -> [f64; 3] {
 }
 
 /// How far apart starts are that explain the photo about as well.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SplitSpread {
     /// Names of these starts, the best first.
     pub starts: Vec<String>,

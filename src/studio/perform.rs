@@ -156,6 +156,10 @@ fn perform_on_view(act: Act, model: &mut Model) {
         Act::LayerRoughness => edits.layer = Layer::Roughness,
         Act::LayerNormal => edits.layer = Layer::Normal,
         Act::LayerTimesSeen => edits.layer = Layer::TimesSeen,
+        Act::LayerDiffuseDeviation => edits.layer = Layer::DiffuseDeviation,
+        Act::LayerSpecularDeviation => edits.layer = Layer::SpecularDeviation,
+        Act::LayerRoughnessDeviation => edits.layer = Layer::RoughnessDeviation,
+        Act::LayerLobeSharing => edits.layer = Layer::LobeSharing,
         Act::LayerPhotoError | Act::LayerCoverage | Act::LayerDisagreement => {
             edits.layer = match act {
                 Act::LayerPhotoError => Layer::PhotoError,

@@ -55,12 +55,12 @@ pub fn with_photo() -> TestStudio {
     studio
 }
 
-fn type_path(studio: &mut TestStudio, what: &str, path: &Path) {
+pub fn type_path(studio: &mut TestStudio, what: &str, path: &Path) {
     studio.replace_text(&format!("{what} path"), &path.display().to_string());
     studio.click(&format!("Add {what}"));
 }
 
-fn result_folder(studio: &mut TestStudio) -> PathBuf {
+pub fn result_folder(studio: &mut TestStudio) -> PathBuf {
     studio.model().object.outcome.as_ref().unwrap().folder.clone().unwrap()
 }
 

@@ -21,6 +21,8 @@ pub use eframe::egui::{Key, Modifiers};
 const PATIENCE: Duration = Duration::from_secs(240);
 /// The same where neither a task nor a fit is at work.
 const PATIENCE_AT_REST: Duration = Duration::from_secs(10);
+/// Between two looks at what is waited for.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(20);
 /// Steps of a fit that only a stop ends.
 pub const ENDLESS: usize = 100_000;
 
@@ -213,7 +215,8 @@ impl TestStudio {
             let is_at_rest = !is_at_work && !model.tasks.is_busy();
             let patience = if is_at_rest { PATIENCE_AT_REST } else { PATIENCE };
             assert!(began.elapsed() < patience, "{what} did not come; {:?}, {}", model.fit.status, self.log());
-            std::thread::sleep(Duration::from_millis(5));
+            // What is waited for works at a lower priority: frames would take its time.
+            std::thread::sleep(BETWEEN_LOOKS);
         }
     }
 

@@ -37,13 +37,13 @@ fn a_glossy_sphere_looks_as_the_path_tracer_says() {
         let mut frame = sphere_frame(maps, sky.clone());
         (frame.look.display, frame.look.backdrop, frame.content.lobe_strength) = (LINEAR, Backdrop::Light, 1.0);
         let eye = frame.eye;
-        let shown = pixels(&mut window(Vec2::new(96.0, 72.0), frame), |_| {});
+        let shown = pixels(&mut window(Vec2::new(72.0, 54.0), frame), |_| {});
         let surface = Surface::new(sphere(96, 48)).unwrap();
         let stop = AtomicBool::new(false);
-        let traced = render(&surface, &eye.as_camera(96, 72), &parameters, 0, &settings(256), &stop);
+        let traced = render(&surface, &eye.as_camera(72, 54), &parameters, 0, &settings(128), &stop);
         let (mut difference, mut sum) = (0.0, 0.0);
-        for row in 0..72 {
-            for column in 0..96 {
+        for row in 0..54 {
+            for column in 0..72 {
                 let expected = (traced.radiance[(row, column)] * 0.5).min(Vec3::ONE);
                 let found = Vec3::from_array(shown[(row, column)].map(f32::from)) / 255.0;
                 difference += (found - expected).abs().element_sum();

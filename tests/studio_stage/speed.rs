@@ -11,6 +11,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 #[test]
+#[ignore = "slow: a large scene drawn on the processor; times are printed for a person"]
 fn frame_times_of_a_large_scene() {
     if !has_adapter() {
         return;

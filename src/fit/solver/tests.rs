@@ -6,11 +6,18 @@ use crate::material::texels::{PyramidWeights, TexelPyramid, texels_from_maps};
 use crate::render::picture::{PictureSettings, render};
 use crate::render::{Parameters, Surface};
 use crate::scene::{Scene, demo};
+use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
 const SIZE: usize = 64;
 
-fn photographed() -> (Scene, Surface) {
+/// Photographed once for all tests.
+fn photographed() -> &'static (Scene, Surface) {
+    static SCENE: OnceLock<(Scene, Surface)> = OnceLock::new();
+    SCENE.get_or_init(photograph)
+}
+
+fn photograph() -> (Scene, Surface) {
     let settings = demo::DemoSettings { views: 12, held_out: 0, width: 80, height: 60, map_size: SIZE, seed: 1 };
     let mut scene = demo::build(&settings).unwrap().scene;
     let surface = Surface::new(scene.mesh.clone()).unwrap();
@@ -62,13 +69,13 @@ fn maps_are_recovered_under_a_known_light_and_bits_do_not_depend_on_threads() {
         pool.install(|| {
             let settings = SolverSettings { fixed_light: true, coarse_rounds: 1, fine_rounds: 0, ..settings() };
             let light = &scene.truth.as_ref().unwrap().environment;
-            let mut solver = Solver::new(&scene, &surface, settings, Some(light)).unwrap();
+            let mut solver = Solver::new(scene, surface, settings, Some(light)).unwrap();
             solver.run(&AtomicBool::new(false), &mut |_, _, _| {});
             solver.maps()
         })
     };
     let maps = run(2);
-    let (own, constant) = diffuse_error(&scene, &maps);
+    let (own, constant) = diffuse_error(scene, &maps);
     println!("diffuse {own:.4}, a constant {constant:.4}");
     assert!(own < 0.65 * constant, "{own} {constant}");
     assert!(maps.roughness.pixels().iter().all(|r| r.is_finite()));
@@ -78,11 +85,11 @@ fn maps_are_recovered_under_a_known_light_and_bits_do_not_depend_on_threads() {
 #[test]
 fn light_and_maps_are_found_together() {
     let (scene, surface) = photographed();
-    let mut solver = Solver::new(&scene, &surface, settings(), None).unwrap();
+    let mut solver = Solver::new(scene, surface, settings(), None).unwrap();
     let mut stages = Vec::new();
     solver.run(&AtomicBool::new(false), &mut |step, _, _| stages.push(step));
     assert_eq!(stages.len(), 4);
-    let (own, constant) = diffuse_error(&scene, &solver.maps());
+    let (own, constant) = diffuse_error(scene, &solver.maps());
     let light = solver.environment();
     let truth = &scene.truth.as_ref().unwrap().environment;
     println!("diffuse {own:.4}, a constant {constant:.4}");

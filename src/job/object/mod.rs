@@ -8,14 +8,17 @@
 //! its first round, writes the state after its last round. A folder that cannot be written leaves the result in memory,
 //! and [`ObjectParts::write`] can be asked again.
 //!
-//! [`look`] makes what is looked at, [`worker`](self) is the thread, [`parts`] a result that can be written and relit.
+//! [`look`] makes what is looked at, [`worker`](self) is the thread, [`parts`] a result that can be written and relit,
+//! [`reopen`] reads one from its folder again.
 
 pub mod look;
 pub mod parts;
+mod reopen;
 mod worker;
 
 pub use look::{LobeSlice, MaterialLook, ObjectLook};
 pub use parts::ObjectParts;
+pub use reopen::{ReopenedObject, reopen};
 
 use super::{Slot, Wake};
 use crate::error::{Error, ErrorKind, Finding, Result, text_of_panic};
@@ -23,6 +26,7 @@ use crate::image::{GreyImage, Image, RgbImage};
 use crate::light::Environment;
 use crate::object::progress::ObjectiveRow;
 use crate::object::read::ObjectFiles;
+use crate::object::result_read::ObjectInputs;
 use crate::object::settings::ObjectSettings;
 use crate::object::split::{Gauge, SplitSpread};
 use crate::object::starts::ModelKind;
@@ -49,6 +53,19 @@ pub struct ObjectRequest {
     pub relights: Vec<(String, Arc<Environment>)>,
     /// The result folder: new, empty, or one of an earlier estimation.
     pub output: PathBuf,
+}
+
+impl ObjectRequest {
+    /// What a result remembers of the request, so that it can be opened again.
+    fn inputs(&self) -> ObjectInputs {
+        ObjectInputs {
+            files: self.files.clone(),
+            light: self.light.clone(),
+            model: self.model,
+            lobes: self.lobes,
+            weights: None,
+        }
+    }
 }
 
 /// A photo as it was read.

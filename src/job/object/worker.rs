@@ -106,7 +106,7 @@ impl Worker {
         for finding in &found.findings {
             self.teller.send(ObjectNews::Finding(finding.clone()));
         }
-        let parts = Arc::new(ObjectParts::new(views, model, found, settings.clone()));
+        let parts = Arc::new(ObjectParts::new(views, model, found, settings.clone(), self.request.inputs()));
         let outcome = Box::new(self.finish(parts));
         self.teller.send(match is_whole {
             true => ObjectNews::Finished(outcome),
@@ -250,7 +250,8 @@ impl Worker {
     }
 }
 
-fn seen(view: &ObjectView) -> PhotoSeen {
+/// A view as it is shown.
+pub(super) fn seen(view: &ObjectView) -> PhotoSeen {
     let mut is_object = Image::filled(view.geometry.width, view.geometry.height, false);
     for pixel in &view.geometry.pixels {
         is_object[(pixel.row as usize, pixel.column as usize)] = true;

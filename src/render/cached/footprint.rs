@@ -96,6 +96,7 @@ impl ViewFootprints {
         view: u32,
         settings: &FootprintSettings,
     ) -> Self {
+        let corners = corners_of_pixels(surface, camera);
         let rows: Vec<ViewFootprints> = (0..camera.height)
             .into_par_iter()
             .map(|row| {
@@ -103,7 +104,9 @@ impl ViewFootprints {
                 let mut pieces = Vec::new();
                 for column in 0..camera.width {
                     let pixel = row * camera.width + column;
-                    let escaped = pieces_of_pixel(surface, camera, row, column, settings, &mut pieces);
+                    let first = row * (camera.width + 1) + column;
+                    let around = [0, 1, camera.width + 1, camera.width + 2].map(|step| &corners[first + step]);
+                    let escaped = pieces_of_pixel(surface, camera, row, column, settings, around, &mut pieces);
                     made.escaped.push(escaped);
                     for piece in &pieces {
                         made.add(surface, grid, piece, pixel as u32, view, settings);
@@ -246,6 +249,59 @@ struct Piece {
     reach: f32,
 }
 
+/// Place of a sample in its pixel, in [0, 1]^2: the points of Hammersley. However an edge lies, about its share of them
+/// falls on each side; on a square grid of 8 x 8 an edge along a row is off by up to a sixteenth of the pixel.
+fn place_in_pixel(sample: usize, total: usize) -> Vec2 {
+    let half = 0.5 / total as f32;
+    let mirrored = (sample as u32).reverse_bits() as f32 * (0.5f32).powi(32);
+    Vec2::new(sample as f32 / total as f32, mirrored) + half
+}
+
+/// What a ray through a place of the picture meets.
+enum Seen {
+    Background,
+    Back,
+    Front { point: SurfacePoint, reach: f32 },
+}
+
+/// Neighbours on one piece are not much farther apart than this multiple of a pixel's footprint.
+const REACH_PIXELS: f32 = 4.0;
+
+fn look(surface: &Surface, camera: &Camera, place: Vec2) -> (Seen, Vec3) {
+    let ray = camera.ray_through(place);
+    let Some(hit) = surface.closest(&ray) else { return (Seen::Background, ray.direction) };
+    let point = surface.point(&hit);
+    // Backs are black, as along a path.
+    if point.geometric_normal.dot(ray.direction) >= 0.0 || point.shading_normal.dot(ray.direction) >= 0.0 {
+        return (Seen::Back, ray.direction);
+    }
+    let cosine = point.geometric_normal.dot(-ray.direction).max(0.05);
+    let reach = REACH_PIXELS * camera.pixel_angle_radians() * hit.t / cosine;
+    (Seen::Front { point, reach }, ray.direction)
+}
+
+/// What lies at the corners of the pixels, row after row of `width + 1`. An edge that cuts off a corner passes by all
+/// places of a pixel's first samples; a ray at each corner, shared by four pixels, finds it.
+fn corners_of_pixels(surface: &Surface, camera: &Camera) -> Vec<Seen> {
+    let across = camera.width + 1;
+    (0..across * (camera.height + 1))
+        .into_par_iter()
+        .with_min_len(across)
+        .map(|corner| look(surface, camera, Vec2::new((corner % across) as f32, (corner / across) as f32)).0)
+        .collect()
+}
+
+impl Piece {
+    fn has(&self, point: &SurfacePoint, reach: f32) -> bool {
+        let reach = self.reach.max(reach);
+        self.first.shading_normal.dot(point.shading_normal) > ONE_PIECE
+            && (self.first.position - point.position).length() < reach
+            // Nor are they far apart on the atlas.
+            && (self.first.uv - point.uv).length()
+                < 2.0 * reach * point.uv_per_length.max(self.first.uv_per_length) + 1e-6
+    }
+}
+
 /// Fills `pieces` and returns the share of the pixel that escapes.
 fn pieces_of_pixel(
     surface: &Surface,
@@ -253,6 +309,7 @@ fn pieces_of_pixel(
     row: usize,
     column: usize,
     settings: &FootprintSettings,
+    corners: [&Seen; 4],
     pieces: &mut Vec<Piece>,
 ) -> f32 {
     let mut side = settings.coarse_side.max(1);
@@ -261,29 +318,18 @@ fn pieces_of_pixel(
         let mut escaped = 0usize;
         let total = side * side;
         for sample in 0..total {
-            let offset = Vec2::new((sample % side) as f32 + 0.5, (sample / side) as f32 + 0.5) / side as f32;
-            let ray = camera.ray_through(Vec2::new(column as f32, row as f32) + offset);
-            let Some(hit) = surface.closest(&ray) else {
-                escaped += 1;
-                continue;
+            let place = Vec2::new(column as f32, row as f32) + place_in_pixel(sample, total);
+            let (point, reach, direction) = match look(surface, camera, place) {
+                (Seen::Front { point, reach }, direction) => (point, reach, direction),
+                (Seen::Background, _) => {
+                    escaped += 1;
+                    continue;
+                }
+                (Seen::Back, _) => continue,
             };
-            let point = surface.point(&hit);
-            // Backs are black, as along a path.
-            if point.geometric_normal.dot(ray.direction) >= 0.0 || point.shading_normal.dot(ray.direction) >= 0.0 {
-                continue;
-            }
             let tap = TextureTap::at(point.uv, 0, settings.map_size, settings.map_size);
-            // Neighbours on one piece are not much farther apart than a pixel's footprint, nor far apart on the atlas.
-            let cosine = point.geometric_normal.dot(-ray.direction).max(0.05);
-            let reach = 4.0 * camera.pixel_angle_radians() * hit.t / cosine;
-            let known = pieces.iter_mut().find(|piece| {
-                piece.first.shading_normal.dot(point.shading_normal) > ONE_PIECE
-                    && (piece.first.position - point.position).length() < piece.reach.max(reach)
-                    && (piece.first.uv - point.uv).length()
-                        < 2.0 * piece.reach.max(reach) * point.uv_per_length.max(piece.first.uv_per_length) + 1e-6
-            });
-            let piece = match known {
-                Some(piece) => piece,
+            let index = match pieces.iter().position(|piece| piece.has(&point, reach)) {
+                Some(index) => index,
                 None => {
                     pieces.push(Piece {
                         samples: 0,
@@ -298,15 +344,13 @@ fn pieces_of_pixel(
                         first: point,
                         reach,
                     });
-                    match pieces.last_mut() {
-                        Some(piece) => piece,
-                        None => continue,
-                    }
+                    pieces.len() - 1
                 }
             };
+            let piece = &mut pieces[index];
             piece.samples += 1;
             piece.normal += point.shading_normal;
-            piece.to_viewer -= ray.direction;
+            piece.to_viewer -= direction;
             piece.position += point.position;
             piece.uv += point.uv;
             piece.places.push(point.uv);
@@ -315,7 +359,13 @@ fn pieces_of_pixel(
         for piece in pieces.iter_mut() {
             piece.share = piece.samples as f32 / total as f32;
         }
-        let agree = (pieces.len() == 1 && pieces[0].samples == total) || (pieces.is_empty() && escaped == total);
+        let agree = match pieces.as_slice() {
+            [piece] if piece.samples == total => {
+                corners.iter().all(|corner| matches!(corner, Seen::Front { point, reach } if piece.has(point, *reach)))
+            }
+            [] if escaped == total => corners.iter().all(|corner| matches!(corner, Seen::Background)),
+            _ => false,
+        };
         if agree || side >= settings.fine_side {
             return escaped as f32 / total as f32;
         }

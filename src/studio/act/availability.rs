@@ -99,9 +99,14 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
             need(has_views, "there are no photos")?;
             need(has_maps, "there are no maps yet: start a fit")
         }
-        Act::LayerDiffuse | Act::LayerSpecular | Act::LayerRoughness | Act::LayerTimesSeen => {
-            need(has_maps, "there are no maps yet: start a fit")
-        }
+        Act::LayerDiffuse
+        | Act::LayerSpecular
+        | Act::LayerRoughness
+        | Act::LayerTimesSeen
+        | Act::LayerDiffuseDeviation
+        | Act::LayerSpecularDeviation
+        | Act::LayerRoughnessDeviation
+        | Act::LayerLobeSharing => need(has_maps, "there are no maps yet: start a fit"),
         Act::FittedLight => need(has_maps, "there is no fitted light yet"),
         Act::ChartBorders => {
             need(project.is_some_and(|project| project.surface.is_some()), "the atlas is not made yet")

@@ -1,20 +1,71 @@
 //! From what is asked to a job, from its result to relit pictures, and from a dropped file to what is asked.
 
 use super::lights::LightName;
+use super::log::Message;
 use super::object::RelitObject;
-use super::object_form::is_photo;
-use super::{Done, Model, store};
-use crate::job::object::{self, ObjectJobOptions, ObjectOutcome, ObjectRequest};
+use super::object_form::{ObjectForm, is_photo};
+use super::{Done, Model, Workspace, store};
+use crate::error::{Error, ErrorKind, Place};
+use crate::job::object::{self, ObjectJobOptions, ObjectOutcome, ObjectRequest, ReopenedObject};
 use crate::light::Environment;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Title of the task that shows the object under the lights of the shelf.
 pub const RELIGHT_TITLE: &str = "Relighting the object";
+/// Title of the task that opens a result.
+pub const OPEN_TITLE: &str = "Opening the result";
 /// Lights that are written into a result folder, at most.
 const MOST_RELIGHTS: usize = 8;
 
 impl Model {
+    /// Opens a result folder and shows it in object mode. While an estimation runs or waits to be saved, it is left alone.
+    pub fn open_object(&mut self, folder: PathBuf) {
+        self.workspace = Workspace::Object;
+        let is_unsaved = self.object.outcome.as_ref().is_some_and(|own| own.folder.is_none());
+        if self.object.status.is_live() || is_unsaved {
+            let why = if is_unsaved { "the last result is not on disk yet" } else { "an estimation is in progress" };
+            return self.log.error(
+                &Error::new(ErrorKind::Unsupported, format!("the result was not opened: {why}"))
+                    .at(Place::File(folder))
+                    .remedy("stop the estimation or save its result, then open this one again"),
+            );
+        }
+        self.log.dismiss();
+        let folder = std::path::absolute(&folder).unwrap_or(folder);
+        self.tasks.spawn(OPEN_TITLE, move |context| {
+            context.tell("reading the result", 0.0);
+            Ok(Done::ObjectOpened(Box::new(object::reopen(&folder)?)))
+        });
+    }
+
+    pub(super) fn object_was_opened(&mut self, opened: ReopenedObject) {
+        for finding in &opened.findings {
+            self.log.add(Message::from(finding));
+        }
+        let inputs = opened.outcome.parts.inputs.clone();
+        let files = inputs.files;
+        let form = &mut self.edits.object;
+        *form = ObjectForm {
+            photos: files.photos,
+            masks: files.masks,
+            is_sphere: files.mesh.is_none(),
+            mesh: files.mesh.map(|mesh| mesh.display().to_string()).unwrap_or_default(),
+            cameras: files.cameras,
+            light: inputs.light.map(|light| light.display().to_string()).unwrap_or_default(),
+            model: inputs.model,
+            lobes: inputs.lobes,
+            ..form.clone()
+        };
+        self.history.restart(&self.edits);
+        self.object.show(opened);
+        if let Some(folder) = self.object.outcome.as_ref().and_then(|outcome| outcome.folder.clone()) {
+            self.preferences.remember(&folder, true);
+            self.log.note(format!("Opened {}", folder.display()));
+        }
+        self.relight_object();
+    }
+
     /// Starts an estimation of what is asked for.
     pub fn start_object(&mut self) {
         let form = &self.edits.object;
@@ -60,6 +111,9 @@ impl Model {
     pub(super) fn poll_object(&mut self) -> bool {
         let (changed, came) = self.object.poll(&mut self.log);
         if came {
+            if let Some(folder) = self.object.outcome.as_ref().and_then(|outcome| outcome.folder.clone()) {
+                self.preferences.remember(&folder, true);
+            }
             self.relight_object();
         }
         changed
@@ -79,6 +133,7 @@ impl Model {
         self.tasks.spawn(RELIGHT_TITLE, move |context| {
             let maps: Vec<&Environment> = lights.iter().map(|(_, light)| light.as_ref()).collect();
             context.tell("the object", 0.0);
+            // Without its photos there is no object to show.
             let pictures = outcome.parts.relit(&maps);
             let mut relit = Vec::new();
             for (index, ((name, light), picture)) in lights.iter().zip(pictures).enumerate() {

@@ -1,6 +1,7 @@
 //! What the window knows, without any widget.
 //!
-//! [`Model`] joins the parts: [`project`] is what is open, [`fit`] the job, [`edits`] what undo covers, [`lights`] the
+//! [`Model`] joins the parts: [`project`] is what is open, [`fit`] the job,
+//! [`known`] what the solver is sure of, [`edits`] what undo covers, [`lights`] the
 //! shelf, [`tasks`] work beside the window, [`log`] what was noticed, [`store`] what is remembered. [`opening`] and
 //! [`starting`] are how a folder becomes a project and a project a fit, [`viewing`] where the eye stands, [`dialogs`] what
 //! is asked in windows over the window. In object mode [`object_form`] is what is asked for, [`object`] the estimation,
@@ -11,6 +12,7 @@ pub mod dialogs;
 pub mod edits;
 pub mod estimating;
 pub mod fit;
+pub mod known;
 pub mod lights;
 pub mod log;
 pub mod materials;
@@ -76,6 +78,8 @@ pub enum Done {
     Entangled(Box<crate::job::entanglement::Entanglement>),
     /// The estimated object under the lights of the shelf.
     ObjectRelit(Vec<object::RelitObject>),
+    /// A result of object mode was read from its folder.
+    ObjectOpened(Box<crate::job::object::ReopenedObject>),
     /// The result of an estimation was written to a folder.
     ObjectSaved(PathBuf),
     /// The library of materials with its thumbnails.
@@ -301,6 +305,7 @@ impl Model {
                 }
             }
             Done::ObjectRelit(relit) => self.object.relit = relit,
+            Done::ObjectOpened(opened) => self.object_was_opened(*opened),
             Done::ObjectSaved(folder) => self.object_was_saved(folder),
             Done::MaterialsDrawn(library, pictures) => self.materials_were_drawn(library, pictures),
             Done::MaterialShown(shown) => self.materials.shown = Some(Arc::from(shown)),
@@ -318,6 +323,7 @@ impl Model {
             // What was measured on older maps no longer holds.
             project.photo_error = None;
             project.disagreement = None;
+            project.known = known::Known::of(snapshot.told.clone());
             self.shelf.put(ShelfLight::new(LightName::Fitted, Arc::clone(&snapshot.environment)));
             if self.light_was_chosen_for_us.take().is_some_and(|sky| self.edits.relight.first == sky) {
                 self.edits.relight.first = LightName::Fitted;

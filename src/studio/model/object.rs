@@ -3,7 +3,7 @@
 use super::lights::LightName;
 use super::log::{Log, Message, capitalised};
 use crate::image::{GreyImage, RgbImage};
-use crate::job::object::{MaterialLook, ObjectJob, ObjectLook, ObjectNews, ObjectOutcome, PhotoSeen};
+use crate::job::object::{MaterialLook, ObjectJob, ObjectLook, ObjectNews, ObjectOutcome, PhotoSeen, ReopenedObject};
 use crate::light::Environment;
 use crate::object::progress::ObjectiveRow;
 use std::sync::Arc;
@@ -87,6 +87,20 @@ impl ObjectControl {
     /// Takes over a job that was just started.
     pub(super) fn begin(&mut self, job: ObjectJob, rounds: usize) {
         *self = ObjectControl { job: Some(job), status: ObjectStatus::Running, rounds, ..ObjectControl::default() };
+    }
+
+    /// Shows a result that was read from its folder.
+    pub(super) fn show(&mut self, opened: ReopenedObject) {
+        let ReopenedObject { photos, outcome, findings } = opened;
+        *self = ObjectControl {
+            status: ObjectStatus::Finished,
+            photos,
+            rows: outcome.parts.estimate.rows.clone(),
+            rounds: outcome.parts.settings.outer_loops,
+            findings,
+            outcome: Some(Arc::new(outcome)),
+            ..ObjectControl::default()
+        };
     }
 
     /// Asks the job to end.

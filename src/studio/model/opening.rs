@@ -12,6 +12,7 @@ use crate::insight::report::data::StageTime;
 use crate::job::demo;
 use crate::job::open::{self, OpenStage, OpenedRun, OpenedScene, PathKind};
 use crate::job::prepare::{Prepared, RunSettings, prepare_with};
+use crate::object::result_read;
 use crate::scene::demo::DemoSettings;
 use crate::scene::{Mesh, ReadSettings, Scene};
 use crate::studio::stage::eye::OrbitEye;
@@ -51,11 +52,14 @@ pub struct RunRead {
 }
 
 impl Model {
-    /// Opens a scene or run folder; a picture is a photo for object mode.
+    /// Opens a scene or run folder; a picture is a photo for object mode, a result of object mode is shown there.
     pub fn open(&mut self, path: PathBuf) {
         if super::object_form::is_photo(&path) && path.is_file() {
             self.workspace = Workspace::Object;
             return self.object_dropped(&path);
+        }
+        if result_read::is_result(&path) {
+            return self.open_object(path);
         }
         self.open_with(path, ReadSettings::default());
     }
@@ -222,6 +226,7 @@ impl Model {
             maps: Some(Arc::new(run.maps)),
             environment: Some(environment),
             times_seen: run.times_seen.map(Arc::new),
+            known: super::known::Known::of(run.told),
             view_errors: errors.unwrap_or_else(|| vec![None; views]),
             clipped_shares,
             thumbnails,

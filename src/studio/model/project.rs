@@ -1,5 +1,6 @@
 //! What is open: a scene, and the maps and light that belong to it.
 
+use super::known::Known;
 use super::lights::LightName;
 use crate::atlas::{AtlasQuality, chart_borders};
 use crate::error::Finding;
@@ -72,6 +73,8 @@ pub struct Project {
     pub coverage: Option<Arc<GreyImage>>,
     /// Disagreement of the photos in [0, 1].
     pub disagreement: Option<Arc<GreyImage>>,
+    /// What the solver tells of its maps and light; empty under Adam.
+    pub known: Known,
     /// Errors at the two ends of the colour scale.
     pub photo_error_range: [f32; 2],
     /// Disagreements at the two ends of the colour scale.

@@ -1,6 +1,6 @@
 //! The fitted environment: as a map of all directions and as two balls, beside the truth where one is known.
 
-use super::empty;
+use super::{empty, light_known};
 use crate::image::RgbImage;
 use crate::image::display::DisplaySettings;
 use crate::light::Environment;
@@ -8,7 +8,7 @@ use crate::light::ball::{matte_ball, mirror_ball};
 use crate::math::sphere::direction_of_angles;
 use crate::studio::model::Model;
 use crate::studio::model::lights::LightName;
-use crate::studio::picture::{self, Compare, Comparison, Overlay, PictureView, Source};
+use crate::studio::picture::{self, Compare, Comparison, Overlay, PictureView, Place, Source};
 use egui::{Align, Layout, RichText, Ui, vec2};
 use std::sync::Arc;
 
@@ -25,6 +25,8 @@ pub struct LightMemory {
     balls: Option<(Arc<Environment>, [Arc<RgbImage>; 2])>,
     picture: Option<(Arc<Environment>, Arc<RgbImage>)>,
     truth: Option<(Arc<Environment>, Arc<RgbImage>)>,
+    shows_known: bool,
+    known: light_known::KnownMemory,
 }
 
 /// Draws the panel.
@@ -32,6 +34,14 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut LightMemory) {
     let Some(environment) = model.project.as_ref().and_then(|project| project.environment.clone()) else {
         return empty(ui, "No light yet", "The fitted environment appears with the first steps of the fit");
     };
+    ui.horizontal(|ui| {
+        ui.selectable_value(&mut memory.shows_known, false, "Radiance").on_hover_text("The light that was fitted");
+        ui.selectable_value(&mut memory.shows_known, true, "Known by")
+            .on_hover_text("What each texel of it is known by: highlights, background, diffuse light, or belief alone");
+    });
+    if memory.shows_known {
+        return light_known::show(ui, model, &mut memory.known);
+    }
     let truth = model.shelf.find(&LightName::Truth).map(|light| Arc::clone(&light.environment));
     let display = model.edits.display;
     draw(ui, model, memory, "Environment", &environment, truth, &display);
@@ -78,17 +88,21 @@ pub fn draw(
         let response = picture::show(ui, label, &source, display, &mut memory.view, &overlay);
         memory.wipe = response.wipe.or(memory.wipe);
         if let Some(place) = response.hovered {
-            let direction = direction_of_angles(
-                place.column / environment.width() as f32 * std::f32::consts::TAU,
-                place.row / environment.height() as f32 * std::f32::consts::PI,
-            );
-            let azimuth = direction.x.atan2(-direction.z).to_degrees().rem_euclid(360.0);
-            let elevation = direction.y.clamp(-1.0, 1.0).asin().to_degrees();
-            model.hovered_value =
-                picture::describe(place, response.value, &[("azimuth", azimuth), ("elevation", elevation)]);
+            let named = place_words(place, (environment.width(), environment.height()));
+            model.hovered_value = picture::describe(place, response.value, &named);
         }
     });
     balls(ui, display, memory, environment);
+}
+
+/// Azimuth and elevation in degrees of a place on a map of all directions, with their names.
+pub(super) fn place_words(place: Place, size: (usize, usize)) -> [(&'static str, f32); 2] {
+    let direction = direction_of_angles(
+        place.column / size.0 as f32 * std::f32::consts::TAU,
+        place.row / size.1 as f32 * std::f32::consts::PI,
+    );
+    let azimuth = direction.x.atan2(-direction.z).to_degrees().rem_euclid(360.0);
+    [("azimuth", azimuth), ("elevation", direction.y.clamp(-1.0, 1.0).asin().to_degrees())]
 }
 
 /// The pixels of a light behind a pointer that stays while the light does.

@@ -6,6 +6,7 @@ use crate::insight::cursor::surface_point_of_uv;
 use crate::material::MaterialMaps;
 use crate::studio::act::Act;
 use crate::studio::layout::Panel;
+use crate::studio::model::known::Told;
 use crate::studio::model::{Cursor, Model, Project};
 use crate::studio::picture::{self, LineSpace, Lines, Mark, Overlay, PictureView, Place, Source};
 use crate::studio::theme;
@@ -23,16 +24,29 @@ enum Map {
     TimesSeen,
     PhotoError,
     Disagreement,
+    Told(Told),
 }
 
 impl Map {
-    const ALL: [(Map, &'static str, &'static str); 6] = [
+    const ALL: [(Map, &'static str, &'static str); 10] = [
         (Map::Diffuse, "Diffuse", "Diffuse reflectance, linear RGB"),
         (Map::Specular, "Specular", "Specular reflectance F0, linear RGB"),
         (Map::Roughness, "Roughness", "r, the square of the microfacet width"),
         (Map::TimesSeen, "Seen", "How many photos see a texel; hatched: none"),
         (Map::PhotoError, "Error", "Root mean square error over the photos that see a texel"),
         (Map::Disagreement, "Disagreement", "Variance over photos of the gradient by diffuse, in [0, 1]"),
+        (Map::Told(Told::Diffuse), "± diffuse", "Standard deviation of diffuse given the light, mean of the channels"),
+        (
+            Map::Told(Told::Specular),
+            "± specular",
+            "Standard deviation of specular given the light, mean of the channels",
+        ),
+        (Map::Told(Told::Roughness), "± roughness", "Standard deviation of roughness given the light"),
+        (
+            Map::Told(Told::LobeSharing),
+            "Shared lobe",
+            "How many texels share a texel's lobe; hatched: taken over from neighbours",
+        ),
     ];
 }
 
@@ -59,6 +73,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut MapsMemory) {
             let response = ui.add_enabled(there, button).on_hover_text(help);
             let why = match map {
                 Map::TimesSeen => "Counted when a fit is done, or with the error of the photos",
+                Map::Told(_) => model.why_untold(),
                 _ => "Measure it first: View, Measure photo error",
             };
             if response.on_disabled_hover_text(why).clicked() {
@@ -113,6 +128,7 @@ fn is_there(project: &Project, map: Map) -> bool {
         Map::TimesSeen => project.times_seen.is_some(),
         Map::PhotoError => project.photo_error.is_some(),
         Map::Disagreement => project.disagreement.is_some(),
+        Map::Told(what) => project.known.has(what),
     }
 }
 
@@ -150,6 +166,12 @@ fn source(project: &Project, memory: &mut MapsMemory) -> Option<(Source, (usize,
         Map::Disagreement => {
             let [low, high] = project.disagreement_range;
             Source::numbers(Arc::clone(project.disagreement.as_ref()?), ValueScale::linear(low, high))
+        }
+        Map::Told(what) => {
+            let layer = project.known.layer(what)?;
+            let [low, high] = layer.range;
+            let scale = ValueScale { low, high, logarithmic: layer.is_by_factors() };
+            Source::numbers(Arc::clone(&layer.texels), scale)
         }
     };
     let size = source.size();

@@ -9,6 +9,7 @@ pub mod dialog;
 pub mod fit;
 pub mod form;
 pub mod light;
+pub mod light_known;
 pub mod maps;
 pub mod menu;
 pub mod messages;

@@ -1,8 +1,10 @@
 //! The texel under the cursor: its values, the photos that see it, and what each of them says.
 
 use super::{empty, heading};
+use crate::image::value_scale::three_digits;
 use crate::insight::record::{RecordSettings, TexelRecord, texel_record};
 use crate::job::background;
+use crate::studio::model::known::Told;
 use crate::studio::model::{Cursor, Model};
 use crate::studio::theme;
 use egui::{Color32, Grid, RichText, ScrollArea, Ui};
@@ -117,6 +119,7 @@ fn ask(ui: &Ui, model: &Model, cursor: &Cursor, memory: &mut RecordMemory) {
 fn body(ui: &mut Ui, model: &mut Model, record: &TexelRecord) {
     let (row, column) = record.texel;
     ui.label(format!("Texel row {row}, column {column}"));
+    let uncertainty = uncertainty(model, record.texel);
     Grid::new("values").num_columns(2).spacing([12.0, 3.0]).show(ui, |ui| {
         let mut line = |name: &str, value: String, help: &str| {
             ui.label(name).on_hover_text(help);
@@ -126,6 +129,9 @@ fn body(ui: &mut Ui, model: &mut Model, record: &TexelRecord) {
         line("Diffuse", rgb(record.diffuse), "Diffuse reflectance, linear");
         line("Specular", rgb(record.specular), "Specular reflectance F0, linear");
         line("Roughness", format!("{:.4}", record.roughness), "r, the square of the microfacet width");
+        for (name, value, help) in uncertainty {
+            line(name, value, help);
+        }
         line("Seen by", format!("{} photos", record.rows.len()), "Photos whose view of the texel nothing blocks");
         line("Resolved to", format!("{:.2} texels a pixel", record.footprint_texels), "Above 1 no photo resolves single texels here");
         line("Spread of views", format!("{:.0} degrees", record.view_spread_degrees), "Small: shine cannot be told from colour");
@@ -171,6 +177,24 @@ fn body(ui: &mut Ui, model: &mut Model, record: &TexelRecord) {
             ui.end_row();
         }
     });
+}
+
+/// What the solver tells of a texel, as lines; none under Adam.
+fn uncertainty(model: &Model, (row, column): (usize, usize)) -> Vec<(&'static str, String, &'static str)> {
+    let Some(project) = &model.project else { return Vec::new() };
+    let named = [
+        (Told::Diffuse, "± diffuse", "Standard deviation given the light, mean of the channels"),
+        (Told::Specular, "± specular", "Standard deviation given the light, mean of the channels"),
+        (Told::Roughness, "± roughness", "Standard deviation given the light"),
+        (Told::LobeSharing, "Shared lobe", "Texels that share this texel's specular lobe"),
+    ];
+    let line = |(what, name, help): (Told, &'static str, &'static str)| {
+        let texels = &project.known.layer(what)?.texels;
+        let value = (row < texels.height() && column < texels.width()).then(|| texels[(row, column)])?;
+        let words = if value.is_nan() { "taken over from neighbours".into() } else { three_digits(value) };
+        Some((name, words, help))
+    };
+    named.into_iter().filter_map(line).collect()
 }
 
 fn rgb(value: Vec3) -> String {

@@ -88,6 +88,10 @@ fn layers(ui: &mut Ui, model: &mut Model) {
         (Act::LayerTimesSeen, Layer::TimesSeen),
         (Act::LayerCoverage, Layer::Coverage),
         (Act::LayerDisagreement, Layer::Disagreement),
+        (Act::LayerDiffuseDeviation, Layer::DiffuseDeviation),
+        (Act::LayerSpecularDeviation, Layer::SpecularDeviation),
+        (Act::LayerRoughnessDeviation, Layer::RoughnessDeviation),
+        (Act::LayerLobeSharing, Layer::LobeSharing),
     ];
     let chosen = further.iter().find(|(_, layer)| *layer == model.edits.layer);
     let text = chosen.map_or("More", |(act, _)| act.name());

@@ -35,13 +35,21 @@ pub enum Layer {
     TimesSeen,
     /// The quantity of the content: how far the gradients of the photos disagree.
     Disagreement,
+    /// The quantity of the content: standard deviation of the diffuse map.
+    DiffuseDeviation,
+    /// The quantity of the content: standard deviation of the specular map.
+    SpecularDeviation,
+    /// The quantity of the content: standard deviation of the roughness map.
+    RoughnessDeviation,
+    /// The quantity of the content: how many texels share a lobe.
+    LobeSharing,
     /// A checker of texture coordinates.
     Uv,
 }
 
 impl Layer {
     /// All layers with their names on screen.
-    pub const NAMED: [(Layer, &str); 10] = [
+    pub const NAMED: [(Layer, &str); 14] = [
         (Layer::Lit, "Lit"),
         (Layer::Diffuse, "Diffuse"),
         (Layer::Specular, "Specular"),
@@ -51,12 +59,18 @@ impl Layer {
         (Layer::Coverage, "Coverage"),
         (Layer::TimesSeen, "Times seen"),
         (Layer::Disagreement, "Disagreement"),
+        (Layer::DiffuseDeviation, "Uncertainty of diffuse"),
+        (Layer::SpecularDeviation, "Uncertainty of specular"),
+        (Layer::RoughnessDeviation, "Uncertainty of roughness"),
+        (Layer::LobeSharing, "Texels that share a lobe"),
         (Layer::Uv, "Texture coordinates"),
     ];
 
     /// Whether the layer shows [`StageContent::quantity`] by the colour scale.
     pub fn is_quantity(self) -> bool {
-        matches!(self, Layer::PhotoError | Layer::Coverage | Layer::TimesSeen | Layer::Disagreement)
+        use Layer::*;
+        matches!(self, PhotoError | Coverage | TimesSeen | Disagreement)
+            || matches!(self, DiffuseDeviation | SpecularDeviation | RoughnessDeviation | LobeSharing)
     }
 }
 

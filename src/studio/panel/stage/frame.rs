@@ -5,6 +5,7 @@ use crate::job::prepare::covered;
 use crate::render::Surface;
 use crate::scene::Scene;
 use crate::studio::model::edits::PhotoLook;
+use crate::studio::model::known::Told;
 use crate::studio::model::lights::LightName;
 use crate::studio::model::{Model, Project};
 use crate::studio::stage::eye::Eye;
@@ -178,6 +179,22 @@ fn quantity(project: &Project, layer: Layer) -> Option<StageQuantity> {
         Layer::Coverage => of(&project.coverage, [0.0, 1.0]),
         Layer::TimesSeen => of(&project.times_seen, [0.0, project.view_count().max(1) as f32]),
         Layer::Disagreement => of(&project.disagreement, project.disagreement_range),
+        _ => {
+            let layer = project.known.layer(told_by(layer)?)?;
+            let [low, high] = layer.range;
+            let range = if layer.is_by_factors() { [low.log2(), high.log2()] } else { layer.range };
+            Some(StageQuantity { texels: Arc::clone(&layer.even), range })
+        }
+    }
+}
+
+/// What a layer of the solver shows; `None` for the others.
+pub(super) fn told_by(layer: Layer) -> Option<Told> {
+    match layer {
+        Layer::DiffuseDeviation => Some(Told::Diffuse),
+        Layer::SpecularDeviation => Some(Told::Specular),
+        Layer::RoughnessDeviation => Some(Told::Roughness),
+        Layer::LobeSharing => Some(Told::LobeSharing),
         _ => None,
     }
 }

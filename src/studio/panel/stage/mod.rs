@@ -3,6 +3,7 @@
 mod frame;
 mod traced;
 
+use crate::image::value_scale::three_digits;
 use crate::insight::cursor::place_in_view;
 use crate::studio::act::Act;
 use crate::studio::layout::Panel;
@@ -227,7 +228,15 @@ fn decorate(ui: &mut Ui, model: &Model, frame: &StageFrame, rect: Rect, traced: 
     let name = Layer::NAMED.iter().find(|(layer, _)| *layer == model.edits.layer).map_or("", |(_, name)| name);
     let lit = model.edits.layer == Layer::Lit;
     let relight = &model.edits.relight;
-    caption(Align2::LEFT_TOP, &if lit { relight.first.label() } else { name.to_owned() });
+    let told = frame::told_by(model.edits.layer);
+    caption(
+        Align2::LEFT_TOP,
+        &match told.and_then(|what| model.project.as_ref()?.known.layer(what)) {
+            _ if lit => relight.first.label(),
+            Some(layer) => format!("{name}: {} to {}", three_digits(layer.range[0]), three_digits(layer.range[1])),
+            None => name.to_owned(),
+        },
+    );
     if let (Some(second), Some(share), true) = (&relight.second, frame.look.light_wipe, lit) {
         caption(Align2::RIGHT_TOP, &second.label());
         handle(&painter, rect, share, colours.accent);
@@ -246,7 +255,9 @@ fn decorate(ui: &mut Ui, model: &Model, frame: &StageFrame, rect: Rect, traced: 
     caption(Align2::LEFT_BOTTOM, &left);
     let quick = lit && frame.content.traced.is_none();
     let clay = model.project.as_ref().is_some_and(|project| project.maps.is_none());
+    let is_untold = told.is_some_and(|what| !model.project.as_ref().is_some_and(|own| own.known.has(what)));
     let right = match (quick, clay) {
+        _ if is_untold => model.why_untold(),
         (_, true) if lit => "No materials yet: start the fit",
         (true, _) if matches!(model.fit.status, FitStatus::Running | FitStatus::Pausing) => {
             "Quick look without shadows; pause to see it traced"
