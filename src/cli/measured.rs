@@ -8,11 +8,14 @@ use crate::insight::material_pictures::{self as pictures, ShowLight};
 use crate::job::rivals::{DATA_STATEMENT, RivalOptions};
 use crate::light::Environment;
 use crate::measured::analytic::OwnLobe;
+use crate::measured::analytic::own_lobe::MapValues;
 use crate::measured::fit_model::ModelFitSettings;
 use crate::measured::fits::{NeuralFits, PublishedFits};
+use crate::measured::metrics::TableError;
 use crate::measured::rivals::Rival;
 use crate::measured::sphere::{self, EnvironmentLevels};
 use crate::measured::{Category, MeasuredBrdf};
+use crate::neural::own_net::{self, OwnNetSettings};
 use crate::neural::source;
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
@@ -111,7 +114,8 @@ pub struct MeasuredFitOptions {
     /// The material.
     #[command(flatten)]
     pub source: Source,
-    /// cook-torrance, cook-torrance-two, ggx, ward, dsbrdf, bivariate, or maps: diffuse, specular and roughness.
+    /// cook-torrance, cook-torrance-two, ggx, ward, dsbrdf, bivariate, maps (diffuse, specular and roughness), or ibrdf: a
+    /// neural model whose weights are all fitted to this one material.
     #[arg(long)]
     pub model: String,
     /// Folder of the fit: `fit.json`, `fit.binary`, spheres and lobes side by side.
@@ -250,9 +254,27 @@ fn convert(options: &ConvertOptions) -> Result<()> {
 }
 
 fn fit(options: &MeasuredFitOptions, json: bool) -> Result<()> {
-    let rival = Rival::of_key(&options.model).map_err(|error| error.at(Place::Setting("model".into())))?;
+    if options.model == own_net::KEY {
+        let (table, name) = table_of(&options.source)?;
+        let found = own_net::fit_own_net(&crate::neural::shipped()?, &table, &OwnNetSettings::default())?;
+        let fitted = Fitted {
+            model: own_net::NAME,
+            table: found.model.table(&found.parameters),
+            error: found.error,
+            maps: None,
+            parameters: found.parameters,
+        };
+        return report_fit(&fitted, &name, &table, Some(&options.output), "fit", json);
+    }
+    let rival = Rival::of_key(&options.model).map_err(|error| {
+        Error::new(ErrorKind::InvalidSetting, error.message()).at(Place::Setting("model".into())).remedy(format!(
+            "{}, {}",
+            error.remedy_text(),
+            own_net::KEY
+        ))
+    })?;
     let (table, name) = table_of(&options.source)?;
-    report_fit(rival, &name, &table, Some(&options.output), "fit", json)
+    report_fit(&Fitted::of(rival, &table)?, &name, &table, Some(&options.output), "fit", json)
 }
 
 fn project(options: &ProjectOptions, json: bool) -> Result<()> {
@@ -260,28 +282,48 @@ fn project(options: &ProjectOptions, json: bool) -> Result<()> {
     if !json {
         println!("{}: {}", found.name, found.origin);
     }
-    report_fit(Rival::OwnLobe, &found.name, &found.table, options.output.as_deref(), "project", json)
+    let fitted = Fitted::of(Rival::OwnLobe, &found.table)?;
+    report_fit(&fitted, &found.name, &found.table, options.output.as_deref(), "project", json)
 }
 
-/// Fits a model to a table, writes `STEM.json`, `STEM.binary`, spheres and lobes if a folder is given, and prints the
-/// errors.
+/// A model after its fit.
+struct Fitted {
+    model: &'static str,
+    table: MeasuredBrdf,
+    error: TableError,
+    maps: Option<MapValues>,
+    parameters: Vec<f64>,
+}
+
+impl Fitted {
+    fn of(rival: Rival, table: &MeasuredBrdf) -> Result<Self> {
+        let fit = rival.fit(table, &ModelFitSettings::default())?;
+        Ok(Fitted {
+            model: rival.name(),
+            table: fit.table(),
+            error: fit.error,
+            maps: (rival == Rival::OwnLobe).then(|| OwnLobe::map_values(&fit.parameters)),
+            parameters: fit.parameters,
+        })
+    }
+}
+
+/// Writes `STEM.json`, `STEM.binary`, spheres and lobes of a fit if a folder is given, and prints its errors.
 fn report_fit(
-    rival: Rival,
+    fit: &Fitted,
     name: &str,
     table: &MeasuredBrdf,
     output: Option<&Path>,
     stem: &str,
     json: bool,
 ) -> Result<()> {
-    let fit = rival.fit(table, &ModelFitSettings::default())?;
-    let fitted = fit.table();
-    let maps = (rival == Rival::OwnLobe).then(|| OwnLobe::map_values(&fit.parameters));
+    let (fitted, maps) = (&fit.table, fit.maps);
     let lamps = sphere::showing_lamps();
     let truth = sphere::render_table(256, table, &lamps);
-    let estimate = sphere::render_table(256, &fitted, &lamps);
+    let estimate = sphere::render_table(256, fitted, &lamps);
     let psnr = sphere::displayed_scores(&estimate, &truth)?.psnr;
     let report = serde_json::json!({
-        "event": "measured-fit", "material": name, "model": rival.name(), "error": fit.error, "sphere_psnr_db": psnr,
+        "event": "measured-fit", "material": name, "model": fit.model, "error": fit.error, "sphere_psnr_db": psnr,
         "maps": maps, "parameters": fit.parameters,
     });
     if let Some(output) = output {
@@ -292,7 +334,7 @@ fn report_fit(
         let exposure = sphere::display_exposure(&truth, &sphere::sphere_mask(256));
         let tiles = [
             (name.to_string(), pictures::shown_sphere_at(&truth, exposure)),
-            (rival.name().to_string(), pictures::shown_sphere_at(&estimate, exposure)),
+            (fit.model.to_string(), pictures::shown_sphere_at(&estimate, exposure)),
         ];
         file::write_png_srgb8(&output.join("spheres.png"), &pictures::sheet(&tiles, Some(2)))?;
         let svg = pictures::lobes_svg(&[("", &value), (stem, &fitted_value)]);
@@ -302,7 +344,7 @@ fn report_fit(
         println!("{report}");
         return Ok(());
     }
-    println!("{name}, {}: log-RMSE {:.4}, sphere {psnr:.1} dB", rival.name(), fit.error.log_rmse);
+    println!("{name}, {}: log-RMSE {:.4}, sphere {psnr:.1} dB", fit.model, fit.error.log_rmse);
     if let Some(maps) = maps {
         println!("diffuse {:.4?}, specular {:.4?}, roughness {:.5}", maps.diffuse, maps.specular, maps.roughness);
     }

@@ -1,7 +1,7 @@
 //! What a flow is made of, as it stands in the metadata of a file of weights.
 
 use super::dense::{Activation, DenseNet, Layer};
-use super::spline::SplineShape;
+use super::spline::{FLOOR_DIGITS, SplineShape};
 use super::warp::{AZIMUTH, DIFFERENCE, HALF};
 use std::f64::consts::TAU;
 
@@ -34,8 +34,20 @@ pub struct Architecture {
     pub waves: bool,
     /// What stands behind the layers of the conditioners.
     pub activation: Activation,
+    /// No density of a coupling is lower at a knot than ten to the minus this. Four keeps training calm; what is measured
+    /// as nothing at all, as in parts of metals, needs more.
+    #[serde(default = "usual_floor", skip_serializing_if = "is_usual_floor")]
+    pub floor_digits: u8,
     /// The couplings in the order in which data pass them.
     pub couplings: Vec<Coupling>,
+}
+
+fn usual_floor() -> u8 {
+    FLOOR_DIGITS
+}
+
+fn is_usual_floor(digits: &u8) -> bool {
+    *digits == FLOOR_DIGITS
 }
 
 impl Architecture {
@@ -51,6 +63,7 @@ impl Architecture {
             code,
             waves: false,
             activation: Activation::Rectifier,
+            floor_digits: FLOOR_DIGITS,
             couplings: [0, 1, 2, 0, 1, 2].map(coupling).into(),
         }
     }
@@ -75,6 +88,7 @@ impl Architecture {
             code,
             waves: true,
             activation: Activation::Squareplus,
+            floor_digits: FLOOR_DIGITS,
             couplings: vec![
                 Coupling {
                     transforms: HALF,
@@ -128,13 +142,14 @@ impl Architecture {
                 })
         };
         self.code <= 256
+            && (1..=12).contains(&self.floor_digits)
             && (1..=64).contains(&self.couplings.len())
             && self.couplings.iter().all(|coupling| coupling.layers.len() <= 64 && sound(coupling))
     }
 
     /// The spline of a coupling.
     pub fn spline(&self, coupling: &Coupling) -> SplineShape {
-        SplineShape { bins: coupling.bins, periodic: coupling.periodic }
+        SplineShape { bins: coupling.bins, periodic: coupling.periodic, floor_digits: self.floor_digits }
     }
 
     /// How many numbers a conditioner sees of one coordinate.

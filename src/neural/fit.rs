@@ -8,6 +8,7 @@
 use super::lobes::{CubeColumns, Reconstruction, log_densities, pull_back_codes};
 use super::model::FlowModel;
 use super::warp::{AZIMUTH, DIFFERENCE, HALF, to_cube};
+use super::weights::Trained;
 use crate::error::{Error, ErrorKind, Result};
 use crate::math::random::SequentialRandom;
 use crate::measured::grid::{
@@ -132,6 +133,25 @@ pub fn fit_table(model: &FlowModel, table: &MeasuredBrdf, settings: &FlowFitSett
     let (parameters, objective) = descend(model, &sample, start, settings);
     let error = table_error(&model.table(&parameters), table)?;
     Ok(FlowFit { parameters, error, sampled_log_rmse: objective.sqrt(), started_from })
+}
+
+/// For each channel the row of the nearest code of the library, and the logarithm of the colour at which it is nearest;
+/// row 0 for a library without codes.
+///
+/// Errors: a library that holds no material, a table of which no cell counts.
+pub(super) fn nearest_codes(library: &Trained, table: &MeasuredBrdf, seed: u64) -> Result<[(usize, f64); 3]> {
+    let sample = Sample::draw(table, &FlowFitSettings { seed, columns: 120, ..FlowFitSettings::default() });
+    let rows = library.log_colours.len();
+    if sample.weight.is_empty() || rows == 0 {
+        return Err(Error::new(ErrorKind::Missing, "there is no code to start from")
+            .remedy("use weights that hold materials, and a table with cells above 0"));
+    }
+    let densities = log_densities(&library.flow, &library.codes, rows, &sample.columns);
+    Ok([0, 1, 2].map(|channel| {
+        let errors = densities.iter().map(|density| sample.best_colour(density, channel, Reconstruction::default()));
+        let best = errors.enumerate().min_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        best.map_or((0, 0.0), |(row, (_, colour))| (row, colour))
+    }))
 }
 
 /// For each channel the nearest codes of the library: the nearest in the first lobe, the next ones fainter behind it.

@@ -9,7 +9,7 @@
 //! matrix products of [`product`]. [`columns`] is the fast path that training and fitting take, [`pass`] chooses it.
 //! * Training: [`library`] and [`target`] (what is learned), [`batch`] (the gradient of one step), [`train`], [`adam`],
 //!   [`run`] (a sitting, with checkpoints), [`weights`] (the file).
-//! * Use: [`model`] (reflectance from codes and colours, through [`lobes`], read between [`nodes`]), [`fit`] (to a table), [`sampler`] (for a
+//! * Use: [`model`] (reflectance from codes and colours, through [`lobes`], read between [`nodes`]), [`fit`] (to a table), [`own_net`] (all weights to one table), [`sampler`] (for a
 //!   path tracer), [`embedding`] (the map of codes), [`between`] (materials between those of the library), [`source`]
 //!   (reflectance by name), [`speed`].
 //!
@@ -21,6 +21,7 @@ pub mod adam;
 pub mod architecture;
 pub mod batch;
 pub mod between;
+mod cells;
 pub mod columns;
 pub mod dense;
 pub mod embedding;
@@ -30,8 +31,10 @@ pub mod library;
 pub mod lobes;
 pub mod model;
 pub mod nodes;
+pub mod own_net;
 pub mod pass;
 pub mod product;
+mod product_wide;
 pub mod run;
 pub mod sampler;
 pub mod source;

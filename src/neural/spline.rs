@@ -7,8 +7,8 @@
 
 /// No bin is narrower; of the paper's code nothing of the kind is known, a bin of no width divides by zero there.
 pub const MIN_WIDTH: f64 = 1e-4;
-/// No density at a knot is lower.
-pub const MIN_HEIGHT: f64 = 1e-4;
+/// No density at a knot is lower than ten to the minus this, unless a shape says otherwise.
+pub const FLOOR_DIGITS: u8 = 4;
 /// Raw numbers are held within this many units of zero: `exp(40)` is dynamic range enough.
 const RAW_BOUND: f32 = 20.0;
 /// The largest number below one, where the last bin ends.
@@ -21,12 +21,19 @@ pub struct SplineShape {
     pub bins: usize,
     /// Whether the density at 1 is that at 0.
     pub periodic: bool,
+    /// No density at a knot is lower than ten to the minus this.
+    pub floor_digits: u8,
 }
 
 impl SplineShape {
     /// Raw numbers that make one spline: a width for each bin, then a height for each knot.
     pub fn raw_count(self) -> usize {
         2 * self.bins + if self.periodic { 0 } else { 1 }
+    }
+
+    /// The least density at a knot.
+    fn floor(self) -> f64 {
+        0.1f64.powi(i32::from(self.floor_digits))
     }
 }
 
@@ -90,9 +97,10 @@ impl Spline {
             self.scaled[bins] = self.scaled[0];
         }
         let area: f64 = (0..bins).map(|bin| 0.5 * (self.scaled[bin] + self.scaled[bin + 1]) * self.width[bin]).sum();
+        let floor = self.shape.floor();
         for knot in 0..=bins {
             self.scaled[knot] /= area;
-            self.height[knot] = MIN_HEIGHT + (1.0 - MIN_HEIGHT) * self.scaled[knot];
+            self.height[knot] = floor + (1.0 - floor) * self.scaled[knot];
         }
         for bin in 0..bins {
             let mean = 0.5 * (self.height[bin] + self.height[bin + 1]);
@@ -179,8 +187,9 @@ impl SplineAdjoint {
         }
         // Heights are exponentials over their area: the area takes back what all of them gain together.
         let mut gain = 0.0;
+        let floor = spline.shape.floor();
         for knot in 0..=bins {
-            self.height[knot] *= 1.0 - MIN_HEIGHT;
+            self.height[knot] *= 1.0 - floor;
             gain += self.height[knot] * spline.scaled[knot];
         }
         for bin in 0..bins {
@@ -215,8 +224,11 @@ mod tests {
     use super::*;
     use crate::math::random::SequentialRandom;
 
-    const SHAPES: [SplineShape; 2] =
-        [SplineShape { bins: 8, periodic: false }, SplineShape { bins: 5, periodic: true }];
+    const SHAPES: [SplineShape; 3] = [
+        SplineShape { bins: 6, periodic: false, floor_digits: 8 },
+        SplineShape { bins: 8, periodic: false, floor_digits: FLOOR_DIGITS },
+        SplineShape { bins: 5, periodic: true, floor_digits: FLOOR_DIGITS },
+    ];
 
     fn raw(shape: SplineShape, random: &mut SequentialRandom, range: f32) -> Vec<f32> {
         (0..shape.raw_count()).map(|_| range * (2.0 * random.next_number() - 1.0)).collect()
@@ -296,7 +308,11 @@ mod tests {
                 assert!(spline.width.iter().all(|&width| width >= MIN_WIDTH * 0.999));
                 for step in 0..=1000 {
                     let (density, y) = spline.at(f64::from(step) / 1000.0);
-                    assert!(density >= MIN_HEIGHT && density.is_finite() && (0.0..1.0).contains(&y));
+                    assert!(
+                        density >= 0.1f64.powi(i32::from(FLOOR_DIGITS))
+                            && density.is_finite()
+                            && (0.0..1.0).contains(&y)
+                    );
                 }
             }
             let mut spline = Spline::new(shape);
