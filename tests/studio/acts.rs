@@ -161,11 +161,13 @@ fn every_act_does_something_from_its_menu() {
 }
 
 #[test]
+#[ignore = "slow: every act; by the menu it is among the quick ones"]
 fn every_act_does_something_from_the_palette() {
     every_act_does_something(Way::Palette);
 }
 
 #[test]
+#[ignore = "slow: every act; by the menu it is among the quick ones"]
 fn every_act_does_something_by_its_key() {
     every_act_does_something(Way::Key);
 }

@@ -108,6 +108,7 @@ fn a_photo_of_a_sphere_becomes_light_and_reflectance_on_the_screen_and_on_disk()
 }
 
 #[test]
+#[ignore = "slow: an estimation of its own"]
 fn an_estimation_that_is_stopped_keeps_what_it_reached() {
     let mut studio = with_photo();
     studio.model().edits.object.effort = Effort::Released;
@@ -141,6 +142,7 @@ fn an_estimation_that_is_stopped_keeps_what_it_reached() {
 }
 
 #[test]
+#[ignore = "slow: an estimation of its own"]
 fn a_panic_is_told_and_what_was_reached_is_kept() {
     let mut studio = with_photo();
     studio.model().after_round = Some(Arc::new(|round| assert!(round < 2, "a fault on purpose")));
@@ -156,6 +158,7 @@ fn a_panic_is_told_and_what_was_reached_is_kept() {
 }
 
 #[test]
+#[ignore = "slow: an estimation of its own"]
 fn a_result_that_cannot_be_written_is_kept_and_can_be_saved_elsewhere() {
     let mut studio = with_photo();
     let runs = studio.model().runs_folder();

@@ -23,6 +23,7 @@ const FIELD_OF_VIEW: f32 = 0.6;
 const DISTANCE: f32 = 4.0;
 
 #[test]
+#[ignore = "slow: an estimation of its own"]
 fn a_finished_result_is_opened_again_from_its_folder() {
     let mut studio = with_photo();
     studio.act(Act::ObjectStart);
@@ -137,6 +138,7 @@ fn write_ball(folder: &Path) {
 }
 
 #[test]
+#[ignore = "slow: an estimation of its own"]
 fn an_object_with_a_mesh_and_a_camera_is_estimated_and_opened_again() {
     // A studio in object mode with small settings; its photo of a sphere is taken out again.
     let mut studio = with_photo();

@@ -247,6 +247,7 @@ fn curves_are_drawn_over_steps_and_seconds_whole_and_by_stage() {
 }
 
 #[test]
+#[ignore = "slow: pictures under every light"]
 fn scores_under_other_lights_are_measured_when_asked_for() {
     let mut studio = TestStudio::with_finished_run();
     studio.show(Panel::Scores);

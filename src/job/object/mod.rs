@@ -9,7 +9,7 @@
 //! and [`ObjectParts::write`] can be asked again.
 //!
 //! [`look`] makes what is looked at, [`worker`](self) is the thread, [`parts`] a result that can be written and relit,
-//! [`reopen`] reads one from its folder again.
+//! [`reopen()`] reads one from its folder again.
 
 pub mod look;
 pub mod parts;
