@@ -337,6 +337,7 @@ fn every_act_can_be_asked_for_on_a_scene_and_while_a_fit_starts_and_stops() {
 }
 
 #[test]
+#[ignore = "slow: every act; on the first page and on a scene it is among the quick ones"]
 fn every_act_can_be_asked_for_on_a_run_and_while_a_fit_runs() {
     let mut studio = TestStudio::with_finished_run();
     do_every_act(&mut studio);
