@@ -1,6 +1,6 @@
-//! Files that are written whole or not at all.
+//! Files that are written whole or not at all, and settings that are read with the line of what is wrong.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Place, Result};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -30,6 +30,19 @@ pub fn write_atomically(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> 
 /// Writes bytes with [`write_atomically`].
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     write_atomically(path, |writer| writer.write_all(bytes))
+}
+
+/// Settings from the text of a TOML file at `path`.
+///
+/// # Errors
+/// `InvalidSetting` with the line that is not understood.
+pub fn settings_of_toml<T: serde::de::DeserializeOwned>(text: &str, path: &Path) -> Result<T> {
+    toml::from_str(text).map_err(|source| {
+        let line = source.span().map_or(1, |span| 1 + text[..span.start.min(text.len())].matches('\n').count());
+        Error::new(ErrorKind::InvalidSetting, source.message().replace('\n', " "))
+            .at(Place::Line(path.into(), line))
+            .remedy("mend the line, or delete it to take the default")
+    })
 }
 
 /// The temporary name of a file that is being written: same folder, so that the rename is atomic.

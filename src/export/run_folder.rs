@@ -122,9 +122,10 @@ impl RunFolder {
 
     /// Writes standard deviations of the maps, in the units of the maps.
     pub fn write_deviations(&self, deviations: &MaterialMaps) -> Result<()> {
-        file::write_exr_rgb(&self.file("diffuse_deviation.exr"), &deviations.diffuse)?;
-        file::write_exr_rgb(&self.file("specular_deviation.exr"), &deviations.specular)?;
-        file::write_exr_grey(&self.file("roughness_deviation.exr"), &deviations.roughness)
+        let [diffuse, specular, roughness] = DEVIATION_FILES.map(|name| self.file(name));
+        file::write_exr_rgb(&diffuse, &deviations.diffuse)?;
+        file::write_exr_rgb(&specular, &deviations.specular)?;
+        file::write_exr_grey(&roughness, &deviations.roughness)
     }
 
     /// Writes what each texel of the light is known by.
@@ -132,7 +133,7 @@ impl RunFolder {
     /// # Errors
     /// Files that cannot be written.
     pub fn write_light_evidence(&self, shares: &RgbImage) -> Result<()> {
-        file::write_exr_rgb(&self.file("environment_evidence.exr"), shares)
+        file::write_exr_rgb(&self.file(LIGHT_EVIDENCE_FILE), shares)
     }
 
     /// Writes the number of texels that share each texel's lobe.
@@ -140,7 +141,7 @@ impl RunFolder {
     /// # Errors
     /// Files that cannot be written.
     pub fn write_lobe_sharing(&self, sharing: &GreyImage) -> Result<()> {
-        file::write_exr_grey(&self.file("lobe_sharing.exr"), sharing)
+        file::write_exr_grey(&self.file(LOBE_SHARING_FILE), sharing)
     }
 
     /// Reads standard deviations of the maps; `None` where a run has none.
@@ -148,14 +149,14 @@ impl RunFolder {
     /// # Errors
     /// Files that cannot be read.
     pub fn read_deviations(&self) -> Result<Option<MaterialMaps>> {
-        const FILES: [&str; 3] = ["diffuse_deviation.exr", "specular_deviation.exr", "roughness_deviation.exr"];
-        if FILES.iter().any(|name| !self.file(name).is_file()) {
+        if DEVIATION_FILES.iter().any(|name| !self.file(name).is_file()) {
             return Ok(None);
         }
+        let [diffuse, specular, roughness] = DEVIATION_FILES;
         Ok(Some(MaterialMaps {
-            diffuse: self.read_rgb(FILES[0])?,
-            specular: self.read_rgb(FILES[1])?,
-            roughness: self.read_grey(FILES[2])?,
+            diffuse: self.read_rgb(diffuse)?,
+            specular: self.read_rgb(specular)?,
+            roughness: self.read_grey(roughness)?,
         }))
     }
 
@@ -164,8 +165,7 @@ impl RunFolder {
     /// # Errors
     /// A file that cannot be read.
     pub fn read_light_evidence(&self) -> Result<Option<RgbImage>> {
-        let name = "environment_evidence.exr";
-        self.file(name).is_file().then(|| self.read_rgb(name)).transpose()
+        self.file(LIGHT_EVIDENCE_FILE).is_file().then(|| self.read_rgb(LIGHT_EVIDENCE_FILE)).transpose()
     }
 
     /// Reads the number of texels that share each texel's lobe; `None` where a run does not say.
@@ -173,8 +173,7 @@ impl RunFolder {
     /// # Errors
     /// A file that cannot be read.
     pub fn read_lobe_sharing(&self) -> Result<Option<GreyImage>> {
-        let name = "lobe_sharing.exr";
-        self.file(name).is_file().then(|| self.read_grey(name)).transpose()
+        self.file(LOBE_SHARING_FILE).is_file().then(|| self.read_grey(LOBE_SHARING_FILE)).transpose()
     }
 
     /// Reads the result. Before anything is read, all missing files are named in one error.
@@ -225,14 +224,8 @@ impl RunFolder {
 
     /// Reads `settings.toml`. An error names the line.
     pub fn read_settings<T: serde::de::DeserializeOwned>(&self) -> Result<T> {
-        let path = self.file("settings.toml");
         let text = self.read_text("settings.toml", "patina fit SCENE -o RUN")?;
-        toml::from_str(&text).map_err(|source| {
-            let line = source.span().map_or(1, |span| 1 + text[..span.start.min(text.len())].matches('\n').count());
-            Error::new(ErrorKind::InvalidSetting, source.message().replace('\n', " "))
-                .at(Place::Line(path, line))
-                .remedy("mend the line, or delete it to take the default")
-        })
+        crate::files::settings_of_toml(&text, &self.file("settings.toml"))
     }
 
     /// Writes `report.json`. A number that is not finite becomes `null`.
@@ -271,6 +264,12 @@ impl RunFolder {
 }
 
 const RESULT_FILES: [&str; 6] = ["diffuse.exr", "specular.exr", "roughness.exr", "seen.exr", "env.exr", "mesh.obj"];
+/// Standard deviations of diffuse, specular and roughness map, where the solver made them.
+const DEVIATION_FILES: [&str; 3] = ["diffuse_deviation.exr", "specular_deviation.exr", "roughness_deviation.exr"];
+/// What each texel of the light is known by, where the solver made it.
+const LIGHT_EVIDENCE_FILE: &str = "environment_evidence.exr";
+/// Number of texels that share each texel's lobe, where the solver made them.
+const LOBE_SHARING_FILE: &str = "lobe_sharing.exr";
 
 /// The same error with the command that makes the file as its remedy, where the file is missing or damaged.
 fn made_by(error: Error, command: &str) -> Error {

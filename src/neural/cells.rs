@@ -8,6 +8,23 @@ use crate::measured::grid::{
 use crate::measured::metrics::LOG_FLOOR;
 use crate::measured::table::MeasuredBrdf;
 
+/// The cells of a column that count, with their places in the cube, by rising `theta_half`.
+pub(super) fn counted_in_column(
+    table: &MeasuredBrdf,
+    difference: usize,
+    azimuth: usize,
+) -> impl Iterator<Item = (usize, [f64; 3])> + '_ {
+    (0..THETA_HALF_COUNT)
+        .map(move |half| cell_of_indices(half, difference, azimuth))
+        .filter(|&cell| table.counts(cell))
+        .filter_map(|cell| to_cube(coordinates_of_cell(cell)).map(|point| (cell, point)))
+}
+
+/// `ln(stored + 1e-6)` of a cell.
+pub(super) fn log_stored(table: &MeasuredBrdf, cell: usize) -> [f64; 3] {
+    table.raw_value(cell).map(|raw| (raw.max(0.0) + LOG_FLOOR).ln())
+}
+
 /// The cells of a table that count, column by column.
 pub(super) struct CountedColumns {
     /// `theta_difference` and `phi_difference` in the cube.
@@ -35,15 +52,10 @@ impl CountedColumns {
         for difference in 0..THETA_DIFFERENCE_COUNT {
             for azimuth in 0..PHI_DIFFERENCE_COUNT {
                 let mut place = None;
-                for half in 0..THETA_HALF_COUNT {
-                    let cell = cell_of_indices(half, difference, azimuth);
-                    let point = if table.counts(cell) { to_cube(coordinates_of_cell(cell)) } else { None };
-                    if let Some(point) = point {
-                        place = Some([point[DIFFERENCE], point[AZIMUTH]]);
-                        columns.half.push(point[HALF] as f32);
-                        let raw = table.raw_value(cell);
-                        columns.log_stored.push(raw.map(|raw| (raw.max(0.0) + LOG_FLOOR).ln() as f32));
-                    }
+                for (cell, point) in counted_in_column(table, difference, azimuth) {
+                    place = Some([point[DIFFERENCE], point[AZIMUTH]]);
+                    columns.half.push(point[HALF] as f32);
+                    columns.log_stored.push(log_stored(table, cell).map(|value| value as f32));
                 }
                 if let Some(place) = place {
                     columns.at.push(place);

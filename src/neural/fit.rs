@@ -5,15 +5,14 @@
 //! its single start at a code of zero is replaced by starts from the codes of the library that come nearest. Channels
 //! share nothing, so each has its own best start.
 
+use super::cells::{counted_in_column, log_stored};
 use super::lobes::{CubeColumns, Reconstruction, log_densities, pull_back_codes};
 use super::model::FlowModel;
-use super::warp::{AZIMUTH, DIFFERENCE, HALF, to_cube};
+use super::warp::{AZIMUTH, DIFFERENCE, HALF};
 use super::weights::Trained;
 use crate::error::{Error, ErrorKind, Result};
 use crate::math::random::SequentialRandom;
-use crate::measured::grid::{
-    PHI_DIFFERENCE_COUNT, THETA_DIFFERENCE_COUNT, THETA_HALF_COUNT, cell_of_indices, coordinates_of_cell,
-};
+use crate::measured::grid::{PHI_DIFFERENCE_COUNT, THETA_DIFFERENCE_COUNT};
 use crate::measured::metrics::{LOG_FLOOR, TableError, table_error};
 use crate::measured::model::ReflectanceModel;
 use crate::measured::table::MeasuredBrdf;
@@ -74,11 +73,8 @@ impl Sample {
             let (low, high) = (stratum * all / wanted, (stratum + 1) * all / wanted);
             let place = low + random.below((high - low).max(1));
             let (difference, azimuth) = (place / PHI_DIFFERENCE_COUNT, place % PHI_DIFFERENCE_COUNT);
-            let cells: Vec<usize> = (0..THETA_HALF_COUNT)
-                .map(|half| cell_of_indices(half, difference, azimuth))
-                .filter(|&cell| table.counts(cell) && to_cube(coordinates_of_cell(cell)).is_some())
-                .collect();
-            let Some(first) = cells.first().and_then(|&cell| to_cube(coordinates_of_cell(cell))) else { continue };
+            let cells: Vec<(usize, [f64; 3])> = counted_in_column(table, difference, azimuth).collect();
+            let Some((_, first)) = cells.first() else { continue };
             sample.columns.at.push([first[DIFFERENCE], first[AZIMUTH]]);
             for part in 0..settings.per_column.max(1) {
                 let (low, high) = (
@@ -86,10 +82,9 @@ impl Sample {
                     (part + 1) * cells.len() / settings.per_column.max(1),
                 );
                 // A short column has parts without cells: they stay in the shape, and weigh nothing.
-                let cell = cells[(low + random.below((high - low).max(1))).min(cells.len() - 1)];
-                let half = to_cube(coordinates_of_cell(cell)).map_or(0.0, |point| point[HALF]);
-                sample.columns.halves.push(half);
-                sample.log_stored.push(table.raw_value(cell).map(|raw| (raw.max(0.0) + LOG_FLOOR).ln()));
+                let (cell, point) = cells[(low + random.below((high - low).max(1))).min(cells.len() - 1)];
+                sample.columns.halves.push(point[HALF]);
+                sample.log_stored.push(log_stored(table, cell));
                 sample.weight.push((high - low) as f64);
             }
         }
@@ -118,6 +113,17 @@ impl Sample {
         }
         let colour = 0.5 * (low + high);
         (error(colour), colour)
+    }
+
+    /// Error, logarithm of the best colour and row of each code of a library for one channel, the nearest first.
+    fn ranked(&self, densities: &[Vec<f32>], channel: usize) -> Vec<(f64, f64, usize)> {
+        let of_row = |(row, density): (usize, &Vec<f32>)| {
+            let (error, colour) = self.best_colour(density, channel, Reconstruction::default());
+            (error, colour, row)
+        };
+        let mut ranked: Vec<(f64, f64, usize)> = densities.iter().enumerate().map(of_row).collect();
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+        ranked
     }
 }
 
@@ -148,9 +154,9 @@ pub(super) fn nearest_codes(library: &Trained, table: &MeasuredBrdf, seed: u64) 
     }
     let densities = log_densities(&library.flow, &library.codes, rows, &sample.columns);
     Ok([0, 1, 2].map(|channel| {
-        let errors = densities.iter().map(|density| sample.best_colour(density, channel, Reconstruction::default()));
-        let best = errors.enumerate().min_by(|a, b| a.1.0.total_cmp(&b.1.0));
-        best.map_or((0, 0.0), |(row, (_, colour))| (row, colour))
+        // There is a first one: the library has rows.
+        let (_, colour, row) = sample.ranked(&densities, channel)[0];
+        (row, colour)
     }))
 }
 
@@ -166,15 +172,7 @@ fn start(model: &FlowModel, sample: &Sample) -> (Vec<f64>, [usize; 3]) {
     }
     let densities = log_densities(&trained.flow, &trained.codes, rows, &sample.columns);
     for channel in 0..3 {
-        let mut ranked: Vec<(f64, f64, usize)> = densities
-            .iter()
-            .enumerate()
-            .map(|(row, density)| {
-                let (error, colour) = sample.best_colour(density, channel, Reconstruction::default());
-                (error, colour, row)
-            })
-            .collect();
-        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let ranked = sample.ranked(&densities, channel);
         from[channel] = ranked[0].2;
         for lobe in 0..model.lobes() {
             // The best codes are often twins, channels of one material: go further down the list for later lobes.

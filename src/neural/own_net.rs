@@ -223,20 +223,14 @@ fn evaluate(own: &Trained, columns: &CountedColumns, batch: &Batch) -> Found {
         found
     };
     let parts: Vec<Found> = batch.columns.par_chunks(CHUNK).enumerate().map(of_chunk).collect();
-    let mut sum: Option<Found> = None;
-    for part in parts {
-        sum = Some(match sum {
-            None => part,
-            Some(mut sum) => {
-                sum.squared_error += part.squared_error;
-                sum.d_weights.iter_mut().zip(&part.d_weights).for_each(|(sum, own)| *sum += own);
-                sum.d_codes.iter_mut().zip(&part.d_codes).for_each(|(sum, own)| *sum += own);
-                sum.d_colours.iter_mut().zip(&part.d_colours).for_each(|(sum, own)| *sum += own);
-                sum
-            }
-        });
-    }
-    sum.unwrap_or_default()
+    let add = |mut sum: Found, part: Found| {
+        sum.squared_error += part.squared_error;
+        sum.d_weights.iter_mut().zip(&part.d_weights).for_each(|(sum, own)| *sum += own);
+        sum.d_codes.iter_mut().zip(&part.d_codes).for_each(|(sum, own)| *sum += own);
+        sum.d_colours.iter_mut().zip(&part.d_colours).for_each(|(sum, own)| *sum += own);
+        sum
+    };
+    parts.into_iter().reduce(add).unwrap_or_default()
 }
 
 #[cfg(test)]

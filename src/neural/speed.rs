@@ -41,7 +41,7 @@ pub fn measure(flow: &Flow, batch: usize, repeats: usize) -> Speed {
     let mut tape = FlowTape::default();
     let gradients_per_second = best(&mut || {
         // In parts, so that what a pass leaves for the way back fits the cache.
-        for part in points.chunks(256) {
+        for part in points.chunks(super::flow::CHUNK) {
             flow.forward(&mut part.to_vec(), &code, part.len(), &mut tape);
             flow.backward(&mut tape, &vec![1.0; part.len()], &mut d_weights, &mut d_codes);
         }

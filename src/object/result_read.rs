@@ -148,11 +148,7 @@ pub fn read(folder: &Path) -> Result<ObjectResult> {
 
 fn read_settings(path: &Path) -> Result<ObjectSettings> {
     let text = std::fs::read_to_string(path).map_err(|source| Error::reading(path, source))?;
-    toml::from_str(&text).map_err(|source| {
-        Error::new(ErrorKind::InvalidSetting, source.message().replace('\n', " "))
-            .at(Place::File(path.into()))
-            .remedy("mend the line, or delete it to take the default")
-    })
+    crate::files::settings_of_toml(&text, path)
 }
 
 /// Copies the files of a result to another folder that is prepared for it.

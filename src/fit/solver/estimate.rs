@@ -76,8 +76,9 @@ impl Estimate {
         }
     }
 
-    /// Standard deviations of the values of maps of this size, by [`Estimate::texels`] and [`Estimate::variances`]: how far a value may be off given the light that was found.
-    /// A texel that was not solved for has those of what is believed of any surface.
+    /// Standard deviations of the values of maps of this size, by [`Estimate::texels`] and [`Estimate::variances`]: how far
+    /// a value may be off given the light that was found. A texel that was not solved for has those of what is believed of
+    /// any surface.
     pub fn deviations(texels: &[Texel<f32>], variances: &[Texel<f32>], map_size: usize) -> MaterialMaps {
         let deviation = |texel: usize, number: usize| {
             let own = variances[texel];

@@ -144,8 +144,15 @@ impl Painter {
     }
 }
 
+/// A re-render of a view with the logarithm of it over the photo.
+pub fn with_log_error(view: &ObjectView, rerender: RgbImage) -> (Arc<RgbImage>, Arc<GreyImage>) {
+    let photo = &view.photo.radiance;
+    let log_error = log_error_map(&view.geometry, &rerender, photo, epsilon_of(&view.geometry, photo));
+    (Arc::new(rerender), Arc::new(log_error))
+}
+
 /// What is added to radiance before a logarithm: a thousandth of the mean of the object's pixels.
-pub fn epsilon_of(geometry: &ObjectGeometry, photo: &RgbImage) -> f32 {
+fn epsilon_of(geometry: &ObjectGeometry, photo: &RgbImage) -> f32 {
     let sum: f64 = geometry
         .pixels
         .iter()

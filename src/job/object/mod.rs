@@ -24,9 +24,10 @@ use super::{Slot, Wake};
 use crate::error::{Error, ErrorKind, Finding, Result, text_of_panic};
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::light::Environment;
+use crate::object::nodes::NodeGrid;
 use crate::object::progress::ObjectiveRow;
 use crate::object::read::ObjectFiles;
-use crate::object::result_read::ObjectInputs;
+use crate::object::result_read::{FollowedStart, ObjectInputs};
 use crate::object::settings::ObjectSettings;
 use crate::object::split::{Gauge, SplitSpread};
 use crate::object::starts::ModelKind;
@@ -113,6 +114,32 @@ pub struct ObjectOutcome {
     pub spread: SplitSpread,
     /// Level of the light and the room that physics leaves for it.
     pub gauge: Gauge,
+}
+
+impl ObjectOutcome {
+    /// The outcome of a result whose re-renders, with their errors, and starts, the best first, are these.
+    fn of(
+        parts: Arc<ObjectParts>,
+        folder: Option<PathBuf>,
+        pictures: Vec<(Arc<RgbImage>, Arc<GreyImage>)>,
+        spread: SplitSpread,
+        followed: Vec<FollowedStart>,
+    ) -> Self {
+        let best = followed.first().map_or(0.0, |best| best.evidence);
+        let starts = followed.into_iter().map(|own| StartFollowed {
+            objective: own.objective,
+            nats_behind: own.evidence - best,
+            is_as_good: spread.starts.contains(&own.start),
+            name: own.start,
+        });
+        let starts = starts.collect();
+        let (rerenders, log_errors) = pictures.into_iter().unzip();
+        let found = &parts.estimate;
+        let gauge = Gauge::of(&found.light, &NodeGrid::new(parts.settings.nodes), &found.table);
+        let light = Arc::new(found.light.environment());
+        let material = Arc::new(MaterialLook::of(&parts.reflectance(), None));
+        ObjectOutcome { parts, folder, rerenders, log_errors, material, light, starts, spread, gauge }
+    }
 }
 
 /// What a job tells.

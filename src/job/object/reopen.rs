@@ -1,14 +1,11 @@
 //! A result read from its folder again, as the window shows it.
 
-use super::look::{MaterialLook, epsilon_of};
-use super::{ObjectOutcome, ObjectParts, PhotoSeen, StartFollowed, worker};
+use super::look::with_log_error;
+use super::{ObjectOutcome, ObjectParts, PhotoSeen, worker};
 use crate::error::{Finding, Result, Severity};
 use crate::image::file;
-use crate::object::nodes::NodeGrid;
-use crate::object::picture::log_error_map;
 use crate::object::read::read_views;
 use crate::object::result_read::{self, ObjectResult};
-use crate::object::split::Gauge;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -41,31 +38,16 @@ pub fn reopen(folder: &Path) -> Result<ReopenedObject> {
             Vec::new()
         }
     };
-    let (mut rerenders, mut log_errors) = (Vec::new(), Vec::new());
+    let mut pictures = Vec::new();
     for (index, view) in views.iter().enumerate() {
         let picture = file::read_rgb(&folder.join(format!("rerender_{index}.exr")))?;
         if (picture.width(), picture.height()) == (view.geometry.width, view.geometry.height) {
-            let epsilon = epsilon_of(&view.geometry, &view.photo.radiance);
-            log_errors.push(Arc::new(log_error_map(&view.geometry, &picture, &view.photo.radiance, epsilon)));
-            rerenders.push(Arc::new(picture));
+            pictures.push(with_log_error(view, picture));
         }
     }
-    let best = followed.first().map_or(0.0, |best| best.evidence);
-    let starts = followed.into_iter().map(|own| StartFollowed {
-        objective: own.objective,
-        nats_behind: own.evidence - best,
-        is_as_good: spread.starts.contains(&own.start),
-        name: own.start,
-    });
-    let starts = starts.collect();
     let photos = views.iter().map(worker::seen).collect();
-    let gauge = Gauge::of(&estimate.light, &NodeGrid::new(settings.nodes), &estimate.table);
-    let light = Arc::new(estimate.light.environment());
     let mut parts = ObjectParts::new(views, model, estimate, settings, inputs);
     parts.read_from = Some(folder.into());
-    let parts = Arc::new(parts);
-    let material = Arc::new(MaterialLook::of(&parts.reflectance(), None));
-    let folder = Some(folder.into());
-    let outcome = ObjectOutcome { parts, folder, rerenders, log_errors, material, light, starts, spread, gauge };
+    let outcome = ObjectOutcome::of(Arc::new(parts), Some(folder.into()), pictures, spread, followed);
     Ok(ReopenedObject { photos, outcome, findings })
 }

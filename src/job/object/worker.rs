@@ -1,7 +1,7 @@
 //! The thread of an estimation, and the one that paints beside it.
 
-use super::look::{MaterialLook, Painter, epsilon_of};
-use super::{ObjectLook, ObjectNews, ObjectOutcome, ObjectParts, ObjectRequest, PhotoSeen, StartFollowed, Teller};
+use super::look::{Painter, with_log_error};
+use super::{ObjectLook, ObjectNews, ObjectOutcome, ObjectParts, ObjectRequest, PhotoSeen, Teller};
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::image::{Image, file};
 use crate::job::Slot;
@@ -9,11 +9,11 @@ use crate::light::Environment;
 use crate::neural;
 use crate::object::joint::{Estimate, Known, estimate};
 use crate::object::nodes::{NodeGrid, NodeTable};
-use crate::object::picture::log_error_map;
 use crate::object::prior::LogLight;
 use crate::object::progress::{ObjectEvent, ObjectiveRow};
 use crate::object::read::read_views;
-use crate::object::split::{Gauge, SplitSpread};
+use crate::object::result_read::FollowedStart;
+use crate::object::split::SplitSpread;
 use crate::object::starts::{ModelKind, StartedModel};
 use crate::object::{ObjectView, result_folder};
 use crossbeam_channel::{Receiver, bounded};
@@ -211,17 +211,13 @@ impl Worker {
     fn finish(&self, parts: Arc<ObjectParts>) -> ObjectOutcome {
         self.stage("rendering and writing the result");
         let request = &self.request;
-        let grid = NodeGrid::new(request.settings.nodes);
         let written = parts.write(&request.output, &request.relights);
-        let mut rerenders = Vec::new();
-        let mut log_errors = Vec::new();
+        let mut pictures = Vec::new();
         for (index, view) in parts.views.iter().enumerate() {
             if let Ok(picture) = file::read_rgb(&request.output.join(format!("rerender_{index}.exr")))
                 && written.is_ok()
             {
-                let epsilon = epsilon_of(&view.geometry, &view.photo.radiance);
-                log_errors.push(Arc::new(log_error_map(&view.geometry, &picture, &view.photo.radiance, epsilon)));
-                rerenders.push(Arc::new(picture));
+                pictures.push(with_log_error(view, picture));
             }
         }
         let folder = match written {
@@ -233,20 +229,15 @@ impl Worker {
                 None
             }
         };
-        let found = &parts.estimate;
-        let spread = SplitSpread::of(&found.candidates);
-        let best = found.candidates.first().map_or(0.0, |best| best.evidence);
-        let starts = found.candidates.iter().map(|candidate| StartFollowed {
-            name: candidate.name.clone(),
+        let candidates = &parts.estimate.candidates;
+        let spread = SplitSpread::of(candidates);
+        let followed = candidates.iter().map(|candidate| FollowedStart {
+            start: candidate.name.clone(),
             objective: candidate.total(),
-            nats_behind: candidate.evidence - best,
-            is_as_good: spread.starts.contains(&candidate.name),
+            evidence: candidate.evidence,
         });
-        let starts = starts.collect();
-        let material = Arc::new(MaterialLook::of(&parts.reflectance(), None));
-        let light = Arc::new(found.light.environment());
-        let gauge = Gauge::of(&found.light, &grid, &found.table);
-        ObjectOutcome { folder, rerenders, log_errors, starts, material, light, gauge, spread, parts }
+        let followed = followed.collect();
+        ObjectOutcome::of(parts, folder, pictures, spread, followed)
     }
 }
 

@@ -1,6 +1,6 @@
 //! What a camera sees of the surface, traced once: shading points with the texels they cover.
 //!
-//! A pixel is sampled at 2 x 2 places, or 8 x 8 where those do not agree (at 4 x 4, coverage errs by three per cent: a
+//! A pixel is sampled at 4 places, or 64 where those and its corners do not agree (at 16, coverage errs by three per cent: a
 //! hundredth of a picture's root mean square before a black background). Samples on one smooth piece of surface become
 //! one shading point: their mean normal and direction, and one list of texels with weights that sum to 1 (the exact mean
 //! of their bilinear lookups). Most pixels have one; edges and silhouettes have several, each with its share.
@@ -71,9 +71,9 @@ pub struct ViewFootprints {
 pub struct FootprintSettings {
     /// Width and height of the maps in texels.
     pub map_size: usize,
-    /// Samples along each side of a pixel, at first.
+    /// Root of the number of samples of a pixel, at first.
     pub coarse_side: usize,
-    /// Samples along each side of a pixel where those at first do not agree.
+    /// The same where those at first and the corners do not agree.
     pub fine_side: usize,
     /// Whether rays look for other surface in the lobe.
     pub lobe_rays: bool,
