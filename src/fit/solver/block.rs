@@ -5,9 +5,10 @@
 //! `y = (rho + delta_cell) E + F0 S(a) + S5(a)`.
 //! Deviations have a normal prior of variance tau^2, so they can be eliminated in closed form: what remains of a cell is
 //! six sums, and cells add up. At each width a bounded 2 x 2 system per channel gives rho and F0; the width is one for
-//! all channels, found by looking at all nodes and refined by a parabola.
+//! all channels, found by looking at all nodes, then halfway beside the best ([`super::lobe_widths`]), then by a parabola.
 
 use super::cell_sums::{System, ridge, system};
+use super::lobe_widths::WidthStencil;
 
 /// Light at one pixel: what multiplies the unknowns.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -59,8 +60,6 @@ pub struct BlockSolution {
     pub residual: f32,
     /// Index of the best width among the nodes.
     pub best_node: usize,
-    /// Curvature of the negative log posterior in the logarithm of the width, where the search ended.
-    pub curvature: f32,
 }
 
 /// Solves a block over nodes `log_widths[range]`; terms outside the range may be unset.
@@ -78,56 +77,53 @@ pub fn solve_block(
         return None;
     }
     let mut scratch = vec![System::default(); cell_count];
-    let cost_at = |node: usize, scratch: &mut [System]| -> f64 {
-        let prior_cost = ((log_widths[node] - prior.log_width.0) / prior.log_width.1).powi(2);
-        (0..3)
-            .map(|channel| {
-                let at = |term: &PixelTerms| (term.base[node][channel], term.grazing[node][channel]);
-                system(terms, channel, at, prior, scratch).solve().1
-            })
-            .sum::<f64>()
-            / (prior.noise * prior.noise)
-            + prior_cost
+    let mut cost_at = |log_width: f64| -> f64 {
+        let stencil = WidthStencil::new(log_widths, log_width, range.clone());
+        let of_channels = (0..3).map(|channel| {
+            let at = |term: &PixelTerms| (stencil.of(&term.base, channel), stencil.of(&term.grazing, channel));
+            system(terms, channel, at, prior, &mut scratch).solve().1
+        });
+        let misfit = of_channels.sum::<f64>() / (prior.noise * prior.noise);
+        misfit + ((log_width - prior.log_width.0) / prior.log_width.1).powi(2)
     };
-    let costs: Vec<f64> = range.clone().map(|node| cost_at(node, &mut scratch)).collect();
-    let mut best = 0;
-    for (index, cost) in costs.iter().enumerate() {
-        if *cost < costs[best] {
-            best = index;
-        }
-    }
+    let least = |costs: &[(f64, f64)]| {
+        let better = |best: usize, index: usize| if costs[index].1 < costs[best].1 { index } else { best };
+        (0..costs.len()).fold(0, better)
+    };
+    let costs: Vec<(f64, f64)> = log_widths[range.clone()].iter().map(|&x| (x, cost_at(x))).collect();
+    let best = least(&costs);
     let best_node = range.start + best;
-    // A parabola through the best node and its neighbours.
-    let mut log_width = log_widths[best_node];
-    let mut curvature = 0.0;
-    if best > 0 && best + 1 < costs.len() {
-        let (x0, x1, x2) = (log_widths[best_node - 1], log_width, log_widths[best_node + 1]);
-        let (d0, d2) = ((costs[best - 1] - costs[best]) / (x0 - x1), (costs[best + 1] - costs[best]) / (x2 - x1));
-        curvature = 2.0 * (d2 - d0) / (x2 - x0);
+    // Halfway to the neighbours: from one width to the next the cost is no parabola yet.
+    let mut near = vec![costs[best]];
+    if best > 0 {
+        let x = 0.5 * (costs[best - 1].0 + costs[best].0);
+        near.splice(0..0, [costs[best - 1], (x, cost_at(x))]);
+    }
+    if best + 1 < costs.len() {
+        let x = 0.5 * (costs[best].0 + costs[best + 1].0);
+        near.extend([(x, cost_at(x)), costs[best + 1]]);
+    }
+    let best = least(&near);
+    let mut log_width = near[best].0;
+    if best > 0 && best + 1 < near.len() {
+        let [(x0, c0), (x1, c1), (x2, c2)] = [near[best - 1], near[best], near[best + 1]];
+        let (d0, d2) = ((c0 - c1) / (x0 - x1), (c2 - c1) / (x2 - x1));
+        let curvature = 2.0 * (d2 - d0) / (x2 - x0);
         if curvature > 0.0 {
             let slope = (d0 * (x2 - x1) + d2 * (x1 - x0)) / (x2 - x0);
             log_width = (x1 - slope / curvature).clamp(x0, x2);
         }
     }
-    // Terms between nodes: through the three nearest.
-    let weights = interpolation(log_widths, &range, best_node, log_width);
+    let stencil = WidthStencil::new(log_widths, log_width, range);
     let mut solution = BlockSolution {
         log_width: log_width as f32,
         cells: vec![[0.0; 3]; cell_count],
         best_node,
-        curvature: curvature as f32,
         ..BlockSolution::default()
     };
     let mut squared = 0.0;
     for channel in 0..3 {
-        let at = |term: &PixelTerms| {
-            let (mut base, mut grazing) = (0.0f32, 0.0f32);
-            for &(node, weight) in &weights {
-                base += weight * term.base[node][channel];
-                grazing += weight * term.grazing[node][channel];
-            }
-            (base, grazing)
-        };
+        let at = |term: &PixelTerms| (stencil.of(&term.base, channel), stencil.of(&term.grazing, channel));
         let ([rho, specular], _) = system(terms, channel, at, prior, &mut scratch).solve();
         solution.diffuse[channel] = rho as f32;
         solution.specular[channel] = specular as f32;
@@ -148,28 +144,6 @@ pub fn solve_block(
     }
     solution.residual = (squared / (3.0 * weight)).sqrt() as f32;
     Some(solution)
-}
-
-/// Nodes and weights of the parabola through the best node and its neighbours.
-pub fn interpolation(
-    log_widths: &[f64],
-    range: &std::ops::Range<usize>,
-    best_node: usize,
-    log_width: f64,
-) -> Vec<(usize, f32)> {
-    let first = best_node.saturating_sub(1).max(range.start);
-    let nodes: Vec<usize> = (first..(best_node + 2).min(range.end)).collect();
-    nodes
-        .iter()
-        .map(|&node| {
-            let weight: f64 = nodes
-                .iter()
-                .filter(|&&other| other != node)
-                .map(|&other| (log_width - log_widths[other]) / (log_widths[node] - log_widths[other]))
-                .product();
-            (node, weight as f32)
-        })
-        .collect()
 }
 
 #[cfg(test)]

@@ -5,28 +5,48 @@
 //! for diffuse reflectance wherever the light is a little wrong, in the complementary colour where it is too much.
 //! The logarithm of the width is normal for all kinds.
 
-use super::block::MOST_NODES;
+use super::lobe_widths::LOBE_WIDTHS;
 use glam::{DMat3, DVec3};
 
 /// Kinds of surface.
 pub const KINDS: usize = 3;
 
-/// Sums of a texel, or of a group, with diffuse reflectance integrated out: per kind, width and channel `∑ S S`,
-/// `∑ S y` and `∑ y y`, in units of the noise.
+/// Sums of a texel, or of a group, per width and channel: `E E`, `E S`, `S S`, `E y`, `S y`, `y y` in units of the noise,
+/// with each texel's deviation from its group's diffuse reflectance integrated out.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LobeSumsOfGroup(pub [[[[f64; 3]; 3]; MOST_NODES]; KINDS]);
+pub struct LobeSumsOfGroup(pub [[[f64; 6]; 3]; LOBE_WIDTHS]);
 
 impl Default for LobeSumsOfGroup {
     fn default() -> Self {
-        LobeSumsOfGroup([[[[0.0; 3]; 3]; MOST_NODES]; KINDS])
+        LobeSumsOfGroup([[[0.0; 6]; 3]; LOBE_WIDTHS])
     }
 }
 
 impl LobeSumsOfGroup {
+    /// Those of one texel. `ridge` is the inverse variance of its deviation; `worse` is added to the cost of each width.
+    pub fn of_texel(raw: &[[[f64; 6]; 3]; LOBE_WIDTHS], ridge: f64, worse: &[f64; LOBE_WIDTHS]) -> Self {
+        let mut made = LobeSumsOfGroup::default();
+        for ((made, raw), worse) in made.0.iter_mut().zip(raw).zip(worse) {
+            for (made, &[ee, es, ss, ey, sy, yy]) in made.iter_mut().zip(raw) {
+                let keep = 1.0 / (ee + ridge);
+                let left = ridge * keep;
+                *made = [
+                    ee * left,
+                    es * left,
+                    ss - es * es * keep,
+                    ey * left,
+                    sy - es * ey * keep,
+                    yy - ey * ey * keep + worse / 3.0,
+                ];
+            }
+        }
+        made
+    }
+
     /// Adds another's.
     pub fn add(&mut self, other: &LobeSumsOfGroup) {
-        let others = other.0.iter().flatten().flatten().flatten();
-        for (own, other) in self.0.iter_mut().flatten().flatten().flatten().zip(others) {
+        let others = other.0.iter().flatten().flatten();
+        for (own, other) in self.0.iter_mut().flatten().flatten().zip(others) {
             *own += other;
         }
     }
@@ -37,13 +57,24 @@ impl LobeSumsOfGroup {
 pub struct LobeKind {
     /// Mean of F0, standard deviation of what its channels have in common, and of what they do not.
     pub specular: (f64, f64, f64),
-    /// Mean and standard deviation of diffuse reflectance; `None` for the mean of what lies around.
+    /// Mean and standard deviation of a group's diffuse reflectance; `None` for the mean of what lies around.
     pub diffuse: (Option<f64>, f64),
     /// Share of all surface.
     pub share: f64,
 }
 
 impl LobeKind {
+    /// What is left of a channel's sums, and of the logarithm of the evidence, once the group's diffuse reflectance is
+    /// integrated out: `S S`, `S y`, `y y`, and the logarithm of the volume.
+    fn without_diffuse(&self, sums: &[f64; 6], around: f64) -> ([f64; 3], f64) {
+        let &[ee, es, ss, ey, sy, yy] = sums;
+        let (mean, precision) = (self.diffuse.0.unwrap_or(around), 1.0 / (self.diffuse.1 * self.diffuse.1));
+        let keep = 1.0 / (ee + precision);
+        let side = ey + precision * mean;
+        let left = [ss - es * es * keep, sy - es * side * keep, yy + precision * mean * mean - side * side * keep];
+        (left, -(precision * keep).ln())
+    }
+
     /// Inverse covariance of F0, and the logarithm of the covariance's determinant.
     fn precision(&self) -> (DMat3, f64) {
         let (common, own) = (self.specular.1.powi(2), self.specular.2.powi(2));
@@ -85,19 +116,27 @@ pub struct LobeBelief {
 }
 
 /// Points between two widths where the posterior is looked at.
-const FINE: usize = 6;
+const FINE: usize = 4;
 /// Logarithm of the evidence that a group shares one lobe, and what is then believed of it.
-pub fn shared_lobe(sums: &LobeSumsOfGroup, log_widths: &[f64; MOST_NODES], prior: &LobePrior) -> (f64, LobeBelief) {
+/// `around` is the mean diffuse reflectance of what lies around.
+pub fn shared_lobe(
+    sums: &LobeSumsOfGroup,
+    around: [f64; 3],
+    log_widths: &[f64; LOBE_WIDTHS],
+    prior: &LobePrior,
+) -> (f64, LobeBelief) {
     // Per width: logarithm of the evidence, mean and square of F0.
-    let mut log_at = [0.0f64; MOST_NODES];
-    let mut specular = [[[0.0f64; 2]; 3]; MOST_NODES];
-    for node in 0..MOST_NODES {
+    let mut log_at = [0.0f64; LOBE_WIDTHS];
+    let mut specular = [[[0.0f64; 2]; 3]; LOBE_WIDTHS];
+    for node in 0..LOBE_WIDTHS {
         let mut kinds = [(0.0f64, [(0.0f64, 0.0f64); 3]); KINDS];
-        for ((own, kind), sums) in kinds.iter_mut().zip(&prior.kinds).zip(&sums.0) {
-            let (precision, log_volume) = kind.precision();
+        for (own, kind) in kinds.iter_mut().zip(&prior.kinds) {
+            let (precision, mut log_volume) = kind.precision();
             let (mut total, mut side) = (precision, precision * DVec3::splat(kind.specular.0));
             let mut cost = kind.specular.0 * side.element_sum();
-            for (channel, &[ss, sy, yy]) in sums[node].iter().enumerate() {
+            for (channel, sums) in sums.0[node].iter().enumerate() {
+                let ([ss, sy, yy], log_of_diffuse) = kind.without_diffuse(sums, around[channel]);
+                log_volume += log_of_diffuse;
                 total.col_mut(channel)[channel] += ss;
                 side[channel] += sy;
                 cost += yy;
@@ -117,9 +156,9 @@ pub fn shared_lobe(sums: &LobeSumsOfGroup, log_widths: &[f64; MOST_NODES], prior
         }
     }
     // Between widths the logarithm of the evidence is a parabola, as that of a normal distribution is.
-    let mut points = [(0.0f64, 0usize, 0.0f64, 0.0f64); (MOST_NODES - 1) * FINE + 1];
+    let mut points = [(0.0f64, 0usize, 0.0f64, 0.0f64); (LOBE_WIDTHS - 1) * FINE + 1];
     for (index, point) in points.iter_mut().enumerate() {
-        let (node, part) = ((index / FINE).min(MOST_NODES - 2), index);
+        let (node, part) = ((index / FINE).min(LOBE_WIDTHS - 2), index);
         let share = (part - node * FINE) as f64 / FINE as f64;
         let x = log_widths[node] * (1.0 - share) + log_widths[node + 1] * share;
         let step = (log_widths[node + 1] - log_widths[node]) / FINE as f64;
@@ -147,10 +186,10 @@ pub fn shared_lobe(sums: &LobeSumsOfGroup, log_widths: &[f64; MOST_NODES], prior
 
 /// Between two nodes: the straight line, and the smaller of the curvatures at both ends where they have one sign. For a
 /// parabola that is the parabola; beside a kink it does not overshoot.
-fn between(x: &[f64; MOST_NODES], y: &[f64; MOST_NODES], node: usize, at: f64) -> f64 {
+fn between(x: &[f64; LOBE_WIDTHS], y: &[f64; LOBE_WIDTHS], node: usize, at: f64) -> f64 {
     let slope = |k: usize| (y[k + 1] - y[k]) / (x[k + 1] - x[k]);
     let curvature = |middle: usize| {
-        let middle = middle.clamp(1, MOST_NODES - 2);
+        let middle = middle.clamp(1, LOBE_WIDTHS - 2);
         (slope(middle) - slope(middle - 1)) / (x[middle + 1] - x[middle - 1])
     };
     let (left, right) = (curvature(node), curvature(node + 1));

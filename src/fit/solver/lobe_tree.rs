@@ -1,8 +1,10 @@
 //! Which texels share a lobe: a tree of hypotheses over a tile, weighed by their evidence.
 //!
-//! Given F0 and a width, diffuse reflectances of texels are independent of each other, so each can be integrated out,
-//! and what is left of a texel is three sums per channel and width. Sums of texels add up: any group of texels can be
-//! asked how likely its pixels are if it shares one lobe, by a closed integral over F0 and a sum over widths.
+//! Given F0, a width and the diffuse reflectance of a group, deviations of its texels are independent of each other, so
+//! each can be integrated out, and what is left of a texel is six sums per channel and width. Sums of texels add up: any
+//! group of texels can be asked how likely its pixels are if it shares one lobe, by a closed integral over the group's
+//! diffuse reflectance and F0 and a sum over widths. What a kind of surface says of diffuse reflectance counts once a
+//! group. Counted once a texel it outvoted the pixels: rough metals that are not black below came out as dielectrics.
 //!
 //! A group shares a lobe, or is cut into quarters, or into two by colour, each part with the same choice: Bayesian model
 //! averaging over all prunings of a tree (Willems, Shtarkov and Tjalkens 1995, context-tree weighting). What comes out
@@ -10,8 +12,8 @@
 //!
 //! [`super::lobe_evidence`] asks one group; here groups are made and weighed.
 
-use super::block::MOST_NODES;
 use super::lobe_evidence::{LobeBelief, LobePrior, LobeSumsOfGroup, log_sum, shared_lobe};
+use super::lobe_widths::LOBE_WIDTHS;
 
 /// A texel of a tile: where it lies and what tells it from others.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,11 +47,17 @@ pub fn beliefs(
     texels: &[TreeTexel],
     sums: &[LobeSumsOfGroup],
     side: usize,
-    log_widths: &[f64; MOST_NODES],
+    log_widths: &[f64; LOBE_WIDTHS],
     prior: &LobePrior,
 ) -> Vec<LobeBelief> {
-    let alone = sums.iter().map(|sums| shared_lobe(sums, log_widths, prior)).collect();
-    let tree = Tree { texels, sums, alone, log_widths, prior };
+    let mut around = [0.0f64; 3];
+    for texel in texels {
+        for (sum, value) in around.iter_mut().zip(texel.colour) {
+            *sum += f64::from(value) / texels.len() as f64;
+        }
+    }
+    let alone = sums.iter().map(|sums| shared_lobe(sums, around, log_widths, prior)).collect();
+    let tree = Tree { texels, sums, alone, around, log_widths, prior };
     let root = tree.grow((0..texels.len() as u32).collect(), (0, 0), side, true);
     let mut made = vec![LobeBelief::default(); texels.len()];
     tree.spread(&root, 1.0, &mut made);
@@ -66,7 +74,9 @@ struct Tree<'a> {
     sums: &'a [LobeSumsOfGroup],
     /// Evidence and belief of each texel alone.
     alone: Vec<(f64, LobeBelief)>,
-    log_widths: &'a [f64; MOST_NODES],
+    /// Mean diffuse reflectance of all texels.
+    around: [f64; 3],
+    log_widths: &'a [f64; LOBE_WIDTHS],
     prior: &'a LobePrior,
 }
 
@@ -79,7 +89,7 @@ impl Tree<'_> {
                 for &texel in &texels {
                     sums.add(&self.sums[texel as usize]);
                 }
-                shared_lobe(&sums, self.log_widths, self.prior)
+                shared_lobe(&sums, self.around, self.log_widths, self.prior)
             }
         };
         let mut cuts = Vec::new();
@@ -190,19 +200,15 @@ impl Tree<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::lobe_evidence::KINDS;
+    use super::super::lobe_widths::weighed_log_widths;
     use super::*;
-
-    const WIDTHS: [f64; MOST_NODES] = [-3.9, -3.2, -2.6, -2.1, -1.7, -1.35, -1.0, -0.65, -0.3, 0.0];
 
     /// Sums of a texel whose pixels say F0 with this precision at a width, and that other widths are worse.
     fn sums(specular: f64, log_width: f64, precision: f64) -> LobeSumsOfGroup {
-        LobeSumsOfGroup(
-            [WIDTHS.map(|x| {
-                let misfit = precision * 0.5 * (x - log_width).powi(2);
-                [[precision, precision * specular, precision * specular * specular + misfit]; 3]
-            }); KINDS],
-        )
+        LobeSumsOfGroup(weighed_log_widths().map(|x| {
+            let misfit = precision * 0.5 * (x - log_width).powi(2);
+            [[0.0, 0.0, precision, 0.0, precision * specular, precision * specular * specular + misfit]; 3]
+        }))
     }
 
     fn tile(of: impl Fn(usize, usize) -> (f64, f64, [f32; 3]), precision: f64) -> Vec<LobeBelief> {
@@ -215,7 +221,7 @@ mod tests {
                 all.push(sums(specular, log_width, precision));
             }
         }
-        beliefs(&texels, &all, 8, &WIDTHS, &LobePrior::default())
+        beliefs(&texels, &all, 8, &weighed_log_widths(), &LobePrior::default())
     }
 
     #[test]

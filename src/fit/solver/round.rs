@@ -3,6 +3,7 @@
 use super::block::{BlockPrior, BlockSolution, MOST_NODES, PixelTerms, solve_block};
 use super::eliminate::BlockRows;
 use super::light_shape::LightShape;
+use super::lobe_widths::WidthStencil;
 use super::observations::{Observation, Observations};
 use super::plan::Block;
 use crate::render::cached::irradiance::add_irradiance_row;
@@ -176,14 +177,11 @@ impl Round<'_> {
     /// Model radiance of a term with the block's solution.
     pub fn model(&self, work: &BlockWork, term: &PixelTerms) -> [f32; 3] {
         let solution = &work.solution;
-        let weights =
-            super::block::interpolation(&log_widths(), &work.nodes, solution.best_node, f64::from(solution.log_width));
+        let stencil = WidthStencil::new(&log_widths(), f64::from(solution.log_width), work.nodes.clone());
         [0, 1, 2].map(|c| {
-            let mut value = solution.cells[usize::from(term.cell)][c] * term.arriving[c];
-            for &(node, weight) in &weights {
-                value += weight * (solution.specular[c] * term.base[node][c] + term.grazing[node][c]);
-            }
-            value
+            solution.cells[usize::from(term.cell)][c] * term.arriving[c]
+                + solution.specular[c] * stencil.of(&term.base, c)
+                + stencil.of(&term.grazing, c)
         })
     }
 

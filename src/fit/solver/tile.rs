@@ -3,9 +3,10 @@
 //! Blocks book a pixel at the one texel it covers most. Here diffuse reflectance is solved with the footprints inside the
 //! tile, pixels are relieved of what they cover of the neighbours, and what is left tells of lobes ([`super::lobe_tree`]).
 
-use super::block::{MOST_NODES, PixelTerms};
+use super::block::PixelTerms;
 use super::lobe_evidence::{LobeBelief, LobePrior, LobeSumsOfGroup};
 use super::lobe_tree::{TreeTexel, beliefs};
+use super::lobe_widths::{LOBE_WIDTHS, WidthStencil, weighed_log_widths, weighed_stencils};
 use super::round::{BlockWork, Round, log_widths};
 
 /// Texels along a tile's side.
@@ -16,6 +17,8 @@ const PASSES: usize = 2;
 const SWEEPS: usize = 8;
 /// What is believed of diffuse reflectance: the tile's mean, and this standard deviation.
 const DIFFUSE_SPREAD: f64 = 0.35;
+/// Standard deviation of a texel's diffuse reflectance from that of the group that shares its lobe.
+const TEXEL_SPREAD: f64 = 0.2;
 /// Residuals of bright pixels are forgiven: half of the noise goes with the radiance.
 const RELATIVE_NOISE: f32 = 1.0;
 /// Least noise, relative to the mean of the photos.
@@ -150,18 +153,9 @@ impl Tile {
         let widths = log_widths();
         for pixel in &mut self.pixels {
             let mean = &self.lobes[pixel.texel].mean;
-            let x = mean[3].clamp(widths[pixel.nodes.0], widths[pixel.nodes.1 - 1]);
-            let mut node = pixel.nodes.0;
-            while node + 2 < pixel.nodes.1 && widths[node + 1] < x {
-                node += 1;
-            }
-            let next = (node + 1).min(pixel.nodes.1 - 1);
-            let share = if next > node { ((x - widths[node]) / (widths[next] - widths[node])) as f32 } else { 0.0 };
+            let stencil = WidthStencil::new(&widths, mean[3], pixel.nodes.0..pixel.nodes.1);
             let terms = &pixel.terms;
-            pixel.lobe = [0, 1, 2].map(|c| {
-                let at = |node: usize| mean[c] as f32 * terms.base[node][c] + terms.grazing[node][c];
-                at(node) * (1.0 - share) + at(next) * share
-            });
+            pixel.lobe = [0, 1, 2].map(|c| mean[c] as f32 * stencil.of(&terms.base, c) + stencil.of(&terms.grazing, c));
         }
     }
 
@@ -249,15 +243,10 @@ impl Tile {
     fn solve_lobes(&mut self, map_size: usize, independence: f64, prior: &LobePrior) {
         let scale = independence / self.noise;
         let count = self.texels.len();
-        let mut mean = [0.0f64; 3];
-        for rho in &self.rho {
-            for c in 0..3 {
-                mean[c] += f64::from(rho[c]) / count as f64;
-            }
-        }
-        let widths = log_widths();
+        let widths = weighed_log_widths();
+        let stencils = weighed_stencils();
         // Per texel, width and channel: E E, E S, S S, E y, S y, y y.
-        let mut raw = vec![[[[0.0f64; 6]; 3]; MOST_NODES]; count];
+        let mut raw = vec![[[[0.0f64; 6]; 3]; LOBE_WIDTHS]; count];
         for pixel in &self.pixels {
             let weight = scale * f64::from(pixel.terms.weight);
             if weight == 0.0 {
@@ -268,17 +257,17 @@ impl Tile {
                 let e = f64::from(pixel.terms.arriving[c]);
                 let neighbours = self.under(pixel, c) - self.rho[pixel.texel][c];
                 let radiance = f64::from(pixel.terms.radiance[c] - pixel.terms.arriving[c] * neighbours);
-                for node in 0..MOST_NODES {
-                    // A width that was not looked at is the narrowest that was, and worse.
-                    let known = node.clamp(pixel.nodes.0, pixel.nodes.1 - 1);
-                    let s = f64::from(pixel.terms.base[known][c]);
-                    let y = radiance - f64::from(pixel.terms.grazing[known][c]);
-                    for (sum, value) in own[node][c].iter_mut().zip([e * e, e * s, s * s, e * y, s * y, y * y]) {
+                // A width that was not looked at is the narrowest that was, and worse.
+                for (sums, stencil) in own.iter_mut().zip(&stencils[pixel.nodes.0]) {
+                    let s = f64::from(stencil.of(&pixel.terms.base, c));
+                    let y = radiance - f64::from(stencil.of(&pixel.terms.grazing, c));
+                    for (sum, value) in sums[c].iter_mut().zip([e * e, e * s, s * s, e * y, s * y, y * y]) {
                         *sum += weight * value;
                     }
                 }
             }
         }
+        let integrated = log_widths();
         let first = self.pixels.iter().fold(vec![0usize; count], |mut first, pixel| {
             first[pixel.texel] = first[pixel.texel].max(pixel.nodes.0);
             first
@@ -287,27 +276,8 @@ impl Tile {
             .iter()
             .zip(&first)
             .map(|(raw, &first)| {
-                let mut made = LobeSumsOfGroup::default();
-                // The volume of what diffuse reflectance could be is left out: neighbours are alike, so a texel each would
-                // count it far too often, in favour of the kind that believes the most (toys: all of it metal).
-                for (kind, made) in prior.kinds.iter().zip(&mut made.0) {
-                    let ridge = 1.0 / (kind.diffuse.1 * kind.diffuse.1);
-                    for node in 0..MOST_NODES {
-                        let unseen = UNSEEN_WIDTH * (widths[first] - widths[node]).max(0.0);
-                        for c in 0..3 {
-                            let [ee, es, ss, ey, sy, yy] = raw[node][c];
-                            let believed = kind.diffuse.0.unwrap_or(mean[c]);
-                            let keep = 1.0 / (ee + ridge);
-                            let side = ey + ridge * believed;
-                            made[node][c] = [
-                                ss - es * es * keep,
-                                sy - es * side * keep,
-                                yy + ridge * believed * believed - side * side * keep + unseen / 3.0,
-                            ];
-                        }
-                    }
-                }
-                made
+                let worse = widths.map(|width| UNSEEN_WIDTH * (integrated[first] - width).max(0.0));
+                LobeSumsOfGroup::of_texel(raw, 1.0 / (TEXEL_SPREAD * TEXEL_SPREAD), &worse)
             })
             .collect();
         let texels: Vec<TreeTexel> = self
@@ -323,7 +293,7 @@ impl Tile {
         self.lobes = beliefs(&texels, &sums, TILE, &widths, prior);
         let ridge = 1.0 / (DIFFUSE_SPREAD * DIFFUSE_SPREAD);
         for (texel, lobe) in self.lobes.iter().enumerate() {
-            let node = widths.partition_point(|&width| width < lobe.mean[3]).min(MOST_NODES - 1);
+            let node = widths.partition_point(|&width| width < lobe.mean[3]).min(LOBE_WIDTHS - 1);
             self.variance[texel] = [0, 1, 2].map(|c| {
                 let [ee, es, ..] = raw[texel][node][c];
                 (1.0 / (ee + ridge) + (es / (ee + ridge)).powi(2) * lobe.square[c]) as f32
