@@ -141,12 +141,15 @@ pub struct RivalRow {
     pub sphere: Option<SphereError>,
 }
 
+/// Fits one model to a table.
+pub type Fitter<'a> = dyn Fn(&MeasuredBrdf) -> Result<EntrantFit> + 'a;
+
 /// A model under its name in tables, and how it is fitted: a rival, or a learned model, of which this layer knows nothing.
 pub struct Entrant<'a> {
     /// The name.
     pub name: &'a str,
     /// Fits it to a table.
-    pub fit: Box<dyn Fn(&MeasuredBrdf) -> Result<EntrantFit> + 'a>,
+    pub fit: Box<Fitter<'a>>,
 }
 
 /// What came of a fit.

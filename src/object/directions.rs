@@ -237,7 +237,7 @@ mod tests {
     #[test]
     fn parts_come_in_the_order_of_texels_and_cover_the_hemisphere() {
         let directions = TexelDirections::new(64, 32).unwrap();
-        let normal = Vec3::new(0.3, 0.5, 0.8).normalize();
+        let normal = Vec3::new(0.36, 0.48, 0.8);
         let pixel =
             ObjectPixel { row: 0, column: 0, normal, to_eye: Vec3::Z, origin: normal, geometric_normal: normal };
         let (mut last, mut sum, mut parts) = (0, 0.0, 0);
