@@ -19,6 +19,7 @@ use patina::job::pictures::{light_of, parameters, relit};
 use patina::job::prepare::RunSettings;
 use patina::light::Environment;
 use patina::material::MaterialMaps;
+use patina::measured::table::MeasuredBrdf;
 use patina::render::picture::{PictureSettings, render};
 use patina::render::{Parameters, Surface};
 use patina::scene::Scene;
@@ -74,7 +75,7 @@ fn a_turntable_comes_around_and_both_ways_of_turning_show_the_same() {
     let frames = |turning: Turning| {
         let mut frames = Vec::new();
         let settings = TurntableSettings { turning, ..settings.clone() };
-        turntable(&surface, &own, &settings, &picture, &GO, &mut |number, picture| {
+        turntable(&surface, &own, None, &settings, &picture, &GO, &mut |number, picture| {
             assert_eq!(number, frames.len());
             frames.push(picture.radiance);
             Ok(())
@@ -103,7 +104,8 @@ fn a_turntable_is_numbered_files_and_a_stop_leaves_whole_ones() {
     let settings = TurntableSettings { frames: 3, size: (16, 12), turning: Turning::Camera, start: None };
     let display = DisplaySettings::default();
     let files =
-        write_turntable(folder.path(), &surface, &own, &settings, &quick_picture(), &display, &GO, &|_| {}).unwrap();
+        write_turntable(folder.path(), &surface, &own, None, &settings, &quick_picture(), &display, &GO, &|_| {})
+            .unwrap();
     assert_eq!(files.len(), 3);
     assert!(files[2].ends_with("frame_0002.png"));
     assert!(files.iter().all(|path| file::read_size(path).unwrap() == (16, 12)));
@@ -111,11 +113,12 @@ fn a_turntable_is_numbered_files_and_a_stop_leaves_whole_ones() {
     let other = tempfile::tempdir().unwrap();
     let stop = AtomicBool::new(false);
     let raise = |_| stop.store(true, Ordering::Relaxed);
-    let outcome = write_turntable(other.path(), &surface, &own, &settings, &quick_picture(), &display, &stop, &raise);
+    let outcome =
+        write_turntable(other.path(), &surface, &own, None, &settings, &quick_picture(), &display, &stop, &raise);
     assert_eq!(outcome.unwrap_err().kind(), ErrorKind::Stopped);
     assert_eq!(std::fs::read_dir(other.path()).unwrap().count(), 1);
     let none = TurntableSettings { frames: 0, ..settings };
-    let outcome = turntable(&surface, &own, &none, &quick_picture(), &GO, &mut |_, _| Ok(()));
+    let outcome = turntable(&surface, &own, None, &none, &quick_picture(), &GO, &mut |_, _| Ok(()));
     assert_eq!(outcome.unwrap_err().kind(), ErrorKind::InvalidSetting);
 }
 
@@ -318,6 +321,15 @@ fn a_run_is_moved_into_a_new_folder_and_the_command_line_does_the_same() {
     assert_eq!(patina(&turn), success);
     let frame = path("run").join("relight/turntable_overcast/frame_0001.png");
     assert_eq!(file::read_size(&frame).unwrap(), (24, 18));
+    // A material on the whole surface turns with it.
+    let gold = path("gold.binary");
+    MeasuredBrdf::from_fn(|_| [0.3, 0.2, 0.02]).write(&gold).unwrap();
+    let (gold, other) = (text("gold.binary"), text("turned"));
+    let mut of_gold = turn.to_vec();
+    of_gold.extend(["--material", &gold, "-o", &other]);
+    assert_eq!(patina(&of_gold), success);
+    let turned = file::read_srgb8(&path("turned/turntable_overcast/frame_0001.png")).unwrap();
+    assert_ne!(turned, file::read_srgb8(&frame).unwrap());
     let wrong = ["relight", &run, "--env", "noon", "--turntable", "2", "--size", "24"];
     assert_ne!(patina(&wrong), success);
 }

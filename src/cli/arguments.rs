@@ -408,7 +408,7 @@ pub struct RelightOptions {
     pub hide_background: bool,
     /// Give parts of the surface a measured reflectance: a `.binary` file, the result folder of `patina object`, or the
     /// name of a material of the neural model. One for each --region, or one for the whole surface.
-    #[arg(long, conflicts_with = "turntable")]
+    #[arg(long)]
     pub material: Vec<String>,
     /// Take materials from this folder of neural fits of measurements, not from the neural model.
     #[arg(long, requires = "material")]

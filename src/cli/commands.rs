@@ -117,8 +117,9 @@ pub fn relight(options: &RelightOptions) -> Result<()> {
             let start = scene.views[first].camera.shrunk(options.shrink.max(1));
             let lit = Parameters::new(own.texels.clone(), &light);
             let folder = output.join(format!("turntable_{stem}"));
-            let (turn, exposure) = (&options.turntable, options.exposure);
-            super::turntable::write(&folder, &surface, &lit, &start, turn, frames, &picture_settings, exposure)?;
+            let (turn, exposure, picture) = (&options.turntable, options.exposure, &picture_settings);
+            let regions = regions.as_ref();
+            super::turntable::write(&folder, &surface, &lit, regions, &start, turn, frames, picture, exposure)?;
             continue;
         }
         for &view in &views {

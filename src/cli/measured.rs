@@ -148,7 +148,7 @@ pub struct RivalsOptions {
     /// Only these materials.
     #[arg(long, value_delimiter = ',')]
     pub materials: Vec<String>,
-    /// Only these models.
+    /// Only these models: ibrdf (one net per material), bivariate, dsbrdf, cook-torrance, cook-torrance-two, ggx, ward, maps.
     #[arg(long, value_delimiter = ',')]
     pub models: Vec<String>,
     /// Every eighth material only.
@@ -257,6 +257,8 @@ fn fit(options: &MeasuredFitOptions, json: bool) -> Result<()> {
     if options.model == own_net::KEY {
         let (table, name) = table_of(&options.source)?;
         let found = own_net::fit_own_net(&crate::neural::shipped()?, &table, &OwnNetSettings::default())?;
+        let command = format!("patina measured fit {name} --model {}", own_net::KEY);
+        found.named(&name, &command).write(&options.output.join(own_net::FILE))?;
         let fitted = Fitted {
             model: own_net::NAME,
             table: found.model.table(&found.parameters),
@@ -357,11 +359,10 @@ fn report_fit(
 fn rivals(options: &RivalsOptions, json: bool) -> Result<()> {
     let stop = Arc::new(AtomicBool::new(false));
     stop_on_interrupt(Arc::clone(&stop));
-    let models = options.models.iter().map(|key| Rival::of_key(key)).collect::<Result<Vec<Rival>>>()?;
     let study = RivalOptions {
         library: options.library.clone(),
         materials: options.materials.clone(),
-        models,
+        models: options.models.clone(),
         quick: options.quick,
         output: options.output.clone(),
     };

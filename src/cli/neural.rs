@@ -269,8 +269,8 @@ fn time(options: &SpeedOptions, json: bool) -> Result<()> {
             println!("{}", serde_json::json!({"configuration": name, "weights": flow.weights.len(), "speed": found}));
         } else {
             println!(
-                "{name}, {} weights, batches of {}: {:.3e} evaluations/s, {:.3e} samples/s; one thread: {:.3e} with \
-                 gradients/s, {:.3e} in columns/s",
+                "{name}, {} weights, batches of {}: {:.3e} evaluations/s, {:.3e} samples/s, {:.3e} with gradients/s; one \
+                 thread: {:.3e} in columns/s",
                 flow.weights.len(),
                 found.batch,
                 found.evaluations_per_second,

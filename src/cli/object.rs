@@ -198,6 +198,12 @@ pub struct StudyIbrdfOptions {
     /// A few small cases, some minutes.
     #[arg(long)]
     pub quick: bool,
+    /// Materials of each figure at most, in place of two with --quick and the paper's number without.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    pub materials: Option<u16>,
+    /// Lights of each figure at most, in place of one or two with --quick and the paper's number without.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    pub lights: Option<u16>,
     /// Only these parts.
     #[arg(long, value_enum, value_delimiter = ',')]
     pub parts: Vec<study::Part>,
@@ -227,6 +233,8 @@ pub fn study(options: &StudyIbrdfOptions, json: bool) -> Result<()> {
         weights: options.weights.clone(),
         models,
         quick: options.quick,
+        materials: options.materials.map(usize::from),
+        lights: options.lights.map(usize::from),
         parts: options.parts.clone(),
         dsbrdf_minutes: options.dsbrdf_minutes.unwrap_or(if options.quick { 0.0 } else { f64::INFINITY }),
         seed: options.seed,

@@ -4,6 +4,7 @@ use crate::error::Result;
 use crate::image::display::DisplaySettings;
 use crate::job::gallery::{Turning, TurntableSettings, write_turntable};
 use crate::render::picture::PictureSettings;
+use crate::render::regions::Regions;
 use crate::render::{Parameters, Surface};
 use crate::scene::Camera;
 use clap::Args;
@@ -39,6 +40,7 @@ pub fn write(
     folder: &Path,
     surface: &Surface,
     lit: &Parameters<f32>,
+    regions: Option<&Regions>,
     start: &Camera,
     options: &TurntableOptions,
     frames: u32,
@@ -53,7 +55,7 @@ pub fn write(
     };
     let display = DisplaySettings { exposure_stops, ..Default::default() };
     let stop = AtomicBool::new(false);
-    for path in write_turntable(folder, surface, lit, &settings, picture, &display, &stop, &|_| {})? {
+    for path in write_turntable(folder, surface, lit, regions, &settings, picture, &display, &stop, &|_| {})? {
         println!("{}", path.display());
     }
     Ok(())

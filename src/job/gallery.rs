@@ -8,8 +8,10 @@ use crate::error::{Error, ErrorKind, Place, Result};
 use crate::image::display::DisplaySettings;
 use crate::image::{Image, RgbImage, file};
 use crate::light::Environment;
+use crate::render::measured_regions::render_regions;
 use crate::render::picture::{Picture, PictureSettings, render};
 use crate::render::progressive::{Accumulation, PictureTracer};
+use crate::render::regions::Regions;
 use crate::render::{Parameters, Surface};
 use crate::scene::{Camera, Mesh};
 use glam::{Mat3, Vec2, Vec3};
@@ -76,13 +78,15 @@ pub fn relight_strip(
     Ok(pictures)
 }
 
-/// Draws the frames of one turn under the light of `lit` and hands each on, with its number from 0.
+/// Draws the frames of one turn under the light of `lit`, with measured materials in `regions` if there are any, and hands
+/// each on, with its number from 0.
 ///
 /// # Errors
 /// `InvalidSetting` without frames or pixels, `Stopped` when `stop` was raised, and whatever `take` returns.
 pub fn turntable(
     surface: &Surface,
     lit: &Parameters<f32>,
+    regions: Option<&Regions>,
     turntable: &TurntableSettings,
     settings: &PictureSettings,
     stop: &AtomicBool,
@@ -101,7 +105,12 @@ pub fn turntable(
             set_light(&mut lit, &light.rotated_about_up(angle_of_frame(turntable, frame)));
         }
         // Another view each frame: noise that stands still would look like a pattern on the glass.
-        take(frame, drawn(surface, &camera, &lit, frame as u32, settings, stop)?)?;
+        let view = frame as u32;
+        let picture = match regions {
+            Some(regions) => whole(render_regions(surface, &camera, &lit, regions, view, settings, stop), stop)?,
+            None => drawn(surface, &camera, &lit, view, settings, stop)?,
+        };
+        take(frame, picture)?;
     }
     Ok(())
 }
@@ -111,6 +120,7 @@ pub fn write_turntable(
     folder: &Path,
     surface: &Surface,
     lit: &Parameters<f32>,
+    regions: Option<&Regions>,
     settings: &TurntableSettings,
     picture: &PictureSettings,
     display: &DisplaySettings,
@@ -118,7 +128,7 @@ pub fn write_turntable(
     progress: &dyn Fn(f32),
 ) -> Result<Vec<PathBuf>> {
     let mut files = Vec::with_capacity(settings.frames);
-    turntable(surface, lit, settings, picture, stop, &mut |frame, drawn| {
+    turntable(surface, lit, regions, settings, picture, stop, &mut |frame, drawn| {
         let path = folder.join(format!("frame_{frame:04}.png"));
         save_picture(&path, &drawn.radiance, display)?;
         files.push(path);
@@ -283,7 +293,11 @@ pub(super) fn drawn(
     settings: &PictureSettings,
     stop: &AtomicBool,
 ) -> Result<Picture> {
-    let picture = render(surface, camera, lit, view, settings, stop);
+    whole(render(surface, camera, lit, view, settings, stop), stop)
+}
+
+/// A picture that was not stopped.
+fn whole(picture: Picture, stop: &AtomicBool) -> Result<Picture> {
     if stop.load(Ordering::Relaxed) {
         return Err(Error::new(ErrorKind::Stopped, "stopped while pictures were drawn")
             .remedy("pictures that were written before are whole"));

@@ -7,8 +7,10 @@ use crate::files::write_bytes;
 use crate::insight::study::StudyTable;
 use crate::measured::fit_model::ModelFitSettings;
 use crate::measured::fits::NeuralFits;
-use crate::measured::rivals::{Rival, RivalRow, rival_table, summarise};
+use crate::measured::rivals::{Entrant, EntrantFit, Rival, RivalRow, rival_table, summarise};
+use crate::measured::sphere_error::sphere_error;
 use crate::measured::table::MeasuredBrdf;
+use crate::neural::own_net::{self, OwnNetSettings};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -19,8 +21,8 @@ pub struct RivalOptions {
     pub library: PathBuf,
     /// Names of materials; empty for all.
     pub materials: Vec<String>,
-    /// Models; empty for all.
-    pub models: Vec<Rival>,
+    /// Models by their keys, [`Rival::key`] or [`own_net::KEY`]; empty for all.
+    pub models: Vec<String>,
     /// Every eighth material only.
     pub quick: bool,
     /// Folder of the tables.
@@ -41,14 +43,14 @@ pub fn run(options: &RivalOptions, stop: &AtomicBool, tell: &dyn Fn(&RivalRow)) 
     } else {
         options.materials.iter().map(|name| fits.find(name).map(|fit| fit.name.as_str())).collect::<Result<_>>()?
     };
-    let models = if options.models.is_empty() { Rival::ALL.to_vec() } else { options.models.clone() };
+    let settings = ModelFitSettings::default();
+    let models = entrants(&options.models, &settings)?;
 
     let path = options.output.join("rivals.jsonl");
     let known = read_rows(&path)?;
     let mut kept = known.clone();
     let table_of = |name: &str| -> Result<MeasuredBrdf> { Ok(fits.find(name)?.table()) };
-    let settings = ModelFitSettings::default();
-    let rows = rival_table(&materials, &models, &known, &table_of, &settings, stop, &mut |row| {
+    let rows = rival_table(&materials, &models, &known, &table_of, stop, &mut |row| {
         kept.push(row.clone());
         write_rows(&path, &kept)?;
         tell(row);
@@ -61,16 +63,55 @@ pub fn run(options: &RivalOptions, stop: &AtomicBool, tell: &dyn Fn(&RivalRow)) 
     Ok(table)
 }
 
+/// The models of some keys, all when there is none.
+///
+/// # Errors
+/// A key that is not known.
+fn entrants<'a>(keys: &[String], settings: &'a ModelFitSettings) -> Result<Vec<Entrant<'a>>> {
+    if keys.is_empty() {
+        let rivals = Rival::ALL.into_iter().map(|rival| Entrant::of(rival, settings));
+        return Ok(std::iter::once(own_net()?).chain(rivals).collect());
+    }
+    let of_key = |key: &String| match key.as_str() {
+        own_net::KEY => own_net(),
+        key => Rival::of_key(key).map(|rival| Entrant::of(rival, settings)).map_err(|error| {
+            let remedy = format!("{}, {}", error.remedy_text(), own_net::KEY);
+            Error::new(ErrorKind::InvalidSetting, error.message()).remedy(remedy)
+        }),
+    };
+    keys.iter().map(of_key).collect()
+}
+
+/// The neural model with all its weights fitted to each material.
+fn own_net() -> Result<Entrant<'static>> {
+    let shipped = crate::neural::shipped()?;
+    let fit = move |table: &MeasuredBrdf| -> Result<EntrantFit> {
+        let found = own_net::fit_own_net(&shipped, table, &OwnNetSettings::default())?;
+        let sphere = sphere_error(&found.model.reader(&found.parameters), table)?;
+        Ok(EntrantFit { parameters: found.parameter_count(), error: found.error, sphere })
+    };
+    Ok(Entrant { name: own_net::NAME, fit: Box::new(fit) })
+}
+
 /// The rows as a table of models: one value a material.
 pub fn study_table(rows: &[RivalRow]) -> StudyTable {
     let mut table = StudyTable::new(
         "Reflectance models over materials",
         "model",
-        &[("log-RMSE", ""), ("log10-RMSE", ""), ("RMSE of ln(1 + f cos)", ""), ("parameters", "")],
+        &[
+            ("log-RMSE", ""),
+            ("log10-RMSE", ""),
+            ("RMSE of ln(1 + f cos)", ""),
+            ("sphere, RMSE of sRGB", ""),
+            ("sphere, log-RMSE", ""),
+            ("parameters", ""),
+        ],
     );
     for row in rows {
         let error = row.error;
-        table.add(&row.model, &[error.log_rmse, error.log10_rmse, error.cosine_rmse, row.parameters as f64]);
+        let sphere = row.sphere.map_or([f64::NAN; 2], |sphere| [sphere.displayed_rmse, sphere.log_rmse]);
+        let figures = [error.log_rmse, error.log10_rmse, error.cosine_rmse, sphere[0], sphere[1]];
+        table.add(&row.model, &[&figures[..], &[row.parameters as f64]].concat());
     }
     for summary in summarise(rows).iter().filter(|summary| summary.category.is_none()) {
         table.notes.push(format!(
@@ -139,6 +180,7 @@ mod tests {
     use super::*;
     use crate::measured::category::Category;
     use crate::measured::metrics::TableError;
+    use crate::measured::sphere_error::SphereError;
 
     #[test]
     fn rows_survive_their_file_and_become_tables() {
@@ -148,6 +190,7 @@ mod tests {
             model: model.into(),
             parameters: 8,
             error: TableError { log_rmse, cells: 3, ..Default::default() },
+            sphere: Some(SphereError { displayed_rmse: 0.01, log_rmse: 0.1 }),
         };
         let rows = vec![row("steel", "A", 0.1), row("steel", "B", 0.3), row("pink-felt", "A", 0.2)];
         let folder = tempfile::tempdir().unwrap();

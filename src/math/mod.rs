@@ -5,6 +5,7 @@
 //! path sums run in `f32`, in `f64` for audits, and with derivatives for Hessian-vector products.
 //! What is not here: linear algebra (that is glam's and faer's).
 
+pub mod arc;
 pub mod distribution;
 pub mod frame;
 pub mod random;

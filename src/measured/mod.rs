@@ -20,6 +20,7 @@ pub mod metrics;
 pub mod model;
 pub mod rivals;
 pub mod sphere;
+pub mod sphere_error;
 pub mod table;
 
 pub use category::Category;

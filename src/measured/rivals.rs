@@ -2,9 +2,11 @@
 
 use super::analytic::{AnalyticModel, Bivariate, Dsbrdf, LambertLobes, LobeKind, OwnLobe};
 use super::category::Category;
+use super::coordinates::HalfDifference;
 use super::fit_model::{ModelFitSettings, fit_model};
 use super::metrics::{TableError, model_error};
 use super::model::ReflectanceModel;
+use super::sphere_error::{SphereError, sphere_error};
 use super::table::MeasuredBrdf;
 use crate::error::{Error, ErrorKind, Result};
 use crate::math::statistics::quantile;
@@ -134,6 +136,48 @@ pub struct RivalRow {
     pub parameters: usize,
     /// Error over all cells that count.
     pub error: TableError,
+    /// Error of the picture of a sphere, where it was asked for.
+    #[serde(default)]
+    pub sphere: Option<SphereError>,
+}
+
+/// Fits one model to a table.
+pub type Fitter<'a> = dyn Fn(&MeasuredBrdf) -> Result<EntrantFit> + 'a;
+
+/// A model under its name in tables, and how it is fitted: a rival, or a learned model, of which this layer knows nothing.
+pub struct Entrant<'a> {
+    /// The name.
+    pub name: &'a str,
+    /// Fits it to a table.
+    pub fit: Box<Fitter<'a>>,
+}
+
+/// What came of a fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EntrantFit {
+    /// Numbers that were fitted.
+    pub parameters: usize,
+    /// Error over all cells that count.
+    pub error: TableError,
+    /// Error of the picture of a sphere.
+    pub sphere: SphereError,
+}
+
+impl<'a> Entrant<'a> {
+    /// A rival as an entrant.
+    pub fn of(rival: Rival, settings: &'a ModelFitSettings) -> Self {
+        let fit = move |table: &MeasuredBrdf| -> Result<EntrantFit> {
+            let found = rival.fit(table, settings)?;
+            let value = |at: HalfDifference| {
+                let mut values = [[0.0; 3]];
+                found.model.evaluate(&found.parameters, &[at], &mut values);
+                values[0]
+            };
+            let (parameters, sphere) = (found.model.parameter_count(), sphere_error(&value, table)?);
+            Ok(EntrantFit { parameters, error: found.error, sphere })
+        };
+        Entrant { name: rival.name(), fit: Box::new(fit) }
+    }
 }
 
 /// Fits every model to every material: a row for each pair, material by material. `table_of` makes the table of a
@@ -141,21 +185,20 @@ pub struct RivalRow {
 /// taken over: a study that was stopped goes on there. Stops, with an error, when `stop` is set.
 pub fn rival_table(
     materials: &[&str],
-    models: &[Rival],
+    models: &[Entrant],
     known: &[RivalRow],
     table_of: &dyn Fn(&str) -> Result<MeasuredBrdf>,
-    settings: &ModelFitSettings,
     stop: &AtomicBool,
     tell: &mut dyn FnMut(&RivalRow) -> Result<()>,
 ) -> Result<Vec<RivalRow>> {
     let mut rows = Vec::with_capacity(materials.len() * models.len());
     for material in materials {
         let mut table = None;
-        for rival in models {
+        for entrant in models {
             if stop.load(Ordering::Relaxed) {
                 return Err(Error::new(ErrorKind::Stopped, "stopped").remedy("ask again for the same folder to go on"));
             }
-            if let Some(row) = known.iter().find(|row| row.material == *material && row.model == rival.name()) {
+            if let Some(row) = known.iter().find(|row| row.material == *material && row.model == entrant.name) {
                 rows.push(row.clone());
                 continue;
             }
@@ -163,13 +206,14 @@ pub fn rival_table(
                 Some(table) => table,
                 empty => empty.insert(table_of(material)?),
             };
-            let fit = rival.fit(table, settings)?;
+            let fit = (entrant.fit)(table)?;
             let row = RivalRow {
                 material: (*material).into(),
                 category: Category::of(material),
-                model: rival.name().into(),
-                parameters: fit.model.parameter_count(),
+                model: entrant.name.into(),
+                parameters: fit.parameters,
                 error: fit.error,
+                sphere: Some(fit.sphere),
             };
             tell(&row)?;
             rows.push(row);
@@ -236,13 +280,13 @@ mod tests {
             let strength = if name == "steel" { 5.0 } else { 0.1 };
             Ok(MeasuredBrdf::from_fn(|at| [0.1 + strength * (-(at.theta_half / 0.2).powi(2)).exp(); 3]))
         };
-        let models = [Rival::Bivariate, Rival::Ward];
         // Few steps: what is asked is which rows there are.
         let settings = ModelFitSettings { followed: 1, scouting_steps: 2, steps: 4, ..Default::default() };
+        let models = [Rival::Bivariate, Rival::Ward].map(|rival| Entrant::of(rival, &settings));
         let stop = AtomicBool::new(false);
         let mut told = 0;
         let mut study = |known: &[RivalRow], stop: &AtomicBool| {
-            rival_table(&["steel", "red-fabric"], &models, known, &table_of, &settings, stop, &mut |_| {
+            rival_table(&["steel", "red-fabric"], &models, known, &table_of, stop, &mut |_| {
                 told += 1;
                 Ok(())
             })
@@ -252,6 +296,7 @@ mod tests {
         // What is known is not fitted again, and comes in its place.
         assert_eq!(study(&rows[1..3], &stop).unwrap(), rows);
         assert!(rows.iter().filter(|row| row.model == "bivariate table").all(|row| row.error.log_rmse < 1e-9));
+        assert!(rows.iter().all(|row| row.sphere.is_some_and(|sphere| sphere.log_rmse < 2.0)));
         let summary = summarise(&rows);
         assert_eq!(summary.len(), 2 + 4);
         assert_eq!((summary[1].model.as_str(), summary[1].materials), ("Ward", 2));

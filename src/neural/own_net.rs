@@ -31,6 +31,9 @@ pub const NAME: &str = "iBRDF (one net per material)";
 /// Name of the model on the command line.
 pub const KEY: &str = "ibrdf";
 
+/// Name of the file of weights in a folder of a fit.
+pub const FILE: &str = "weights.safetensors";
+
 /// Steps at the end of a round that say how well it went.
 const LATE: u64 = 100;
 
@@ -106,6 +109,18 @@ impl OwnNetFit {
     /// Numbers that were fitted: weights, codes and colours.
     pub fn parameter_count(&self) -> usize {
         self.model.trained().flow.weights.len() + self.parameters.len()
+    }
+
+    /// The weights with codes and colours under a material's name, to be written and read as any trained flow. `command`
+    /// is told as what made them.
+    pub fn named(&self, material: &str, command: &str) -> Trained {
+        let mut own = Trained::clone(self.model.trained());
+        own.account.materials = vec![material.into()];
+        own.account.left_out = Vec::new();
+        own.account.data = format!("one material, {material}; begun from weights of: {}", own.account.data);
+        own.account.command = command.into();
+        own.account.log_error = self.error.log_rmse;
+        own
     }
 }
 
@@ -287,6 +302,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "slow: three fits, each judged over its whole table"]
     fn a_fit_has_the_same_bits_again_and_on_one_thread() {
         let (table, library) = (table(), crate::neural::shipped().unwrap());
         let first = fit_own_net(&library, &table, &few(12)).unwrap();
@@ -294,6 +310,12 @@ mod tests {
         let again = pool.install(|| fit_own_net(&library, &table, &few(12))).unwrap();
         assert_eq!(first.model.trained().flow.weights, again.model.trained().flow.weights);
         assert_eq!((&first.parameters, first.error), (&again.parameters, again.error));
+        // Its weights are a file that is read as any other.
+        let folder = tempfile::tempdir().unwrap();
+        first.named("velvet", "a test").write(&folder.path().join(FILE)).unwrap();
+        let read = Trained::read(&folder.path().join(FILE)).unwrap();
+        let parameters = FlowModel::new(Arc::new(read), 1).of_material("velvet").unwrap();
+        assert_eq!(parameters, first.parameters);
         let other = OwnNetSettings { seed: 2, start: OwnNetStart::Scratch, ..few(12) };
         assert_ne!(fit_own_net(&library, &table, &other).unwrap().parameters, first.parameters);
     }

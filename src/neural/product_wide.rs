@@ -95,10 +95,14 @@ fn pack(right: Strided, inner: usize, first: usize, wide: usize, stride: usize, 
             row[..wide].copy_from_slice(&right.values[from..from + wide]);
         }
     } else {
-        for column in 0..wide {
-            let from = (first + column) * right.column;
-            for k in 0..inner {
-                packed[k * stride + column] = right.values[from + k * right.row];
+        // A few rows at a time: what is written across the columns stays in the first cache.
+        for rows in (0..inner).step_by(LANES) {
+            let end = (rows + LANES).min(inner);
+            for column in 0..wide {
+                let from = (first + column) * right.column;
+                for k in rows..end {
+                    packed[k * stride + column] = right.values[from + k * right.row];
+                }
             }
         }
     }

@@ -93,13 +93,8 @@ fn bytes(values: &[f32]) -> Vec<u8> {
 
 /// Writes weights, codes and colours, and for a checkpoint the moments too; whole or not at all.
 pub fn write(path: &Path, account: &Account, training: &Training, log_colours: &[f32], checkpoint: bool) -> Result<()> {
-    let length = account.architecture.code;
     let rows = log_colours.len();
-    let mut parts: Vec<(&str, Vec<usize>, Vec<u8>)> = vec![
-        ("weights", vec![training.flow.weights.len()], bytes(&training.flow.weights)),
-        ("codes", vec![rows, length], bytes(&training.codes)),
-        ("log_colours", vec![rows], bytes(log_colours)),
-    ];
+    let mut parts = parts_of(account, &training.flow, &training.codes, log_colours);
     if checkpoint {
         let of_codes = |pick: fn(&Adam) -> &Vec<f32>| -> Vec<f32> {
             training.of_codes.iter().flat_map(|adam| pick(adam).iter().copied()).collect()
@@ -108,14 +103,31 @@ pub fn write(path: &Path, account: &Account, training: &Training, log_colours: &
         let count = training.flow.weights.len();
         parts.push(("weights_first", vec![count], bytes(&training.of_weights.first)));
         parts.push(("weights_second", vec![count], bytes(&training.of_weights.second)));
-        parts.push(("codes_first", vec![rows, length], bytes(&of_codes(|adam| &adam.first))));
-        parts.push(("codes_second", vec![rows, length], bytes(&of_codes(|adam| &adam.second))));
+        parts.push(("codes_first", vec![rows, account.architecture.code], bytes(&of_codes(|adam| &adam.first))));
+        parts.push(("codes_second", vec![rows, account.architecture.code], bytes(&of_codes(|adam| &adam.second))));
         parts.push(("codes_steps", vec![rows], steps));
     }
+    pack(path, account, &parts)
+}
+
+/// A tensor to be written: name, shape, bytes.
+type Part = (&'static str, Vec<usize>, Vec<u8>);
+
+/// What every file of weights holds.
+fn parts_of(account: &Account, flow: &Flow, codes: &[f32], log_colours: &[f32]) -> Vec<Part> {
+    vec![
+        ("weights", vec![flow.weights.len()], bytes(&flow.weights)),
+        ("codes", vec![log_colours.len(), account.architecture.code], bytes(codes)),
+        ("log_colours", vec![log_colours.len()], bytes(log_colours)),
+    ]
+}
+
+/// Writes tensors with their account; whole or not at all.
+fn pack(path: &Path, account: &Account, parts: &[Part]) -> Result<()> {
     let internal = |cause: String| Error::new(ErrorKind::Internal, format!("weights cannot be packed: {cause}"));
     let text = serde_json::to_string(account).map_err(|source| internal(source.to_string()))?;
     let mut views = Vec::new();
-    for (name, shape, data) in &parts {
+    for (name, shape, data) in parts {
         let view = TensorView::new(Dtype::F32, shape.clone(), data).map_err(|source| internal(source.to_string()))?;
         views.push((*name, view));
     }
@@ -178,6 +190,13 @@ impl Trained {
     pub fn read(path: &Path) -> Result<Self> {
         let content = std::fs::read(path).map_err(|source| Error::reading(path, source))?;
         Self::parse(&content).map_err(|error| error.at(Place::File(path.into())))
+    }
+
+    /// Writes the weights, to be read again by [`Self::read`]; whole or not at all.
+    ///
+    /// Errors: a file that cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        pack(path, &self.account, &parts_of(&self.account, &self.flow, &self.codes, &self.log_colours))
     }
 
     /// The codes of a material, one a channel, with the logarithms of its colours; `None` for a name not known.

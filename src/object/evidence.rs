@@ -6,6 +6,9 @@
 //! By Laplace's method around the best light `x`, in logarithms,
 //! `-ln p = r^2 / (2 s^2) + x Q x / 2 + ln det(J J / s^2 + Q) / 2` up to what is the same for all reflectances. The last
 //! term is what a sharp reflectance pays: it would have shown much finer light than the photo does.
+//!
+//! The belief on light has heavy tails, `Q` touches it at `x`. A normal distribution would charge a sun hundreds of nats
+//! for its edge: more than a mirror pays for its sharpness, under which a blurred sun shows the same highlight.
 
 use super::light_step::LightObjective;
 use super::likelihood::Likelihood;
@@ -13,33 +16,59 @@ use super::matrices::LightMatrix;
 use super::prior::{LogLight, shares};
 use crate::neural::product::{Rows, multiply};
 
-/// Standard deviation of what the model cannot explain, in natural logarithms.
-const DEVIATION: f64 = 0.05;
-/// One over the variance of the step between neighbouring texels of natural light at 16 rows, in natural logarithms.
-const STIFFNESS: f64 = 3.0;
-/// The same for a texel's distance from the mean.
-const PULL: f64 = 0.1;
-/// Residuals beyond this many deviations count no more than linearly.
-const ROBUST: f64 = 3.0;
+/// What is believed of light and of models before any photo.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Beliefs {
+    /// Standard deviation of what a model cannot explain, in natural logarithms.
+    pub deviation: f64,
+    /// Residuals beyond this many deviations count no more than linearly.
+    pub robust: f64,
+    /// One over the variance of the step between neighbouring texels of natural light at 16 rows, in natural logarithms,
+    /// where steps are small.
+    pub stiffness: f64,
+    /// The same for a texel's distance from the mean.
+    pub pull: f64,
+    /// Weight of the tail of steps, in nats: a step costs `tail ln(1 + stiffness step^2 / (2 tail))`. Suns and windows
+    /// have edges of which a normal distribution knows nothing: it would have a blurred light and a mirror.
+    pub tail: f64,
+}
+
+impl Default for Beliefs {
+    fn default() -> Self {
+        Beliefs { deviation: 0.1, robust: 3.0, stiffness: 1.0, pull: 0.1, tail: 2.0 }
+    }
+}
 
 /// Minus the logarithm of the probability of the photo with the light summed out around `light`, in nats, up to a
 /// number that is the same for all reflectances. Infinite when it cannot be computed.
-pub fn negative_log_evidence(matrix: &LightMatrix, likelihood: &Likelihood, light: &LogLight) -> f64 {
+pub fn negative_log_evidence(
+    matrix: &LightMatrix,
+    likelihood: &Likelihood,
+    light: &LogLight,
+    beliefs: &Beliefs,
+) -> f64 {
+    let [residuals, energy, volume] = evidence_terms(matrix, likelihood, light, beliefs);
+    residuals + energy + volume
+}
+
+/// The terms of [`negative_log_evidence`]: residuals, energy of the light, and half the logarithm of the determinant.
+pub fn evidence_terms(matrix: &LightMatrix, likelihood: &Likelihood, light: &LogLight, beliefs: &Beliefs) -> [f64; 3] {
     let radiance = light.radiance();
     let picture = matrix.forward(&radiance);
+    let (deviation, robust) = (beliefs.deviation, beliefs.robust);
     let mut residuals = 0.0;
     for value in likelihood.residuals(&picture).flatten() {
-        let size = (value / DEVIATION).abs();
-        residuals += if size < ROBUST { 0.5 * size * size } else { ROBUST * (size - 0.5 * ROBUST) };
+        let size = (value / deviation).abs();
+        residuals += if size < robust { 0.5 * size * size } else { robust * (size - 0.5 * robust) };
     }
-    let prior = Precision::new(light.width, light.height);
+    let prior = LightBelief::new(light.width, light.height, beliefs);
     let energy: f64 = light.channels.iter().map(|channel| prior.energy(channel)).sum();
     // The channels see the same geometry: one stands for all three.
     let channel = 1;
     let mut rows = matrix.dense(channel);
     let texels = matrix.texels();
     for (row, pixel) in rows.chunks_exact_mut(texels).zip(&picture) {
-        let by_log = 1.0 / (DEVIATION * (f64::from(pixel[channel]).max(0.0) + likelihood.epsilon));
+        let by_log = 1.0 / (deviation * (f64::from(pixel[channel]).max(0.0) + likelihood.epsilon));
         for (value, radiance) in row.iter_mut().zip(&radiance[channel]) {
             *value = (f64::from(*value * radiance) * by_log) as f32;
         }
@@ -48,30 +77,29 @@ pub fn negative_log_evidence(matrix: &LightMatrix, likelihood: &Likelihood, ligh
     let left = Rows::new(&rows, matrix.pixels(), texels);
     multiply(left.transpose(), left, &mut gram, false);
     let mut square: Vec<f64> = gram.into_iter().map(f64::from).collect();
-    prior.add_to(&mut square);
-    match log_determinant(square, texels) {
-        Some(log_determinant) => residuals + energy + 1.5 * log_determinant,
-        None => f64::INFINITY,
-    }
+    prior.add_to(&light.channels[channel], &mut square);
+    let volume = log_determinant(square, texels).map_or(f64::INFINITY, |logarithm| 1.5 * logarithm);
+    [residuals, energy, volume]
 }
 
 /// The same figure of an objective whose light is known: residuals alone, on the scale of nats.
 pub fn of_known_light(objective: LightObjective, pixels: usize) -> f64 {
-    objective.data * 3.0 * pixels as f64 / DEVIATION
+    objective.data * 3.0 * pixels as f64 / Beliefs::default().deviation
 }
 
-/// What natural light is before any photo: a Gaussian field in logarithms.
-struct Precision {
+/// What natural light is before any photo: a field in logarithms whose steps have a heavy tail.
+struct LightBelief {
     edges: Vec<(usize, usize, f64)>,
     pull: Vec<f64>,
+    tail: f64,
 }
 
-impl Precision {
-    fn new(width: usize, height: usize) -> Self {
+impl LightBelief {
+    fn new(width: usize, height: usize, beliefs: &Beliefs) -> Self {
         let shares = shares(width, height);
         let texels = width * height;
         // A finer map has smaller steps: variance of a step falls with its length.
-        let stiffness = STIFFNESS * height as f64 / 16.0;
+        let stiffness = beliefs.stiffness * height as f64 / 16.0;
         let mut edges = Vec::with_capacity(2 * texels);
         for texel in 0..texels {
             let (row, column) = (texel / width, texel % width);
@@ -81,24 +109,30 @@ impl Precision {
                 edges.push((texel, texel + width, stiffness * sine));
             }
         }
-        let pull = shares.iter().map(|share| PULL * f64::from(*share) * texels as f64).collect();
-        Precision { edges, pull }
+        let pull = shares.iter().map(|share| beliefs.pull * f64::from(*share) * texels as f64).collect();
+        LightBelief { edges, pull, tail: beliefs.tail }
     }
 
     fn energy(&self, logs: &[f32]) -> f64 {
         let total: f64 = self.pull.iter().sum();
         let mean = self.pull.iter().zip(logs).map(|(pull, log)| pull * f64::from(*log)).sum::<f64>() / total;
         let pulls: f64 = self.pull.iter().zip(logs).map(|(pull, log)| pull * (f64::from(*log) - mean).powi(2)).sum();
-        let steps: f64 = self.edges.iter().map(|&(a, b, weight)| weight * f64::from(logs[a] - logs[b]).powi(2)).sum();
-        0.5 * (pulls + steps)
+        let step = |&(a, b, weight): &(usize, usize, f64)| {
+            let quadratic = 0.5 * weight * f64::from(logs[a] - logs[b]).powi(2);
+            self.tail * (quadratic / self.tail).ln_1p()
+        };
+        0.5 * pulls + self.edges.iter().map(step).sum::<f64>()
     }
 
-    fn add_to(&self, square: &mut [f64]) {
+    /// Adds the quadratic that touches the energy at `logs`.
+    fn add_to(&self, logs: &[f32], square: &mut [f64]) {
         let texels = self.pull.len();
         for (texel, pull) in self.pull.iter().enumerate() {
             square[texel * texels + texel] += pull;
         }
         for &(a, b, weight) in &self.edges {
+            let quadratic = 0.5 * weight * f64::from(logs[a] - logs[b]).powi(2);
+            let weight = weight / (1.0 + quadratic / self.tail);
             square[a * texels + a] += weight;
             square[b * texels + b] += weight;
             square[a * texels + b] -= weight;
@@ -134,6 +168,27 @@ fn log_determinant(mut square: Vec<f64>, size: usize) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_sun_costs_little_more_than_its_rim_and_the_quadratic_touches() {
+        let (width, height) = (32, 16);
+        let of_tail = |tail: f64| LightBelief::new(width, height, &Beliefs { tail, ..Beliefs::default() });
+        let (heavy, normal) = (of_tail(Beliefs::default().tail), of_tail(1e12));
+        let mut logs = vec![0.0f32; width * height];
+        let even = heavy.energy(&logs);
+        assert_eq!(even, 0.0);
+        logs[5 * width + 7] = 9.0;
+        assert!(heavy.energy(&logs) < 0.3 * normal.energy(&logs), "{} {}", heavy.energy(&logs), normal.energy(&logs));
+        // Small steps cost the same.
+        logs[5 * width + 7] = 0.05;
+        assert!((heavy.energy(&logs) / normal.energy(&logs) - 1.0).abs() < 0.01);
+        // What is added to a matrix is positive semidefinite: rows sum to the pull alone.
+        let mut square = vec![0.0; (width * height).pow(2)];
+        heavy.add_to(&logs, &mut square);
+        for (row, pull) in square.chunks_exact(width * height).zip(&heavy.pull) {
+            assert!((row.iter().sum::<f64>() - pull).abs() < 1e-9);
+        }
+    }
 
     #[test]
     fn the_determinant_is_that_of_a_known_matrix() {

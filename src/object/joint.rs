@@ -5,7 +5,7 @@
 //! reflectance. What is new here: starts from a whole library, tried at low resolution; the light by Newton; matrices
 //! that make each step a walk through memory.
 
-use super::light_step::{DeepTie, LightOutcome, LightTerms, NewtonBudget, first_order, newton};
+use super::light_step::{DeepTie, LightOutcome, LightTerms, NewtonBudget, first_order, newton, objective};
 use super::matrices::{LightMatrix, NodeMatrix};
 use super::nodes::{NodeGrid, NodeTable};
 use super::observations::ObjectView;
@@ -205,7 +205,8 @@ impl LightHolder {
                 let mut prior = DeepPrior::new(width, height, settings.net_channels, settings.seed)?;
                 prior.offset = light.mean().map(|mean| mean as f32);
                 let (steps, rate) = (settings.net_steps, settings.net_rate);
-                deep = Some(DeepTie::new(prior, width * height, settings.net_weight, steps, rate));
+                let (weight, carry) = (settings.net_weight, settings.net_carry);
+                deep = Some(DeepTie::new(prior, width * height, weight, steps, rate, carry));
             }
         }
         Ok(LightHolder { terms, deep })
@@ -280,13 +281,11 @@ impl Run<'_> {
             light.level_colours();
         }
         self.check_stop()?;
-        self.light_prior = outcome.objective.prior;
-        self.push(
-            round,
-            StepKind::Light,
-            [outcome.objective.data, self.light_prior, self.code_prior],
-            outcome.not_finite,
-        );
+        // What is told is a function of light, net and reflectance as they are now. The steps above each lower another
+        // one: the net moves under them, and so does what is carried along.
+        let reached = objective(&matrix, likelihood, &holder.terms, light);
+        self.light_prior = reached.prior + holder.deep.as_ref().map_or(0.0, |deep| deep.energy(light));
+        self.push(round, StepKind::Light, [reached.data, self.light_prior, self.code_prior], outcome.not_finite);
         Ok(())
     }
 

@@ -6,8 +6,8 @@
 //!   loss falls. A few steps do what hundreds of first-order ones do.
 //! * [`first_order`]: Adam through the net of the deep prior, as released.
 //!
-//! The deep prior joins the first way by alternation (ADMM): the light is pulled to what the net says, the net is fitted
-//! to the light, and their difference is carried along.
+//! The deep prior joins the first way by alternation: the light is pulled to what the net says, the net is fitted to the
+//! light. Of their difference a share may be carried along ([`DeepTie::carry`]); all of it is ADMM.
 
 use super::likelihood::Likelihood;
 use super::matrices::LightMatrix;
@@ -302,13 +302,22 @@ pub struct DeepTie {
     pub net_steps: usize,
     /// Rate of Adam.
     pub rate: f32,
+    /// Share of the difference that is carried along: 1 is ADMM, 0 is descent on one objective, that of
+    /// [`DeepTie::energy`].
+    pub carry: f32,
     carried: [Vec<f32>; 3],
 }
 
 impl DeepTie {
     /// A tie to a fresh net.
-    pub fn new(prior: DeepPrior, texels: usize, weight: f64, net_steps: usize, rate: f32) -> Self {
-        DeepTie { prior, weight, net_steps, rate, carried: [0; 3].map(|_| vec![0.0; texels]) }
+    pub fn new(prior: DeepPrior, texels: usize, weight: f64, net_steps: usize, rate: f32, carry: f32) -> Self {
+        DeepTie { prior, weight, net_steps, rate, carry, carried: [0; 3].map(|_| vec![0.0; texels]) }
+    }
+
+    /// The pull between a light and the net as it is now: a function of both, whatever is carried along.
+    pub fn energy(&self, light: &LogLight) -> f64 {
+        let terms = LightTerms { tie: Some((self.weight, self.prior.log_light())), ..LightTerms::default() };
+        terms.energy(light)
     }
 
     /// One round: light by Newton, net by Adam, difference carried along.
@@ -335,7 +344,7 @@ impl DeepTie {
             for texel in 0..net[channel].len() {
                 let apart = light.channels[channel][texel] - net[channel][texel];
                 // What neither side can give up must not pile up.
-                self.carried[channel][texel] = (self.carried[channel][texel] + apart).clamp(-2.0, 2.0);
+                self.carried[channel][texel] = (self.carried[channel][texel] + self.carry * apart).clamp(-2.0, 2.0);
             }
         }
         outcome

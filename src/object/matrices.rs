@@ -3,9 +3,9 @@
 //! While one of light and reflectance is held, a step on the other asks for hundreds of products. These matrices make
 //! each of them a walk through memory in order.
 
-use super::nodes::NodeTable;
+use super::nodes::{NodeReader, NodeTable};
 use super::transport::Transport;
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
 
 /// Pixels a task; sums over chunks are taken in their order.
@@ -32,10 +32,11 @@ struct LightChunk {
 impl LightMatrix {
     /// Puts a reflectance into the transport.
     pub fn new(transport: &Transport, table: &NodeTable) -> Self {
+        let table = NodeReader::new(table);
         let rows = transport.per_pixel(|entries| {
             let mut texels: Vec<(u16, Vec3)> = Vec::with_capacity(entries.len());
             for entry in entries {
-                let value = transport.reflectance(table, entry) * entry.weight;
+                let value = transport.reflectance(&table, entry) * entry.weight;
                 // The parts of a texel follow each other.
                 match texels.last_mut() {
                     Some((texel, sum)) if *texel == entry.texel => *sum += value,
@@ -210,14 +211,14 @@ impl NodeMatrix {
     pub fn new(transport: &Transport, light: &[Vec3]) -> Self {
         let grid = transport.grid();
         let rows = transport.per_pixel(|entries| {
-            let mut sums = vec![Vec3::ZERO; grid.len()];
+            let mut sums = vec![Vec3A::ZERO; grid.len()];
             for entry in entries {
-                let value = light[usize::from(entry.texel)] * entry.weight;
+                let value = Vec3A::from(light[usize::from(entry.texel)]) * entry.weight;
                 for (corner, weight) in grid.corners(entry.cell).into_iter().zip(entry.corner_weights()) {
                     sums[corner] += value * weight;
                 }
             }
-            let touched = sums.into_iter().enumerate().filter(|(_, value)| *value != Vec3::ZERO);
+            let touched = sums.into_iter().enumerate().filter(|(_, value)| *value != Vec3A::ZERO);
             touched.map(|(node, value)| (node as u16, value.to_array())).collect::<Vec<_>>()
         });
         let chunks = rows

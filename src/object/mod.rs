@@ -6,7 +6,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`photo`], [`geometry`], [`observations`] | radiance with its bounds; normals, eyes, shadows; the pixels of a fit |
-//! | [`nodes`], [`transport`], [`matrices`] | the image as a linear function of the light and of the reflectance |
+//! | [`directions`], [`nodes`], [`transport`], [`matrices`] | the image as a linear function of the light and of the reflectance |
 //! | [`likelihood`] | Laplace on log radiance |
 //! | [`prior`] | what is known of light: the deep prior and its rivals |
 //! | [`light_step`], [`reflectance_step`] | one unknown while the other is held |
@@ -21,6 +21,7 @@
 //! nodes and nothing else. What this folder refuses to do: light that bounces between parts of the object, spatially
 //! varying reflectance (that is `fit`), and anything that needs a window or a thread of its own.
 
+pub mod directions;
 pub mod evidence;
 pub mod geometry;
 pub mod joint;

@@ -3,9 +3,11 @@
 //! A model with a network behind it costs thousands of multiplications a value, and an image asks for millions of
 //! values; between a few thousand nodes that lie close where highlights are, the value is linear.
 
+use super::directions::{BATCH, PartBatch};
+use crate::math::arc::{arc_of_quarter, arc_of_upper_half};
 use crate::measured::coordinates::HalfDifference;
 use crate::measured::model::ReflectanceModel;
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 use std::f32::consts::{FRAC_PI_2, PI};
 
 /// A node whose directions would lie below the surface stands for the one above it at this share of the way.
@@ -77,19 +79,22 @@ impl NodeGrid {
     /// The cell of three angles in radians.
     #[inline]
     pub fn place(&self, theta_half: f32, theta_difference: f32, phi_difference: f32) -> NodePlace {
-        let along = |place: f32, last: usize| {
-            let place = place.clamp(0.0, 1.0) * last as f32;
-            let cell = (place as usize).min(last - 1);
-            (cell, place - cell as f32)
-        };
-        let (half, half_fraction) = along(half_coordinate(theta_half), self.counts[0] - 1);
-        let (difference, difference_fraction) = along(difference_coordinate(theta_difference), self.counts[1] - 1);
-        let around = phi_difference * (self.counts[2] as f32 / PI);
-        let azimuth = (around as usize).min(self.counts[2] - 1);
-        NodePlace {
-            cell: ((half * self.counts[1] + difference) * self.counts[2] + azimuth) as u16,
-            fraction: [half_fraction, difference_fraction, (around - azimuth as f32).clamp(0.0, 1.0)],
+        let counts = self.counts.map(|count| count as i32);
+        let (cell, fraction) = place_of(counts, theta_half, theta_difference, phi_difference);
+        NodePlace { cell: cell as u16, fraction }
+    }
+
+    /// The cells of a batch of parts; what lies beyond its last part is of no meaning.
+    #[inline(never)]
+    pub fn places(&self, batch: &PartBatch) -> NodePlaces {
+        let counts = self.counts.map(|count| count as i32);
+        let mut places = NodePlaces { cell: [0; BATCH], fraction: [[0.0; BATCH]; 3] };
+        for part in 0..BATCH {
+            let (cell, fraction) = place_of(counts, batch.half[part], batch.difference[part], batch.azimuth[part]);
+            places.cell[part] = cell;
+            (0..3).for_each(|axis| places.fraction[axis][part] = fraction[axis]);
         }
+        places
     }
 
     /// The eight nodes of a cell, in the order of [`weights`].
@@ -146,6 +151,31 @@ impl NodeGrid {
     }
 }
 
+/// Cell and fractions of three angles in a grid of so many nodes along each axis: written without a branch, for loops over
+/// batches.
+#[inline(always)]
+fn place_of(counts: [i32; 3], theta_half: f32, theta_difference: f32, phi_difference: f32) -> (i32, [f32; 3]) {
+    let along = |place: f32, last: i32| {
+        let place = place.clamp(0.0, 1.0) * last as f32;
+        let cell = (place as i32).min(last - 1);
+        (cell, place - cell as f32)
+    };
+    let (half, half_fraction) = along(half_coordinate(theta_half), counts[0] - 1);
+    let (difference, difference_fraction) = along(difference_coordinate(theta_difference), counts[1] - 1);
+    let around = phi_difference * (counts[2] as f32 / PI);
+    let azimuth = (around as i32).clamp(0, counts[2] - 1);
+    let cell = (half * counts[1] + difference) * counts[2] + azimuth;
+    (cell, [half_fraction, difference_fraction, (around - azimuth as f32).clamp(0.0, 1.0)])
+}
+
+/// Where the parts of a batch lie in a grid.
+pub struct NodePlaces {
+    /// First node of each part's cell, see [`NodeGrid::corners`].
+    pub cell: [i32; BATCH],
+    /// Fractions along the half, the difference and the azimuth axis, in [0, 1].
+    pub fraction: [[f32; BATCH]; 3],
+}
+
 /// Values of a reflectance at the nodes of a grid, in 1/sr.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NodeTable {
@@ -165,6 +195,29 @@ impl NodeTable {
     pub fn scaled(&self, factor: [f64; 3]) -> Self {
         let scale = |value: &[f32; 3]| [0, 1, 2].map(|c| (f64::from(value[c]) * factor[c]) as f32);
         NodeTable { values: self.values.iter().map(scale).collect(), not_finite: self.not_finite }
+    }
+}
+
+/// A table laid out for reading between its nodes: a whole register a node.
+#[derive(Clone, Debug)]
+pub struct NodeReader {
+    values: Vec<Vec3A>,
+}
+
+impl NodeReader {
+    /// Lays a table out.
+    pub fn new(table: &NodeTable) -> Self {
+        NodeReader { values: table.values.iter().map(|value| Vec3A::from_array(*value)).collect() }
+    }
+
+    /// The sum of eight nodes by their weights, in 1/sr.
+    #[inline]
+    pub fn between(&self, corners: [usize; 8], weights: [f32; 8]) -> Vec3 {
+        let mut sum = Vec3A::ZERO;
+        for (corner, weight) in corners.into_iter().zip(weights) {
+            sum += self.values[corner] * weight;
+        }
+        sum.into()
     }
 }
 
@@ -192,6 +245,7 @@ fn half_angle(place: f32) -> f32 {
     FRAC_PI_2 * place * place
 }
 
+#[inline(always)]
 fn half_coordinate(angle: f32) -> f32 {
     (angle.max(0.0) / FRAC_PI_2).sqrt()
 }
@@ -201,6 +255,7 @@ fn difference_angle(place: f32) -> f32 {
     FRAC_PI_2 * (1.0 - (1.0 - place) * (1.0 - 0.35 * place))
 }
 
+#[inline(always)]
 fn difference_coordinate(angle: f32) -> f32 {
     // The inverse of `difference_angle`: 1 - a = (1 - p)(1 - 0.35 p), a quadratic in p.
     let remaining = 1.0 - (angle / FRAC_PI_2).clamp(0.0, 1.0);
@@ -215,21 +270,22 @@ fn above_surface(point: HalfDifference) -> HalfDifference {
 }
 
 /// Half and difference angles of a pair of unit directions at a unit normal, without a frame, in `f32`.
-#[inline]
+#[inline(always)]
 pub fn angles(normal: Vec3, to_light: Vec3, to_eye: Vec3) -> (f32, f32, f32) {
     let sum = to_light + to_eye;
     let half = sum * (sum.length_squared().max(1e-20)).sqrt().recip();
     let (half_cosine, light_cosine) = (half.dot(normal), to_light.dot(half));
     let across = normal.cross(half);
     let half_sine = across.length();
-    let theta_half = half_sine.atan2(half_cosine).clamp(0.0, FRAC_PI_2);
+    let theta_half = arc_of_quarter(half_sine, half_cosine.max(0.0));
     // Half of the angle between the two directions, from their difference: exact near 0.
-    let theta_difference = (0.5 * (to_light - to_eye).length()).atan2(light_cosine.max(0.0)).clamp(0.0, FRAC_PI_2);
+    let theta_difference = arc_of_quarter(0.5 * (to_light - to_eye).length(), light_cosine.max(0.0));
     // Tangent and bitangent of the half vector, both times the sine of theta_half.
     let (x, y) = (light_cosine * half_cosine - to_light.dot(normal), to_light.dot(across));
-    let azimuth = y.atan2(x);
-    let folded = if azimuth < 0.0 { azimuth + PI } else { azimuth };
-    (theta_half, theta_difference, if folded >= PI { 0.0 } else { folded })
+    // Reciprocity makes phi and phi + pi one: the lower half of the plane is turned onto the upper.
+    let (x, y) = if y < 0.0 { (-x, -y) } else { (x, y) };
+    let azimuth = arc_of_upper_half(y, x);
+    (theta_half, theta_difference, if azimuth >= PI { 0.0 } else { azimuth })
 }
 
 #[cfg(test)]

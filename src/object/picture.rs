@@ -4,7 +4,7 @@
 //! asks the reflectance itself at every part of every texel, and is what studies photograph with.
 
 use super::geometry::{ObjectGeometry, ObjectPixel, Visibility};
-use super::nodes::{NodeGrid, NodeTable, weights};
+use super::nodes::{NodeGrid, NodeReader, NodeTable, weights};
 use super::transport::TexelDirections;
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::light::Environment;
@@ -25,16 +25,17 @@ pub fn render(
     table: &NodeTable,
     lights: &[&Environment],
 ) -> Vec<RgbImage> {
+    let table = NodeReader::new(table);
     pictures(geometry, visibility, lights.len(), |pixel, is_visible, results| {
         let mut sums = vec![DVec3::ZERO; lights.len()];
-        directions.for_each_part(pixel, is_visible, |texel, weight, (half, difference, azimuth)| {
-            let place = grid.place(half, difference, azimuth);
-            let mut value = Vec3::ZERO;
-            for (corner, share) in grid.corners(place.cell).into_iter().zip(weights(place.fraction)) {
-                value += Vec3::from_array(table.values[corner]) * share;
-            }
-            for (sum, light) in sums.iter_mut().zip(lights) {
-                *sum += (value * light.radiance.pixels()[texel] * weight).as_dvec3();
+        directions.for_each_batch(pixel, is_visible, |batch| {
+            let places = grid.places(batch);
+            for part in 0..batch.len() {
+                let fraction = [0, 1, 2].map(|axis| places.fraction[axis][part]);
+                let value = table.between(grid.corners(places.cell[part] as u16), weights(fraction));
+                for (sum, light) in sums.iter_mut().zip(lights) {
+                    *sum += (value * light.radiance.pixels()[batch.texel(part)] * batch.weight(part)).as_dvec3();
+                }
             }
         });
         results.extend(sums.iter().map(|sum| sum.as_vec3()));
@@ -55,13 +56,15 @@ pub fn render_exact(
 ) -> Vec<RgbImage> {
     pictures(geometry, visibility, lights.len(), |pixel, is_visible, results| {
         let (mut at, mut places) = (Vec::new(), Vec::new());
-        directions.for_each_part(pixel, is_visible, |texel, weight, (half, difference, azimuth)| {
-            at.push(HalfDifference {
-                theta_half: f64::from(half),
-                theta_difference: f64::from(difference),
-                phi_difference: f64::from(azimuth),
-            });
-            places.push((texel, f64::from(weight)));
+        directions.for_each_batch(pixel, is_visible, |batch| {
+            for part in 0..batch.len() {
+                at.push(HalfDifference {
+                    theta_half: f64::from(batch.half[part]),
+                    theta_difference: f64::from(batch.difference[part]),
+                    phi_difference: f64::from(batch.azimuth[part]),
+                });
+                places.push((batch.texel(part), f64::from(batch.weight(part))));
+            }
         });
         let mut values = vec![[0.0; 3]; at.len()];
         evaluate(&at, &mut values);

@@ -4,7 +4,7 @@
 //! At low resolution a start costs a fraction of a second, so all of a library can be tried. Starts are ranked by
 //! [`evidence`](super::evidence): by how well they explain the photo under any light, not under the best one.
 
-use super::evidence::{negative_log_evidence, of_known_light};
+use super::evidence::{Beliefs, negative_log_evidence, of_known_light};
 use super::light_step::{LightObjective, LightTerms, NewtonBudget, newton};
 use super::matrices::{LightMatrix, NodeMatrix};
 use super::nodes::NodeTable;
@@ -21,6 +21,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Weight of the gradient prior while starts are tried; the net would be too slow for each.
 const GRADIENT_WEIGHT: f64 = 0.02;
+/// Steps of Newton on the light of a start that is tried. A sun takes more than ten to rise out of an even light; a start
+/// that needs one was ranked below all others before it had it.
+const TRIED_STEPS: usize = 15;
 /// Rounds of light and reflectance for starts that are followed.
 const ROUNDS: usize = 3;
 
@@ -83,7 +86,7 @@ pub fn screen(
             None => {
                 let matrix = LightMatrix::new(&problem.transport, &candidate.table);
                 let light = problem.even_light_through(&matrix, width, height);
-                candidate.light_through(problem, &matrix, &terms, light, 5);
+                candidate.light_through(problem, &matrix, &terms, light, TRIED_STEPS);
             }
         }
         Ok(candidate)
@@ -182,7 +185,7 @@ impl Candidate {
         let outcome = newton(matrix, &problem.likelihood, terms, &mut light, budget);
         (self.objective[0], self.objective[1]) = (outcome.objective.data, outcome.objective.prior);
         self.not_finite += outcome.not_finite;
-        self.evidence = negative_log_evidence(matrix, &problem.likelihood, &light);
+        self.evidence = negative_log_evidence(matrix, &problem.likelihood, &light, &Beliefs::default());
         self.light = Some(light);
     }
 }

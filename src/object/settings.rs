@@ -46,6 +46,9 @@ pub struct ObjectSettings {
     pub net_rate: f32,
     /// Pull between light and net: weight of their mean squared difference.
     pub net_weight: f64,
+    /// Share of the difference between light and net that is carried from step to step: 1 is ADMM, 0 a plain pull. In
+    /// the few steps there are the plain pull found the better light and lowers one objective; ADMM chases what moves.
+    pub net_carry: f32,
     /// Weight of the mean absolute step of the gradient prior.
     pub gradient_weight: f64,
     /// Weight of the entropy prior.
@@ -81,6 +84,7 @@ impl Default for ObjectSettings {
             net_channels: 32,
             net_rate: 0.01,
             net_weight: 0.05,
+            net_carry: 0.0,
             gradient_weight: 0.01,
             entropy_weight: 0.01,
             reflectance_steps: 8,
@@ -139,6 +143,9 @@ impl ObjectSettings {
         }
         if self.pixels == 0 {
             return wrong("pixels", "at least one pixel is needed");
+        }
+        if !(0.0..=1.0).contains(&self.net_carry) {
+            return wrong("net-carry", "this must be a number from 0 to 1");
         }
         let positive = [
             ("epsilon-share", self.epsilon_share),

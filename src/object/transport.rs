@@ -1,22 +1,18 @@
 //! The image as a linear function of the light, and of the reflectance at nodes.
 //!
 //! `pixel = sum over texels of f(half, difference) cos dOmega L V`. Each texel is constant over its exact solid angle;
-//! near the mirror direction it is split into up to 8 x 8 parts, so that narrow lobes are integrated and not hit or
-//! missed. Everything that depends on geometry alone is found once, in [`Transport::new`].
+//! [`directions`](super::directions) splits those near the mirror direction. Everything that depends on geometry alone is
+//! found once, in [`Transport::new`].
 
+pub use super::directions::TexelDirections;
 use super::geometry::{ObjectPixel, Visibility};
-use super::nodes::{NodeGrid, NodeTable, angles, weights};
-use crate::error::{Error, ErrorKind, Place, Result};
-use crate::math::sphere;
+use super::nodes::{NodeGrid, NodeReader, NodeTable, weights};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 /// Pixels a task; sums over chunks are taken in their order.
 const CHUNK: usize = 32;
-/// Parts a side into which a texel is split at most.
-const FINEST: usize = 8;
 
 /// One part of a texel as seen from one pixel.
 #[derive(Clone, Copy, Debug)]
@@ -36,125 +32,6 @@ impl Entry {
     #[inline]
     pub fn corner_weights(&self) -> [f32; 8] {
         weights(self.fraction.map(|part| f32::from(part) * (1.0 / 65535.0)))
-    }
-}
-
-/// Directions of an environment's texels and of their parts.
-#[derive(Clone, Debug)]
-pub struct TexelDirections {
-    /// Width in texels.
-    pub width: usize,
-    /// Height in texels.
-    pub height: usize,
-    centres: Vec<Vec3>,
-    solid_angles: Vec<f32>,
-    /// Per split of 2, 4 and 8: sine and cosine of theta and solid angle of each fine row, sine and cosine of phi.
-    fine: Vec<FineAngles>,
-}
-
-#[derive(Clone, Debug)]
-struct FineAngles {
-    split: usize,
-    rows: Vec<(f32, f32, f32)>,
-    columns: Vec<(f32, f32)>,
-}
-
-impl TexelDirections {
-    /// The directions of a `width x height` environment.
-    ///
-    /// # Errors
-    /// `InvalidSetting` below 4 x 2 texels or above 65 536 in all.
-    pub fn new(width: usize, height: usize) -> Result<Self> {
-        if width < 4 || height < 2 || width * height > 1 << 16 {
-            let message = format!("an environment of {width} x {height} texels cannot be fitted");
-            return Err(Error::new(ErrorKind::InvalidSetting, message)
-                .at(Place::Setting("light-size".into()))
-                .remedy("ask for 16 to 128 rows, twice as many columns"));
-        }
-        Ok(Self::of_any_size(width, height))
-    }
-
-    /// The same for pictures that are only rendered: any size of at least one texel, since nothing is stored.
-    pub fn of_any_size(width: usize, height: usize) -> Self {
-        let (width, height) = (width.max(1), height.max(1));
-        let texels = 0..width * height;
-        let centres =
-            texels.map(|texel| sphere::direction_of_texel(texel / width, texel % width, width, height)).collect();
-        let solid_angles = (0..height).map(|row| sphere::solid_angle_of_texel(row, width, height) as f32).collect();
-        let fine = [2, 4, FINEST].map(|split| FineAngles::new(split, width, height)).to_vec();
-        TexelDirections { width, height, centres, solid_angles, fine }
-    }
-
-    /// Number of texels.
-    pub fn len(&self) -> usize {
-        self.centres.len()
-    }
-
-    /// Whether there is none; never so.
-    pub fn is_empty(&self) -> bool {
-        self.centres.is_empty()
-    }
-
-    /// Calls `each` with every part of every texel that lights a pixel: (texel, cosine times solid angle, angles).
-    pub fn for_each_part(
-        &self,
-        pixel: &ObjectPixel,
-        is_visible: impl Fn(usize) -> bool,
-        mut each: impl FnMut(usize, f32, (f32, f32, f32)),
-    ) {
-        let texel_angle = std::f32::consts::PI / self.height as f32;
-        let (normal, to_eye) = (pixel.normal, pixel.to_eye);
-        for (texel, &centre) in self.centres.iter().enumerate() {
-            let cosine = normal.dot(centre);
-            // A texel whose centre lies just below the horizon may reach above it: split, the parts decide.
-            if cosine < -0.5 * texel_angle || !is_visible(texel) {
-                continue;
-            }
-            let sum = centre + to_eye;
-            let half_cosine = sum.dot(normal) * (sum.length_squared().max(1e-20)).sqrt().recip();
-            // theta_half moves half as fast as the light does.
-            let theta_half = half_cosine.clamp(-1.0, 1.0).acos();
-            let split = match theta_half / texel_angle {
-                reach if reach < 1.0 => 2,
-                reach if reach < 2.0 => 1,
-                reach if reach < 5.0 || cosine < 0.5 * texel_angle => 0,
-                _ => {
-                    let row = texel / self.width;
-                    each(texel, cosine * self.solid_angles[row], angles(normal, centre, to_eye));
-                    continue;
-                }
-            };
-            self.fine[split].for_each(texel / self.width, texel % self.width, |direction, solid_angle| {
-                let cosine = normal.dot(direction);
-                if cosine > 0.0 {
-                    each(texel, cosine * solid_angle, angles(normal, direction, to_eye));
-                }
-            });
-        }
-    }
-}
-
-impl FineAngles {
-    fn new(split: usize, width: usize, height: usize) -> Self {
-        let (columns, rows) = (split * width, split * height);
-        let row = |row: usize| {
-            let (sine, cosine) = (PI * (row as f64 + 0.5) / rows as f64).sin_cos();
-            (sine as f32, cosine as f32, sphere::solid_angle_of_texel(row, columns, rows) as f32)
-        };
-        let column = |column: usize| {
-            let (sine, cosine) = (TAU * (column as f64 + 0.5) / columns as f64).sin_cos();
-            (sine as f32, cosine as f32)
-        };
-        FineAngles { split, rows: (0..rows).map(row).collect(), columns: (0..columns).map(column).collect() }
-    }
-
-    #[inline]
-    fn for_each(&self, row: usize, column: usize, mut each: impl FnMut(Vec3, f32)) {
-        for &(sine, cosine, solid_angle) in &self.rows[row * self.split..(row + 1) * self.split] {
-            for &(phi_sine, phi_cosine) in &self.columns[column * self.split..(column + 1) * self.split] {
-                each(Vec3::new(sine * phi_sine, cosine, -sine * phi_cosine), solid_angle);
-            }
-        }
     }
 }
 
@@ -202,10 +79,13 @@ impl Transport {
                 for (offset, pixel) in chunk.iter().enumerate() {
                     let own = index * CHUNK + offset;
                     let is_visible = |texel: usize| visibility.is_none_or(|bits| bits.is_visible(own, texel));
-                    directions.for_each_part(pixel, is_visible, |texel, weight, (half, difference, azimuth)| {
-                        let place = grid.place(half, difference, azimuth);
-                        let fraction = place.fraction.map(|part| (part * 65535.0 + 0.5) as u16);
-                        entries.push(Entry { texel: texel as u16, cell: place.cell, fraction, weight });
+                    directions.for_each_batch(pixel, is_visible, |batch| {
+                        let places = grid.places(batch);
+                        entries.extend((0..batch.len()).map(|part| {
+                            let fraction = [0, 1, 2].map(|axis| (places.fraction[axis][part] * 65535.0 + 0.5) as u16);
+                            let (texel, cell) = (batch.texel(part) as u16, places.cell[part] as u16);
+                            Entry { texel, cell, fraction, weight: batch.weight(part) }
+                        }));
                     });
                     starts.push(entries.len() as u32);
                 }
@@ -238,10 +118,11 @@ impl Transport {
 
     /// The pixels under a light, one RGB radiance a texel.
     pub fn forward(&self, table: &NodeTable, light: &[Vec3]) -> Vec<Vec3> {
+        let table = NodeReader::new(table);
         self.per_pixel(|entries| {
             let mut sum = DVec3::ZERO;
             for entry in entries {
-                let value = self.reflectance(table, entry) * light[usize::from(entry.texel)];
+                let value = self.reflectance(&table, entry) * light[usize::from(entry.texel)];
                 sum += (value * entry.weight).as_dvec3();
             }
             sum.as_vec3()
@@ -250,8 +131,9 @@ impl Transport {
 
     /// The transpose of [`Transport::forward`] in the light: from derivatives by the pixels to those by the texels.
     pub fn adjoint_by_light(&self, table: &NodeTable, by_pixels: &[Vec3]) -> Vec<DVec3> {
+        let table = NodeReader::new(table);
         self.scattered(self.directions.len(), by_pixels, |entry, by_pixel, sums: &mut [DVec3]| {
-            let value = self.reflectance(table, entry) * entry.weight * by_pixel;
+            let value = self.reflectance(&table, entry) * entry.weight * by_pixel;
             sums[usize::from(entry.texel)] += value.as_dvec3();
         })
     }
@@ -280,12 +162,8 @@ impl Transport {
     }
 
     #[inline]
-    pub(super) fn reflectance(&self, table: &NodeTable, entry: &Entry) -> Vec3 {
-        let mut value = Vec3::ZERO;
-        for (corner, weight) in self.grid.corners(entry.cell).into_iter().zip(entry.corner_weights()) {
-            value += Vec3::from_array(table.values[corner]) * weight;
-        }
-        value
+    pub(super) fn reflectance(&self, table: &NodeReader, entry: &Entry) -> Vec3 {
+        table.between(self.grid.corners(entry.cell), entry.corner_weights())
     }
 
     fn scattered(

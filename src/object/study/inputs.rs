@@ -84,7 +84,7 @@ impl Inputs {
         let finer = if options.quick { FINER_WHEN_QUICK } else { FINER };
         let mut lights = Vec::new();
         for path in light_files(&options.envmaps)? {
-            if options.quick && lights.len() == 2 {
+            if lights.len() == options.lights.unwrap_or(if options.quick { 2 } else { usize::MAX }) {
                 break;
             }
             lights.push(read_light(&path, (finer * width, finer * height))?);

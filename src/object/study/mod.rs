@@ -54,6 +54,10 @@ pub struct StudyOptions {
     pub models: Vec<ModelKind>,
     /// A few small cases.
     pub quick: bool,
+    /// Materials of each figure, at most; those of the paper, or few when `quick`, when not given.
+    pub materials: Option<usize>,
+    /// Lights of each figure, at most; likewise.
+    pub lights: Option<usize>,
     /// Only these parts; all when empty.
     pub parts: Vec<Part>,
     /// Minutes after which figure 2 begins no further fit of DSBRDF, which takes a hundred times as long as the others.

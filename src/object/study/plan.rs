@@ -164,6 +164,9 @@ pub fn plan(inputs: &Inputs, options: &StudyOptions) -> Vec<Case> {
     let quick = options.quick;
     let lights: Vec<String> = inputs.lights.iter().map(|(name, _)| name.clone()).collect();
     let take = |from: &[String], count: usize| from.iter().take(count).cloned().collect::<Vec<_>>();
+    // How many of each a figure takes, when quick and in full.
+    let materials = |few: usize, full: usize| options.materials.unwrap_or(if quick { few } else { full });
+    let lit = |few: usize, full: usize| options.lights.unwrap_or(if quick { few } else { full });
     let base = Case {
         figure: Figure::Both,
         material: String::new(),
@@ -175,9 +178,9 @@ pub fn plan(inputs: &Inputs, options: &StudyOptions) -> Vec<Case> {
         seen: false,
     };
     let mut cases = Vec::new();
-    let all = if quick { take(&some, 2) } else { known };
+    let all = if quick { take(&some, materials(2, 2)) } else { take(&known, materials(2, usize::MAX)) };
     for material in &all {
-        for light in take(&lights, if quick { 2 } else { 5 }) {
+        for light in take(&lights, lit(2, 5)) {
             for &model in &options.models {
                 let (material, light) = (material.clone(), light.clone());
                 cases.push(Case { figure: Figure::Reflectance, material, light, model: Some(model), ..base.clone() });
@@ -188,16 +191,16 @@ pub fn plan(inputs: &Inputs, options: &StudyOptions) -> Vec<Case> {
         true => &[LightPriorKind::None, LightPriorKind::Gradient, LightPriorKind::Deep],
         false => &[LightPriorKind::None, LightPriorKind::Gradient, LightPriorKind::Entropy, LightPriorKind::Deep],
     };
-    for material in take(&some, if quick { 1 } else { 5 }) {
-        for light in take(&lights, if quick { 2 } else { 10 }) {
+    for material in take(&some, materials(1, 5)) {
+        for light in take(&lights, lit(2, 10)) {
             for &prior in priors {
                 let (material, light) = (material.clone(), light.clone());
                 cases.push(Case { figure: Figure::Light, material, light, prior, ..base.clone() });
             }
         }
     }
-    for (index, material) in take(&some, if quick { 2 } else { 20 }).into_iter().enumerate() {
-        for light in take(&lights, if quick { 1 } else { 5 }) {
+    for (index, material) in take(&some, materials(2, 20)).into_iter().enumerate() {
+        for light in take(&lights, lit(1, 5)) {
             for &model in &options.models {
                 let mut spoils = vec![Spoilt::Clean];
                 // Noise and bytes on a quarter of the materials.
@@ -212,8 +215,8 @@ pub fn plan(inputs: &Inputs, options: &StudyOptions) -> Vec<Case> {
         }
     }
     if inputs.mesh.is_some() {
-        for material in take(&some, if quick { 1 } else { 4 }) {
-            for light in take(&lights, if quick { 1 } else { 3 }) {
+        for material in take(&some, materials(1, 4)) {
+            for light in take(&lights, lit(1, 3)) {
                 for shadows in [true, false] {
                     let (material, light, figure) = (material.clone(), light.clone(), Figure::Shadows);
                     cases.push(Case { figure, material, light, shadows, ..base.clone() });

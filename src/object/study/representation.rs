@@ -78,7 +78,8 @@ impl Row {
         let [parameters, log_rmse, log10_rmse, cosine_rmse, cosine_mean, cells, seconds] = numbers.try_into().ok()?;
         let error = TableError { log_rmse, log10_rmse, cosine_rmse, cosine_mean, cells: cells as usize };
         let (category, model) = (Category::of(&material), model.to_string());
-        Some(Row { row: RivalRow { material, category, model, parameters: parameters as usize, error }, seconds })
+        let parameters = parameters as usize;
+        Some(Row { row: RivalRow { material, category, model, parameters, error, sphere: None }, seconds })
     }
 }
 
@@ -175,6 +176,7 @@ pub fn run(options: &StudyOptions, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Re
             model: contender.name().into(),
             parameters,
             error,
+            sphere: None,
         };
         let seconds = began.elapsed().as_secs_f64();
         tell(&format!("{material:<26} {:<22} log-RMSE {:.4}  {seconds:6.1} s", contender.name(), error.log_rmse));
@@ -350,7 +352,10 @@ mod tests {
     fn row(material: &str, model: &str, log_rmse: f64) -> Row {
         let error = TableError { log_rmse, log10_rmse: 0.5, cosine_rmse: 0.25, cosine_mean: 0.125, cells: 7 };
         let (category, model) = (Category::of(material), model.to_string());
-        Row { row: RivalRow { material: material.into(), category, model, parameters: 8, error }, seconds: 1.25 }
+        Row {
+            row: RivalRow { material: material.into(), category, model, parameters: 8, error, sphere: None },
+            seconds: 1.25,
+        }
     }
 
     #[test]

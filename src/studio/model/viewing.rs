@@ -267,7 +267,8 @@ impl Model {
                         turning: Turning::Camera,
                         start: Some(camera),
                     };
-                    gallery::write_turntable(&path, &surface, &own, &turntable, &settings, &display, stop, &tell)?
+                    let (own, display) = (&own, &display);
+                    gallery::write_turntable(&path, &surface, own, None, &turntable, &settings, display, stop, &tell)?
                 }
                 SaveWhat::Strip => {
                     gallery::write_strip(&path, &surface, &own, &camera, &lights, &settings, &display, stop, &tell)?

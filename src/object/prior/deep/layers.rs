@@ -5,10 +5,13 @@
 use super::planes::Planes;
 use crate::neural::product::{Rows, multiply};
 use rayon::prelude::*;
-use std::borrow::Cow;
+use std::ops::Range;
+use std::sync::Arc;
 
-/// Pixels of one product, about.
+/// Pixels of one task, about: each has its own sum of derivatives by the weights.
 const PIXELS_A_TASK: usize = 2048;
+/// Pixels of one product, about: their taps, a few hundred numbers each, stay in the second cache.
+const PIXELS_A_BLOCK: usize = 128;
 /// Slope of the ramp below zero, as released.
 const LEAK: f32 = 0.2;
 /// Channels that are normalised together.
@@ -40,24 +43,28 @@ impl Convolution {
         self.inputs * self.side * self.side
     }
 
-    /// The size that comes out of a size.
-    fn size(&self, planes: &Planes) -> (usize, usize) {
-        (planes.height / self.stride, planes.width / self.stride)
+    /// The size that comes out of what taps read.
+    fn size(&self, source: &Planes) -> (usize, usize) {
+        let border = self.side - 1;
+        ((source.height - border) / self.stride, (source.width - border) / self.stride)
     }
 
     /// What taps read: the planes, padded when there are three taps a side.
-    fn source<'a>(&self, planes: &'a Planes) -> Cow<'a, Planes> {
-        if self.side == 3 { Cow::Owned(planes.padded()) } else { Cow::Borrowed(planes) }
+    pub fn source(&self, planes: Arc<Planes>) -> Arc<Planes> {
+        if self.side == 3 { Arc::new(planes.padded()) } else { planes }
     }
 
-    fn rows_a_task(&self, width: usize) -> usize {
-        (PIXELS_A_TASK / width).max(1)
+    /// Stretches of output rows, one a task.
+    fn tasks(&self, height: usize, width: usize) -> Vec<Range<usize>> {
+        let step = (PIXELS_A_TASK / width).max(1);
+        (0..height).step_by(step).map(|start| start..(start + step).min(height)).collect()
     }
 
     /// Lays the taps of some output rows side by side: one row a tap, one column a pixel. `source` is padded when
     /// there are three taps a side.
-    fn unroll(&self, source: &Planes, first: usize, rows: usize, width: usize) -> Vec<f32> {
-        let mut columns = Vec::with_capacity(self.columns() * rows * width);
+    fn unroll(&self, source: &Planes, first: usize, rows: usize, width: usize, columns: &mut Vec<f32>) {
+        columns.clear();
+        columns.reserve(self.columns() * rows * width);
         for channel in 0..self.inputs {
             let plane = source.channel(channel);
             for tap in 0..self.side * self.side {
@@ -72,34 +79,40 @@ impl Convolution {
                 }
             }
         }
-        columns
     }
 
-    /// The convolution of planes whose sides are multiples of the stride.
-    pub fn forward(&self, weights: &[f32], planes: &Planes) -> Planes {
-        let (height, width) = self.size(planes);
-        let source = &*self.source(planes);
+    /// The convolution of planes whose sides are multiples of the stride, given as [`Convolution::source`] makes them.
+    pub fn forward(&self, weights: &[f32], source: &Planes) -> Planes {
+        let (height, width) = self.size(source);
         let (matrix, offsets) = weights.split_at(self.outputs * self.columns());
-        let rows_a_task = self.rows_a_task(width);
-        let firsts: Vec<usize> = (0..height).step_by(rows_a_task).collect();
-        let parts: Vec<Vec<f32>> = firsts
+        let tasks = self.tasks(height, width);
+        let parts: Vec<Vec<f32>> = tasks
             .par_iter()
-            .map(|&first| {
-                let rows = rows_a_task.min(height - first);
-                let columns = self.unroll(source, first, rows, width);
-                let mut part = vec![0.0; self.outputs * rows * width];
-                let left = Rows::new(matrix, self.outputs, self.columns());
-                multiply(left, Rows::new(&columns, self.columns(), rows * width), &mut part, false);
+            .map(|task| {
+                let mut part = Vec::with_capacity(self.outputs * task.len() * width);
+                let (mut columns, mut product) = (Vec::new(), Vec::new());
+                for rows in blocks(task, width) {
+                    let pixels = rows.len() * width;
+                    self.unroll(source, rows.start, rows.len(), width, &mut columns);
+                    product.resize(self.outputs * pixels, 0.0);
+                    let left = Rows::new(matrix, self.outputs, self.columns());
+                    multiply(left, Rows::new(&columns, self.columns(), pixels), &mut product, false);
+                    part.extend_from_slice(&product);
+                }
                 part
             })
             .collect();
         let mut result = Planes::zeros(self.outputs, height, width);
-        for (&first, part) in firsts.iter().zip(&parts) {
-            let length = part.len() / self.outputs;
-            for output in 0..self.outputs {
-                let target = &mut result.values[output * height * width + first * width..][..length];
-                for (value, sum) in target.iter_mut().zip(&part[output * length..]) {
-                    *value = sum + offsets[output];
+        for (task, part) in tasks.iter().zip(&parts) {
+            let mut at = 0;
+            for rows in blocks(task, width) {
+                let pixels = rows.len() * width;
+                for output in 0..self.outputs {
+                    let target = &mut result.values[output * height * width + rows.start * width..][..pixels];
+                    for (value, sum) in target.iter_mut().zip(&part[at..]) {
+                        *value = sum + offsets[output];
+                    }
+                    at += pixels;
                 }
             }
         }
@@ -107,38 +120,41 @@ impl Convolution {
     }
 
     /// Adds the derivatives by the weights to `d_weights` and returns those by the planes that came in.
-    pub fn backward(&self, weights: &[f32], planes: &Planes, d_result: &Planes, d_weights: &mut [f32]) -> Planes {
-        let (height, width) = self.size(planes);
-        let source = &*self.source(planes);
+    pub fn backward(&self, weights: &[f32], source: &Planes, d_result: &Planes, d_weights: &mut [f32]) -> Planes {
+        let (height, width) = self.size(source);
         let matrix = &weights[..self.outputs * self.columns()];
-        let rows_a_task = self.rows_a_task(width);
-        let firsts: Vec<usize> = (0..height).step_by(rows_a_task).collect();
-        let parts: Vec<(Vec<f32>, Planes)> = firsts
+        let turned = Rows::new(matrix, self.outputs, self.columns()).transpose();
+        let tasks = self.tasks(height, width);
+        let parts: Vec<(Vec<f32>, Planes)> = tasks
             .par_iter()
-            .map(|&first| {
-                let rows = rows_a_task.min(height - first);
-                let pixels = rows * width;
-                let mut d_part = Vec::with_capacity(self.outputs * pixels);
-                for output in 0..self.outputs {
-                    d_part.extend_from_slice(&d_result.channel(output)[first * width..first * width + pixels]);
-                }
-                let columns = self.unroll(source, first, rows, width);
-                let d_rows = Rows::new(&d_part, self.outputs, pixels);
+            .map(|task| {
+                let (mut d_part, mut columns) = (Vec::new(), Vec::new());
                 let mut d_matrix = vec![0.0; matrix.len()];
-                multiply(d_rows, Rows::new(&columns, self.columns(), pixels).transpose(), &mut d_matrix, false);
-                let mut d_columns = columns;
-                let turned = Rows::new(matrix, self.outputs, self.columns()).transpose();
-                multiply(turned, d_rows, &mut d_columns, false);
-                (d_matrix, self.roll(&d_columns, source, rows, width))
+                let strip_height = (task.len() - 1) * self.stride + self.side;
+                let mut strip = Planes::zeros(self.inputs, strip_height, source.width);
+                for rows in blocks(task, width) {
+                    let pixels = rows.len() * width;
+                    d_part.clear();
+                    for output in 0..self.outputs {
+                        d_part.extend_from_slice(&d_result.channel(output)[rows.start * width..][..pixels]);
+                    }
+                    self.unroll(source, rows.start, rows.len(), width, &mut columns);
+                    let d_rows = Rows::new(&d_part, self.outputs, pixels);
+                    multiply(d_rows, Rows::new(&columns, self.columns(), pixels).transpose(), &mut d_matrix, true);
+                    // The taps are read: their place takes their derivatives.
+                    multiply(turned, d_rows, &mut columns, false);
+                    self.roll(&columns, rows.start - task.start, rows.len(), width, &mut strip);
+                }
+                (d_matrix, strip)
             })
             .collect();
         let mut d_source = Planes::zeros(self.inputs, source.height, source.width);
         let (d_matrix, d_offsets) = d_weights.split_at_mut(matrix.len());
-        for (&first, (d_part, strip)) in firsts.iter().zip(&parts) {
+        for (task, (d_part, strip)) in tasks.iter().zip(&parts) {
             d_matrix.iter_mut().zip(d_part).for_each(|(sum, value)| *sum += value);
             let area = d_source.area();
             for channel in 0..self.inputs {
-                let target = &mut d_source.values[channel * area + first * self.stride * source.width..];
+                let target = &mut d_source.values[channel * area + task.start * self.stride * source.width..];
                 target.iter_mut().zip(strip.channel(channel)).for_each(|(sum, value)| *sum += value);
             }
         }
@@ -148,18 +164,17 @@ impl Convolution {
         if self.side == 3 { d_source.unpadded() } else { d_source }
     }
 
-    /// The transpose of [`Convolution::unroll`], into a strip of the rows it reads.
-    fn roll(&self, columns: &[f32], source: &Planes, rows: usize, width: usize) -> Planes {
-        let strip_height = (rows - 1) * self.stride + self.side;
-        let mut strip = Planes::zeros(self.inputs, strip_height, source.width);
-        let area = strip.area();
+    /// The transpose of [`Convolution::unroll`]: adds to a strip of the rows that are read, from its `first` output row
+    /// on.
+    fn roll(&self, columns: &[f32], first: usize, rows: usize, width: usize, strip: &mut Planes) {
+        let (area, line_width) = (strip.area(), strip.width);
         let mut at = 0;
         for channel in 0..self.inputs {
             let plane = &mut strip.values[channel * area..(channel + 1) * area];
             for tap in 0..self.side * self.side {
                 let (down, across) = (tap / self.side, tap % self.side);
-                for row in 0..rows {
-                    let line = &mut plane[(row * self.stride + down) * source.width + across..];
+                for row in first..first + rows {
+                    let line = &mut plane[(row * self.stride + down) * line_width + across..];
                     let values = &columns[at..at + width];
                     if self.stride == 1 {
                         line.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
@@ -170,8 +185,13 @@ impl Convolution {
                 }
             }
         }
-        strip
     }
+}
+
+/// Stretches of the rows of a task whose taps stay near the processor.
+fn blocks(task: &Range<usize>, width: usize) -> impl Iterator<Item = Range<usize>> + use<> {
+    let (end, step) = (task.end, (PIXELS_A_BLOCK / width).max(1));
+    (task.start..end).step_by(step).map(move |start| start..(start + step).min(end))
 }
 
 /// What a normalisation leaves for its way back.
@@ -185,17 +205,17 @@ pub struct NormTape {
 /// `weights` (scales, then offsets), and bends what is below zero.
 ///
 /// Unlike a batch's statistics, those of a group are defined for one picture, and for one of few pixels.
-pub fn norm_forward(weights: &[f32], planes: &Planes) -> (Planes, NormTape) {
+pub fn norm_forward(weights: &[f32], planes: Planes) -> (Planes, NormTape) {
     let (channels, area) = (planes.channels, planes.area());
     let (scales, offsets) = weights.split_at(channels);
-    let mut normalised = planes.clone();
+    let mut normalised = planes;
     let inverse_deviation: Vec<f32> = normalised
         .values
         .par_chunks_mut(GROUP * area)
         .map(|values| {
             let count = values.len() as f64;
-            let mean = values.iter().map(|&value| f64::from(value)).sum::<f64>() / count;
-            let variance = values.iter().map(|&value| (f64::from(value) - mean).powi(2)).sum::<f64>() / count;
+            let mean = sum(values, values, |value, _| value) / count;
+            let variance = sum(values, values, |value, _| (value - mean) * (value - mean)) / count;
             let inverse = 1.0 / (variance as f32 + VARIANCE_FLOOR).sqrt();
             values.iter_mut().for_each(|value| *value = (*value - mean as f32) * inverse);
             inverse
@@ -227,14 +247,13 @@ pub fn norm_backward(
         .par_chunks_mut(area)
         .enumerate()
         .map(|(channel, values)| {
-            let (mut by_scale, mut by_offset) = (0.0f64, 0.0f64);
             let (outcome, own) = (result.channel(channel), tape.normalised.channel(channel));
-            for ((value, &outcome), &own) in values.iter_mut().zip(outcome).zip(own) {
-                let slope = if outcome > 0.0 { *value } else { LEAK * *value };
-                by_scale += f64::from(slope * own);
-                by_offset += f64::from(slope);
-                *value = slope * weights[channel];
+            for (value, &outcome) in values.iter_mut().zip(outcome) {
+                *value = if outcome > 0.0 { *value } else { LEAK * *value };
             }
+            let by_scale = sum(values, own, |slope, own| slope * own);
+            let by_offset = sum(values, own, |slope, _| slope);
+            values.iter_mut().for_each(|value| *value *= weights[channel]);
             (by_scale as f32, by_offset as f32)
         })
         .collect();
@@ -250,13 +269,26 @@ pub fn norm_backward(
         .enumerate()
         .for_each(|(group, (values, normalised))| {
             let count = values.len() as f64;
-            let mean = values.iter().map(|&value| f64::from(value)).sum::<f64>() / count;
-            let pairs = values.iter().zip(normalised);
-            let along = pairs.map(|(&value, &own)| f64::from(value) * f64::from(own)).sum::<f64>() / count;
+            let mean = sum(values, normalised, |value, _| value) / count;
+            let along = sum(values, normalised, |value, own| value * own) / count;
             let inverse = tape.inverse_deviation[group];
             for (value, own) in values.iter_mut().zip(normalised) {
                 *value = inverse * (*value - mean as f32 - own * along as f32);
             }
         });
     d_result
+}
+
+/// The sum of a function of pairs, in eight lanes and a fixed order.
+fn sum(a: &[f32], b: &[f32], of: impl Fn(f64, f64) -> f64) -> f64 {
+    let mut lanes = [0.0f64; 8];
+    let (a_parts, b_parts) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest = a_parts.remainder().iter().zip(b_parts.remainder());
+    let rest: f64 = rest.map(|(&a, &b)| of(f64::from(a), f64::from(b))).sum();
+    for (a, b) in a_parts.zip(b_parts) {
+        for lane in 0..8 {
+            lanes[lane] += of(f64::from(a[lane]), f64::from(b[lane]));
+        }
+    }
+    lanes.iter().sum::<f64>() + rest
 }

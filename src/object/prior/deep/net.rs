@@ -10,6 +10,7 @@ use super::planes::Planes;
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::math::random::SequentialRandom;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Channels of the fixed random input, as released.
 pub const INPUT_CHANNELS: usize = 8;
@@ -26,9 +27,9 @@ struct Block {
 
 /// What a block leaves for its way back.
 struct BlockTape {
-    input: Planes,
+    source: Arc<Planes>,
     norm: NormTape,
-    result: Planes,
+    result: Arc<Planes>,
 }
 
 /// The layout of the net; its weights lie in one slice.
@@ -48,7 +49,7 @@ pub struct NetTape {
     skips: Vec<BlockTape>,
     down: Vec<[BlockTape; 2]>,
     up: Vec<[BlockTape; 2]>,
-    last_input: Planes,
+    last_input: Arc<Planes>,
 }
 
 impl Net {
@@ -125,20 +126,20 @@ impl Net {
     pub fn forward(&self, weights: &[f32], input: &Planes) -> (Planes, NetTape) {
         debug_assert_eq!((input.width, input.height, input.channels), (self.width, self.height, INPUT_CHANNELS));
         let (mut skips, mut down) = (Vec::new(), Vec::new());
-        let mut planes = input.clone();
+        let mut planes = Arc::new(input.clone());
         for (skip, [first, second]) in self.skips.iter().zip(&self.down) {
-            skips.push(skip.forward(weights, planes.clone()));
+            skips.push(skip.forward(weights, Arc::clone(&planes)));
             let first = first.forward(weights, planes);
-            let second = second.forward(weights, first.result.clone());
-            planes = second.result.clone();
+            let second = second.forward(weights, Arc::clone(&first.result));
+            planes = Arc::clone(&second.result);
             down.push([first, second]);
         }
         let mut up = Vec::new();
         for level in (0..self.levels()).rev() {
             let joined = planes.doubled().joined(&skips[level].result);
-            let first = self.up[level][0].forward(weights, joined);
-            let second = self.up[level][1].forward(weights, first.result.clone());
-            planes = second.result.clone();
+            let first = self.up[level][0].forward(weights, Arc::new(joined));
+            let second = self.up[level][1].forward(weights, Arc::clone(&first.result));
+            planes = Arc::clone(&second.result);
             up.push([first, second]);
         }
         up.reverse();
@@ -171,16 +172,17 @@ impl Net {
 }
 
 impl Block {
-    fn forward(&self, weights: &[f32], input: Planes) -> BlockTape {
-        let planes = self.convolution.forward(&weights[self.weights.clone()], &input);
-        let (result, norm) = norm_forward(&weights[self.norm.clone()], &planes);
-        BlockTape { input, norm, result }
+    fn forward(&self, weights: &[f32], input: Arc<Planes>) -> BlockTape {
+        let source = self.convolution.source(input);
+        let planes = self.convolution.forward(&weights[self.weights.clone()], &source);
+        let (result, norm) = norm_forward(&weights[self.norm.clone()], planes);
+        BlockTape { source, norm, result: Arc::new(result) }
     }
 
     fn backward(&self, weights: &[f32], tape: BlockTape, d_result: Planes, d_weights: &mut [f32]) -> Planes {
         let (own, norm) = (self.weights.clone(), self.norm.clone());
         let d_planes = norm_backward(&weights[norm.clone()], &tape.norm, &tape.result, d_result, &mut d_weights[norm]);
-        self.convolution.backward(&weights[own.clone()], &tape.input, &d_planes, &mut d_weights[own])
+        self.convolution.backward(&weights[own.clone()], &tape.source, &d_planes, &mut d_weights[own])
     }
 }
 

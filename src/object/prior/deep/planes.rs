@@ -41,9 +41,10 @@ impl Planes {
             for (row, target) in target.chunks_exact_mut(width + 2).enumerate() {
                 let (from, turn) = source_row(row, height, width);
                 let line = &source[from * width..(from + 1) * width];
-                for (column, value) in target.iter_mut().enumerate() {
-                    *value = line[(column + width - 1 + turn) % width];
-                }
+                // The row from `turn` on, then what lies before it; a column of the other end at each side.
+                target[1..=width - turn].copy_from_slice(&line[turn..]);
+                target[1 + width - turn..=width].copy_from_slice(&line[..turn]);
+                (target[0], target[width + 1]) = (target[width], target[1]);
             }
         }
         padded
@@ -58,9 +59,13 @@ impl Planes {
             for (row, line) in self.channel(channel).chunks_exact(width + 2).enumerate() {
                 let (from, turn) = source_row(row, height, width);
                 let target = &mut target[from * width..(from + 1) * width];
-                for (column, value) in line.iter().enumerate() {
-                    target[(column + width - 1 + turn) % width] += value;
-                }
+                let add = |sums: &mut [f32], values: &[f32]| {
+                    sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+                };
+                add(&mut target[turn..], &line[1..=width - turn]);
+                add(&mut target[..turn], &line[1 + width - turn..=width]);
+                target[(turn + width - 1) % width] += line[0];
+                target[turn] += line[width + 1];
             }
         }
         planes
