@@ -109,9 +109,9 @@ pub fn study_table(rows: &[RivalRow]) -> StudyTable {
     );
     for row in rows {
         let error = row.error;
-        let sphere = row.sphere.map_or([f64::NAN; 2], |sphere| [sphere.displayed_rmse, sphere.log_rmse]);
-        let figures = [error.log_rmse, error.log10_rmse, error.cosine_rmse, sphere[0], sphere[1]];
-        table.add(&row.model, &[&figures[..], &[row.parameters as f64]].concat());
+        let [displayed, log] = row.sphere.map_or([f64::NAN; 2], |sphere| [sphere.displayed_rmse, sphere.log_rmse]);
+        let parameters = row.parameters as f64;
+        table.add(&row.model, &[error.log_rmse, error.log10_rmse, error.cosine_rmse, displayed, log, parameters]);
     }
     for summary in summarise(rows).iter().filter(|summary| summary.category.is_none()) {
         table.notes.push(format!(

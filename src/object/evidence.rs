@@ -16,59 +16,37 @@ use super::matrices::LightMatrix;
 use super::prior::{LogLight, shares};
 use crate::neural::product::{Rows, multiply};
 
-/// What is believed of light and of models before any photo.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Beliefs {
-    /// Standard deviation of what a model cannot explain, in natural logarithms.
-    pub deviation: f64,
-    /// Residuals beyond this many deviations count no more than linearly.
-    pub robust: f64,
-    /// One over the variance of the step between neighbouring texels of natural light at 16 rows, in natural logarithms,
-    /// where steps are small.
-    pub stiffness: f64,
-    /// The same for a texel's distance from the mean.
-    pub pull: f64,
-    /// Weight of the tail of steps, in nats: a step costs `tail ln(1 + stiffness step^2 / (2 tail))`. Suns and windows
-    /// have edges of which a normal distribution knows nothing: it would have a blurred light and a mirror.
-    pub tail: f64,
-}
-
-impl Default for Beliefs {
-    fn default() -> Self {
-        Beliefs { deviation: 0.1, robust: 3.0, stiffness: 1.0, pull: 0.1, tail: 2.0 }
-    }
-}
+/// Standard deviation of what the model cannot explain, in natural logarithms.
+const DEVIATION: f64 = 0.1;
+/// Residuals beyond this many deviations count no more than linearly.
+const ROBUST: f64 = 3.0;
+/// One over the variance of the step between neighbouring texels of natural light at 16 rows, in natural logarithms, where
+/// steps are small.
+const STIFFNESS: f64 = 1.0;
+/// The same for a texel's distance from the mean.
+const PULL: f64 = 0.1;
+/// Weight of the tail of steps, in nats: a step costs `TAIL ln(1 + STIFFNESS step^2 / (2 TAIL))`. Suns and windows have
+/// edges of which a normal distribution knows nothing: it would have a blurred light and a mirror.
+const TAIL: f64 = 2.0;
 
 /// Minus the logarithm of the probability of the photo with the light summed out around `light`, in nats, up to a
 /// number that is the same for all reflectances. Infinite when it cannot be computed.
-pub fn negative_log_evidence(
-    matrix: &LightMatrix,
-    likelihood: &Likelihood,
-    light: &LogLight,
-    beliefs: &Beliefs,
-) -> f64 {
-    let [residuals, energy, volume] = evidence_terms(matrix, likelihood, light, beliefs);
-    residuals + energy + volume
-}
-
-/// The terms of [`negative_log_evidence`]: residuals, energy of the light, and half the logarithm of the determinant.
-pub fn evidence_terms(matrix: &LightMatrix, likelihood: &Likelihood, light: &LogLight, beliefs: &Beliefs) -> [f64; 3] {
+pub fn negative_log_evidence(matrix: &LightMatrix, likelihood: &Likelihood, light: &LogLight) -> f64 {
     let radiance = light.radiance();
     let picture = matrix.forward(&radiance);
-    let (deviation, robust) = (beliefs.deviation, beliefs.robust);
     let mut residuals = 0.0;
     for value in likelihood.residuals(&picture).flatten() {
-        let size = (value / deviation).abs();
-        residuals += if size < robust { 0.5 * size * size } else { robust * (size - 0.5 * robust) };
+        let size = (value / DEVIATION).abs();
+        residuals += if size < ROBUST { 0.5 * size * size } else { ROBUST * (size - 0.5 * ROBUST) };
     }
-    let prior = LightBelief::new(light.width, light.height, beliefs);
+    let prior = LightBelief::new(light.width, light.height, TAIL);
     let energy: f64 = light.channels.iter().map(|channel| prior.energy(channel)).sum();
     // The channels see the same geometry: one stands for all three.
     let channel = 1;
     let mut rows = matrix.dense(channel);
     let texels = matrix.texels();
     for (row, pixel) in rows.chunks_exact_mut(texels).zip(&picture) {
-        let by_log = 1.0 / (deviation * (f64::from(pixel[channel]).max(0.0) + likelihood.epsilon));
+        let by_log = 1.0 / (DEVIATION * (f64::from(pixel[channel]).max(0.0) + likelihood.epsilon));
         for (value, radiance) in row.iter_mut().zip(&radiance[channel]) {
             *value = (f64::from(*value * radiance) * by_log) as f32;
         }
@@ -79,12 +57,12 @@ pub fn evidence_terms(matrix: &LightMatrix, likelihood: &Likelihood, light: &Log
     let mut square: Vec<f64> = gram.into_iter().map(f64::from).collect();
     prior.add_to(&light.channels[channel], &mut square);
     let volume = log_determinant(square, texels).map_or(f64::INFINITY, |logarithm| 1.5 * logarithm);
-    [residuals, energy, volume]
+    residuals + energy + volume
 }
 
 /// The same figure of an objective whose light is known: residuals alone, on the scale of nats.
 pub fn of_known_light(objective: LightObjective, pixels: usize) -> f64 {
-    objective.data * 3.0 * pixels as f64 / Beliefs::default().deviation
+    objective.data * 3.0 * pixels as f64 / DEVIATION
 }
 
 /// What natural light is before any photo: a field in logarithms whose steps have a heavy tail.
@@ -95,11 +73,11 @@ struct LightBelief {
 }
 
 impl LightBelief {
-    fn new(width: usize, height: usize, beliefs: &Beliefs) -> Self {
+    fn new(width: usize, height: usize, tail: f64) -> Self {
         let shares = shares(width, height);
         let texels = width * height;
         // A finer map has smaller steps: variance of a step falls with its length.
-        let stiffness = beliefs.stiffness * height as f64 / 16.0;
+        let stiffness = STIFFNESS * height as f64 / 16.0;
         let mut edges = Vec::with_capacity(2 * texels);
         for texel in 0..texels {
             let (row, column) = (texel / width, texel % width);
@@ -109,19 +87,20 @@ impl LightBelief {
                 edges.push((texel, texel + width, stiffness * sine));
             }
         }
-        let pull = shares.iter().map(|share| beliefs.pull * f64::from(*share) * texels as f64).collect();
-        LightBelief { edges, pull, tail: beliefs.tail }
+        let pull = shares.iter().map(|share| PULL * f64::from(*share) * texels as f64).collect();
+        LightBelief { edges, pull, tail }
     }
 
     fn energy(&self, logs: &[f32]) -> f64 {
         let total: f64 = self.pull.iter().sum();
         let mean = self.pull.iter().zip(logs).map(|(pull, log)| pull * f64::from(*log)).sum::<f64>() / total;
         let pulls: f64 = self.pull.iter().zip(logs).map(|(pull, log)| pull * (f64::from(*log) - mean).powi(2)).sum();
-        let step = |&(a, b, weight): &(usize, usize, f64)| {
-            let quadratic = 0.5 * weight * f64::from(logs[a] - logs[b]).powi(2);
-            self.tail * (quadratic / self.tail).ln_1p()
-        };
-        0.5 * pulls + self.edges.iter().map(step).sum::<f64>()
+        0.5 * pulls + self.edges.iter().map(|edge| self.tail * self.over_tail(edge, logs).ln_1p()).sum::<f64>()
+    }
+
+    /// What a step would cost under a normal distribution, over the weight of the tail.
+    fn over_tail(&self, &(a, b, weight): &(usize, usize, f64), logs: &[f32]) -> f64 {
+        0.5 * weight * f64::from(logs[a] - logs[b]).powi(2) / self.tail
     }
 
     /// Adds the quadratic that touches the energy at `logs`.
@@ -130,9 +109,9 @@ impl LightBelief {
         for (texel, pull) in self.pull.iter().enumerate() {
             square[texel * texels + texel] += pull;
         }
-        for &(a, b, weight) in &self.edges {
-            let quadratic = 0.5 * weight * f64::from(logs[a] - logs[b]).powi(2);
-            let weight = weight / (1.0 + quadratic / self.tail);
+        for edge in &self.edges {
+            let (a, b, weight) = *edge;
+            let weight = weight / (1.0 + self.over_tail(edge, logs));
             square[a * texels + a] += weight;
             square[b * texels + b] += weight;
             square[a * texels + b] -= weight;
@@ -172,8 +151,7 @@ mod tests {
     #[test]
     fn a_sun_costs_little_more_than_its_rim_and_the_quadratic_touches() {
         let (width, height) = (32, 16);
-        let of_tail = |tail: f64| LightBelief::new(width, height, &Beliefs { tail, ..Beliefs::default() });
-        let (heavy, normal) = (of_tail(Beliefs::default().tail), of_tail(1e12));
+        let [heavy, normal] = [TAIL, 1e12].map(|tail| LightBelief::new(width, height, tail));
         let mut logs = vec![0.0f32; width * height];
         let even = heavy.energy(&logs);
         assert_eq!(even, 0.0);

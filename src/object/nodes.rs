@@ -170,10 +170,16 @@ fn place_of(counts: [i32; 3], theta_half: f32, theta_difference: f32, phi_differ
 
 /// Where the parts of a batch lie in a grid.
 pub struct NodePlaces {
-    /// First node of each part's cell, see [`NodeGrid::corners`].
-    pub cell: [i32; BATCH],
-    /// Fractions along the half, the difference and the azimuth axis, in [0, 1].
-    pub fraction: [[f32; BATCH]; 3],
+    cell: [i32; BATCH],
+    fraction: [[f32; BATCH]; 3],
+}
+
+impl NodePlaces {
+    /// The place of one part.
+    #[inline]
+    pub fn of(&self, part: usize) -> NodePlace {
+        NodePlace { cell: self.cell[part] as u16, fraction: [0, 1, 2].map(|axis| self.fraction[axis][part]) }
+    }
 }
 
 /// Values of a reflectance at the nodes of a grid, in 1/sr.

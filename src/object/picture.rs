@@ -31,8 +31,8 @@ pub fn render(
         directions.for_each_batch(pixel, is_visible, |batch| {
             let places = grid.places(batch);
             for part in 0..batch.len() {
-                let fraction = [0, 1, 2].map(|axis| places.fraction[axis][part]);
-                let value = table.between(grid.corners(places.cell[part] as u16), weights(fraction));
+                let place = places.of(part);
+                let value = table.between(grid.corners(place.cell), weights(place.fraction));
                 for (sum, light) in sums.iter_mut().zip(lights) {
                     *sum += (value * light.radiance.pixels()[batch.texel(part)] * batch.weight(part)).as_dvec3();
                 }

@@ -4,7 +4,7 @@
 //! At low resolution a start costs a fraction of a second, so all of a library can be tried. Starts are ranked by
 //! [`evidence`](super::evidence): by how well they explain the photo under any light, not under the best one.
 
-use super::evidence::{Beliefs, negative_log_evidence, of_known_light};
+use super::evidence::{negative_log_evidence, of_known_light};
 use super::light_step::{LightObjective, LightTerms, NewtonBudget, newton};
 use super::matrices::{LightMatrix, NodeMatrix};
 use super::nodes::NodeTable;
@@ -185,7 +185,7 @@ impl Candidate {
         let outcome = newton(matrix, &problem.likelihood, terms, &mut light, budget);
         (self.objective[0], self.objective[1]) = (outcome.objective.data, outcome.objective.prior);
         self.not_finite += outcome.not_finite;
-        self.evidence = negative_log_evidence(matrix, &problem.likelihood, &light, &Beliefs::default());
+        self.evidence = negative_log_evidence(matrix, &problem.likelihood, &light);
         self.light = Some(light);
     }
 }

@@ -82,9 +82,14 @@ impl Transport {
                     directions.for_each_batch(pixel, is_visible, |batch| {
                         let places = grid.places(batch);
                         entries.extend((0..batch.len()).map(|part| {
-                            let fraction = [0, 1, 2].map(|axis| (places.fraction[axis][part] * 65535.0 + 0.5) as u16);
-                            let (texel, cell) = (batch.texel(part) as u16, places.cell[part] as u16);
-                            Entry { texel, cell, fraction, weight: batch.weight(part) }
+                            let place = places.of(part);
+                            let fraction = place.fraction.map(|part| (part * 65535.0 + 0.5) as u16);
+                            Entry {
+                                texel: batch.texel(part) as u16,
+                                cell: place.cell,
+                                fraction,
+                                weight: batch.weight(part),
+                            }
                         }));
                     });
                     starts.push(entries.len() as u32);

@@ -52,6 +52,8 @@ pub struct BlockSolution {
     pub specular: [f32; 3],
     /// Logarithm of the width.
     pub log_width: f32,
+    /// How the lobe's integral at that width follows from those that were integrated.
+    pub stencil: WidthStencil,
     /// Diffuse reflectance of the block.
     pub diffuse: [f32; 3],
     /// Diffuse reflectance of its cells.
@@ -117,6 +119,7 @@ pub fn solve_block(
     let stencil = WidthStencil::new(log_widths, log_width, range);
     let mut solution = BlockSolution {
         log_width: log_width as f32,
+        stencil,
         cells: vec![[0.0; 3]; cell_count],
         best_node,
         ..BlockSolution::default()

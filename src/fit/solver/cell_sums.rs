@@ -1,10 +1,11 @@
-//! The small linear systems of a block: sums of its cells, and (rho, F0) from them.
+//! The small linear systems of a channel: sums over pixels of what multiplies (rho, F0), and both from them.
 //!
-//! A deviation of a cell from its block is eliminated before cells are added up.
+//! Of a cell, a texel, a block or a group of texels. The deviation of a part from its whole is eliminated before parts are
+//! added up.
 
 use super::block::{BlockPrior, PixelTerms};
 
-/// A 2 x 2 system in (rho, F0) and its constant: the six sums of a channel, of a cell or of a block.
+/// A 2 x 2 system in (rho, F0) and its constant: the six sums of a channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct System {
     pub(super) ee: f64,
@@ -16,15 +17,43 @@ pub(super) struct System {
 }
 
 impl System {
-    /// Adds a cell with its deviation eliminated; `ridge` is the variance of the noise over that of deviations.
-    fn add(&mut self, cell: &System, ridge: f64) {
-        let keep = if ridge.is_finite() { 1.0 / (ridge + cell.ee) } else { 0.0 };
-        self.ee += cell.ee - cell.ee * cell.ee * keep;
-        self.es += cell.es - cell.es * cell.ee * keep;
-        self.ss += cell.ss - cell.es * cell.es * keep;
-        self.ey += cell.ey - cell.ey * cell.ee * keep;
-        self.sy += cell.sy - cell.es * cell.ey * keep;
-        self.yy += cell.yy - cell.ey * cell.ey * keep;
+    /// Adds an observation `y = rho e + F0 s`.
+    pub(super) fn observe(&mut self, weight: f64, e: f64, s: f64, y: f64) {
+        self.ee += weight * e * e;
+        self.es += weight * e * s;
+        self.ss += weight * s * s;
+        self.ey += weight * e * y;
+        self.sy += weight * s * y;
+        self.yy += weight * y * y;
+    }
+
+    /// What is left of a part's sums once the deviation of its rho from that of the whole is eliminated; `ridge` is the
+    /// variance of the noise over that of deviations, infinite where there are none.
+    pub(super) fn without_deviation(&self, ridge: f64) -> System {
+        if !ridge.is_finite() {
+            return *self;
+        }
+        let System { ee, es, ss, ey, sy, yy } = *self;
+        let keep = 1.0 / (ridge + ee);
+        let left = ridge * keep;
+        System {
+            ee: ee * left,
+            es: es * left,
+            ss: ss - es * es * keep,
+            ey: ey * left,
+            sy: sy - es * ey * keep,
+            yy: yy - ey * ey * keep,
+        }
+    }
+
+    /// Adds another's.
+    pub(super) fn add(&mut self, other: &System) {
+        self.ee += other.ee;
+        self.es += other.es;
+        self.ss += other.ss;
+        self.ey += other.ey;
+        self.sy += other.sy;
+        self.yy += other.yy;
     }
 
     /// The best (rho, F0) in the unit square, and the value there.
@@ -77,30 +106,20 @@ pub(super) fn system(
         let e = f64::from(term.arriving[channel]);
         let s = f64::from(base);
         let y = f64::from(term.radiance[channel] - grazing);
-        let cell = &mut cells[usize::from(term.cell)];
-        cell.ee += weight * e * e;
-        cell.es += weight * e * s;
-        cell.ss += weight * s * s;
-        cell.ey += weight * e * y;
-        cell.sy += weight * s * y;
-        cell.yy += weight * y * y;
+        cells[usize::from(term.cell)].observe(weight, e, s, y);
     }
     let ridge = ridge(prior);
     let mut system = System::default();
     for cell in cells.iter() {
-        system.add(cell, ridge);
+        system.add(&cell.without_deviation(ridge));
     }
     // Priors, as observations in units of the noise.
     let variance = prior.noise * prior.noise;
     let (mean, deviation) = prior.specular;
     let precision = variance / (deviation * deviation);
-    system.ss += precision;
-    system.sy += precision * mean[channel];
-    system.yy += precision * mean[channel] * mean[channel];
+    system.observe(precision, 0.0, 1.0, mean[channel]);
     let (mean, deviation) = prior.diffuse;
     let precision = if deviation.is_finite() { variance / (deviation * deviation) } else { 0.0 };
-    system.ee += precision;
-    system.ey += precision * mean[channel];
-    system.yy += precision * mean[channel] * mean[channel];
+    system.observe(precision, 1.0, 0.0, mean[channel]);
     system
 }

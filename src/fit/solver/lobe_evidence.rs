@@ -5,50 +5,38 @@
 //! for diffuse reflectance wherever the light is a little wrong, in the complementary colour where it is too much.
 //! The logarithm of the width is normal for all kinds.
 
+use super::cell_sums::System;
 use super::lobe_widths::LOBE_WIDTHS;
 use glam::{DMat3, DVec3};
 
 /// Kinds of surface.
 pub const KINDS: usize = 3;
 
-/// Sums of a texel, or of a group, per width and channel: `E E`, `E S`, `S S`, `E y`, `S y`, `y y` in units of the noise,
-/// with each texel's deviation from its group's diffuse reflectance integrated out.
+/// Sums of a texel, or of a group, per width and channel, in units of the noise, with each texel's deviation from its
+/// group's diffuse reflectance eliminated.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LobeSumsOfGroup(pub [[[f64; 6]; 3]; LOBE_WIDTHS]);
+pub struct LobeSumsOfGroup(pub(super) [[System; 3]; LOBE_WIDTHS]);
 
 impl Default for LobeSumsOfGroup {
     fn default() -> Self {
-        LobeSumsOfGroup([[[0.0; 6]; 3]; LOBE_WIDTHS])
+        LobeSumsOfGroup([[System::default(); 3]; LOBE_WIDTHS])
     }
 }
 
 impl LobeSumsOfGroup {
     /// Those of one texel. `ridge` is the inverse variance of its deviation; `worse` is added to the cost of each width.
-    pub fn of_texel(raw: &[[[f64; 6]; 3]; LOBE_WIDTHS], ridge: f64, worse: &[f64; LOBE_WIDTHS]) -> Self {
-        let mut made = LobeSumsOfGroup::default();
-        for ((made, raw), worse) in made.0.iter_mut().zip(raw).zip(worse) {
-            for (made, &[ee, es, ss, ey, sy, yy]) in made.iter_mut().zip(raw) {
-                let keep = 1.0 / (ee + ridge);
-                let left = ridge * keep;
-                *made = [
-                    ee * left,
-                    es * left,
-                    ss - es * es * keep,
-                    ey * left,
-                    sy - es * ey * keep,
-                    yy - ey * ey * keep + worse / 3.0,
-                ];
-            }
+    pub(super) fn of_texel(raw: &[[System; 3]; LOBE_WIDTHS], ridge: f64, worse: &[f64; LOBE_WIDTHS]) -> Self {
+        let mut made = LobeSumsOfGroup(raw.map(|channels| channels.map(|sums| sums.without_deviation(ridge))));
+        for (channels, worse) in made.0.iter_mut().zip(worse) {
+            channels.iter_mut().for_each(|sums| sums.yy += worse / 3.0);
         }
         made
     }
 
     /// Adds another's.
     pub fn add(&mut self, other: &LobeSumsOfGroup) {
-        let others = other.0.iter().flatten().flatten();
-        for (own, other) in self.0.iter_mut().flatten().flatten().zip(others) {
-            *own += other;
-        }
+        let others = other.0.iter().flatten();
+        self.0.iter_mut().flatten().zip(others).for_each(|(own, other)| own.add(other));
     }
 }
 
@@ -66,13 +54,13 @@ pub struct LobeKind {
 impl LobeKind {
     /// What is left of a channel's sums, and of the logarithm of the evidence, once the group's diffuse reflectance is
     /// integrated out: `S S`, `S y`, `y y`, and the logarithm of the volume.
-    fn without_diffuse(&self, sums: &[f64; 6], around: f64) -> ([f64; 3], f64) {
-        let &[ee, es, ss, ey, sy, yy] = sums;
-        let (mean, precision) = (self.diffuse.0.unwrap_or(around), 1.0 / (self.diffuse.1 * self.diffuse.1));
-        let keep = 1.0 / (ee + precision);
-        let side = ey + precision * mean;
-        let left = [ss - es * es * keep, sy - es * side * keep, yy + precision * mean * mean - side * side * keep];
-        (left, -(precision * keep).ln())
+    fn without_diffuse(&self, sums: &System, around: f64) -> ([f64; 3], f64) {
+        let precision = 1.0 / (self.diffuse.1 * self.diffuse.1);
+        let mut all = *sums;
+        all.observe(precision, 1.0, 0.0, self.diffuse.0.unwrap_or(around));
+        let System { ee, es, ss, ey, sy, yy } = all;
+        let keep = 1.0 / ee;
+        ([ss - es * es * keep, sy - es * ey * keep, yy - ey * ey * keep], -(precision * keep).ln())
     }
 
     /// Inverse covariance of F0, and the logarithm of the covariance's determinant.

@@ -200,6 +200,7 @@ impl Tree<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::cell_sums::System;
     use super::super::lobe_widths::weighed_log_widths;
     use super::*;
 
@@ -207,7 +208,10 @@ mod tests {
     fn sums(specular: f64, log_width: f64, precision: f64) -> LobeSumsOfGroup {
         LobeSumsOfGroup(weighed_log_widths().map(|x| {
             let misfit = precision * 0.5 * (x - log_width).powi(2);
-            [[0.0, 0.0, precision, 0.0, precision * specular, precision * specular * specular + misfit]; 3]
+            let mut sums = System::default();
+            sums.observe(precision, 0.0, 1.0, specular);
+            sums.yy += misfit;
+            [sums; 3]
         }))
     }
 

@@ -17,11 +17,11 @@ pub const LOBE_WIDTHS: usize = 2 * MOST_NODES - 1 - FIRST_HALVED;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WidthStencil {
     /// The first integrated width.
-    pub first: usize,
+    first: usize,
     /// Number of integrated widths.
-    pub count: usize,
+    count: usize,
     /// Their weights, which sum to 1.
-    pub weights: [f32; 4],
+    weights: [f32; 4],
 }
 
 impl WidthStencil {
@@ -62,8 +62,8 @@ pub fn weighed_log_widths() -> [f64; LOBE_WIDTHS] {
 
 /// Stencils of all widths that are weighed, by the first integrated width that is known.
 pub fn weighed_stencils() -> [[WidthStencil; LOBE_WIDTHS]; MOST_NODES] {
-    let widths = weighed_log_widths();
-    std::array::from_fn(|first| widths.map(|width| WidthStencil::new(&log_widths(), width, first..MOST_NODES)))
+    let (nodes, widths) = (log_widths(), weighed_log_widths());
+    std::array::from_fn(|first| widths.map(|width| WidthStencil::new(&nodes, width, first..MOST_NODES)))
 }
 
 #[cfg(test)]

@@ -3,14 +3,16 @@
 //! Geometry and cameras stay, so light reaches pixels through a cache without noise ([`crate::render::cached`]). Then:
 //! 1. [`scene`]: all that never changes. [`observations`]: pixels, sorted by the texel they show. [`plan`]: the surface as
 //!    blocks of texels. [`estimate`]: what does change.
-//! 2. [`block`] (with `cell_sums`): under a known light, the reflectances of a block in closed form and its lobe's width by looking at all.
+//! 2. [`block`] (with `cell_sums`): under a known light, the reflectances of a block in closed form and its lobe's width by
+//!    looking at all.
 //! 3. [`round`]: a block's rows over the light; [`eliminate`] takes the block's own unknowns out of them, so that what is
 //!    left is the Schur complement of the joint Gauss-Newton system.
 //! 4. [`light_step`]: the light from those rows, at least zero ([`non_negative`]), in wide and narrow hats
 //!    ([`light_shape`]), with a weak wish for smoothness. [`light_round`] is the round as a whole,
 //!    [`light_evidence`] says what each texel of the light is known by.
 //! 5. [`maps`]: block by block, then in tiles ([`tile`]) with the footprints of pixels, where the evidence decides which
-//!    texels share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_widths`]), then [`mod@diffuse`]: all diffuse texels together.
+//!    texels share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_widths`]), then [`mod@diffuse`]: all diffuse texels
+//!    together.
 //! 6. [`solver`]: the steps in their order. A fit does them one by one, as [`crate::fit::Fitter`] does those of Adam.
 //! 7. [`transport_check`]: how far its model is from the path tracer's, once it is done.
 //!

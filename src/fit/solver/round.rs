@@ -3,7 +3,6 @@
 use super::block::{BlockPrior, BlockSolution, MOST_NODES, PixelTerms, solve_block};
 use super::eliminate::BlockRows;
 use super::light_shape::LightShape;
-use super::lobe_widths::WidthStencil;
 use super::observations::{Observation, Observations};
 use super::plan::Block;
 use crate::render::cached::irradiance::add_irradiance_row;
@@ -177,11 +176,10 @@ impl Round<'_> {
     /// Model radiance of a term with the block's solution.
     pub fn model(&self, work: &BlockWork, term: &PixelTerms) -> [f32; 3] {
         let solution = &work.solution;
-        let stencil = WidthStencil::new(&log_widths(), f64::from(solution.log_width), work.nodes.clone());
         [0, 1, 2].map(|c| {
             solution.cells[usize::from(term.cell)][c] * term.arriving[c]
-                + solution.specular[c] * stencil.of(&term.base, c)
-                + stencil.of(&term.grazing, c)
+                + solution.specular[c] * solution.stencil.of(&term.base, c)
+                + solution.stencil.of(&term.grazing, c)
         })
     }
 

@@ -4,6 +4,7 @@
 //! tile, pixels are relieved of what they cover of the neighbours, and what is left tells of lobes ([`super::lobe_tree`]).
 
 use super::block::PixelTerms;
+use super::cell_sums::System;
 use super::lobe_evidence::{LobeBelief, LobePrior, LobeSumsOfGroup};
 use super::lobe_tree::{TreeTexel, beliefs};
 use super::lobe_widths::{LOBE_WIDTHS, WidthStencil, weighed_log_widths, weighed_stencils};
@@ -15,7 +16,7 @@ pub const TILE: usize = 32;
 const PASSES: usize = 2;
 /// Sweeps of Gauss and Seidel over the reflectances of a tile.
 const SWEEPS: usize = 8;
-/// What is believed of diffuse reflectance: the tile's mean, and this standard deviation.
+/// What is believed of diffuse reflectance before looking: this standard deviation.
 const DIFFUSE_SPREAD: f64 = 0.35;
 /// Standard deviation of a texel's diffuse reflectance from that of the group that shares its lobe.
 const TEXEL_SPREAD: f64 = 0.2;
@@ -245,8 +246,7 @@ impl Tile {
         let count = self.texels.len();
         let widths = weighed_log_widths();
         let stencils = weighed_stencils();
-        // Per texel, width and channel: E E, E S, S S, E y, S y, y y.
-        let mut raw = vec![[[[0.0f64; 6]; 3]; LOBE_WIDTHS]; count];
+        let mut raw = vec![[[System::default(); 3]; LOBE_WIDTHS]; count];
         for pixel in &self.pixels {
             let weight = scale * f64::from(pixel.terms.weight);
             if weight == 0.0 {
@@ -261,9 +261,7 @@ impl Tile {
                 for (sums, stencil) in own.iter_mut().zip(&stencils[pixel.nodes.0]) {
                     let s = f64::from(stencil.of(&pixel.terms.base, c));
                     let y = radiance - f64::from(stencil.of(&pixel.terms.grazing, c));
-                    for (sum, value) in sums[c].iter_mut().zip([e * e, e * s, s * s, e * y, s * y, y * y]) {
-                        *sum += weight * value;
-                    }
+                    sums[c].observe(weight, e, s, y);
                 }
             }
         }
@@ -295,7 +293,7 @@ impl Tile {
         for (texel, lobe) in self.lobes.iter().enumerate() {
             let node = widths.partition_point(|&width| width < lobe.mean[3]).min(LOBE_WIDTHS - 1);
             self.variance[texel] = [0, 1, 2].map(|c| {
-                let [ee, es, ..] = raw[texel][node][c];
+                let System { ee, es, .. } = raw[texel][node][c];
                 (1.0 / (ee + ridge) + (es / (ee + ridge)).powi(2) * lobe.square[c]) as f32
             });
         }

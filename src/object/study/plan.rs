@@ -178,7 +178,7 @@ pub fn plan(inputs: &Inputs, options: &StudyOptions) -> Vec<Case> {
         seen: false,
     };
     let mut cases = Vec::new();
-    let all = if quick { take(&some, materials(2, 2)) } else { take(&known, materials(2, usize::MAX)) };
+    let all = take(if quick { &some } else { &known }, materials(2, usize::MAX));
     for material in &all {
         for light in take(&lights, lit(2, 5)) {
             for &model in &options.models {
