@@ -79,6 +79,39 @@ fn a_fit_that_is_taken_up_goes_on_bit_for_bit_whatever_the_threads() {
 }
 
 #[test]
+fn polishing_moves_everything_keeps_what_is_known_and_goes_on_bit_for_bit() {
+    let (scene, surface) = scene();
+    let mut plain = new_fitter(&base());
+    run(&mut plain).unwrap();
+    let settings = FitSettings { solver_polish: 3, ..base() };
+    let mut whole = new_fitter(&settings);
+    run(&mut whole).unwrap();
+    let stages: Vec<&str> = whole.state().losses.iter().skip(4).map(|row| row.stage.as_str()).collect();
+    assert_eq!(stages, ["maps", "polish", "polish", "polish"]);
+    assert!(whole.state().variances == plain.state().variances && whole.deviations().is_some());
+    assert!(whole.state().light != plain.state().light);
+    for number in 0..7 {
+        let moved = |fitter: &Fitter| fitter.state().texels.iter().map(|texel| texel[number]).collect::<Vec<f32>>();
+        assert_ne!(moved(&whole), moved(&plain), "{number}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("checkpoint");
+    for step in [4, 5, 7] {
+        let mut fitter = new_fitter(&settings);
+        (0..step).for_each(|_| drop(fitter.step(&GO).unwrap()));
+        checkpoint::write(&path, fitter.state()).unwrap();
+        let state = checkpoint::read(&path).unwrap();
+        let mut resumed = Fitter::resume(scene.clone(), surface.clone(), settings.clone(), state).unwrap();
+        run(&mut resumed).unwrap();
+        assert!(without_seconds(resumed.state()) == without_seconds(whole.state()), "after step {step}");
+    }
+    // More steps may be asked for once it has ended.
+    plain.change(settings).unwrap();
+    run(&mut plain).unwrap();
+    assert_eq!(plain.state().losses.len(), 8);
+}
+
+#[test]
 fn the_job_shows_each_step_and_leaves_a_whole_run() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run");

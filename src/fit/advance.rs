@@ -46,7 +46,7 @@ impl Fitter {
     pub(super) fn move_parameters(&mut self, stage: &Stage, sums: &StepSums) {
         let Some(work) = &mut self.work else { return };
         let rate = stage.rate(self.state.step_in_stage, self.settings.final_rate);
-        let free = if stage.kind == StageKind::All { rate } else { 0.0 };
+        let free = if stage.kind == StageKind::Diffuse { 0.0 } else { rate };
         let rates = TexelRates {
             diffuse: rate * self.settings.rate_diffuse,
             specular: free * self.settings.rate_specular,

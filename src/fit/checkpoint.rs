@@ -24,6 +24,9 @@ struct Header {
     step_in_stage: usize,
     step: usize,
     map_size: usize,
+    /// Texels of which variances are known; none in files of versions that kept them elsewhere.
+    #[serde(default)]
+    variances: usize,
     light_texels: usize,
     views: usize,
     losses: Vec<LossRow>,
@@ -40,6 +43,7 @@ pub fn write(path: &Path, state: &FitState) -> Result<()> {
         step_in_stage: state.step_in_stage,
         step: state.step,
         map_size: state.map_size,
+        variances: state.variances.len(),
         light_texels: state.light.len(),
         views: state.log_gains.len(),
         losses: state.losses.clone(),
@@ -69,6 +73,7 @@ pub fn write(path: &Path, state: &FitState) -> Result<()> {
         ] {
             put(bytemuck::cast_slice(texels))?;
         }
+        put(bytemuck::cast_slice(&state.variances))?;
         put(bytemuck::cast_slice(&state.light))?;
         put(bytemuck::cast_slice(&state.log_gains))?;
         let checksum = checksum.0;
@@ -160,6 +165,7 @@ pub fn read(path: &Path) -> Result<FitState> {
     let texel_moments = moments(count)?;
     let light_moments = moments(header.light_texels)?;
     let gain_moments = moments(header.views)?;
+    let variances = texels(header.variances)?;
     let light = take(header.light_texels.saturating_mul(3))?.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
     let log_gains = take(header.views)?;
     if !rest.is_empty() {
@@ -173,6 +179,7 @@ pub fn read(path: &Path) -> Result<FitState> {
         map_size: header.map_size,
         texels: state_texels,
         moments: texel_moments,
+        variances,
         light,
         light_moments,
         log_gains,
@@ -210,6 +217,7 @@ mod tests {
             map_size: 2,
             texels: (0..4).map(|texel| std::array::from_fn(|n| (texel * 8 + n) as f32 * 0.1)).collect(),
             moments: Moments::zeros(4),
+            variances: vec![[0.25; 8]; 4],
             light: vec![[1.5, 1e5, 1e-7]; 8],
             light_moments: Moments::zeros(8),
             log_gains: vec![0.1, -0.1],

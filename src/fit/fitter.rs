@@ -11,7 +11,7 @@ use super::figures::LiveFigures;
 use super::gauge::GaugeRule;
 use super::held_out::held_out_targets;
 use super::schedule::{Stage, stages};
-use super::settings::{FitSettings, Method, Start};
+use super::settings::{FitSettings, Start};
 use super::solver::SolverScene;
 use super::solver::light_evidence::EvidenceShares;
 use super::start;
@@ -118,6 +118,7 @@ impl Fitter {
         }) && state.stage <= state.plan.len()
             && state.texels.len() == texels
             && state.moments.is_of(texels)
+            && (state.variances.is_empty() || state.variances.len() == texels)
             && state.light.len() == light
             && state.light_moments.is_of(light)
             && state.log_gains.len() == views
@@ -256,7 +257,7 @@ impl Fitter {
     /// Does one step. `stop` may be raised by another thread at any time: the step in progress is then dropped.
     pub fn step(&mut self, stop: &AtomicBool) -> Result<StepOutcome> {
         let began = Instant::now();
-        if self.settings.method == Method::Paper && !self.look_at_held_out(stop) {
+        if !self.look_at_held_out(stop) {
             return Ok(StepOutcome::Interrupted);
         }
         while self.stage().is_some_and(|stage| self.state.step_in_stage >= stage.steps) {
@@ -265,7 +266,7 @@ impl Fitter {
             self.work = None;
         }
         let Some(&stage) = self.stage() else { return Ok(StepOutcome::Finished) };
-        if self.settings.method == Method::Solver {
+        if stage.kind.is_of_solver() {
             return self.solver_step(&stage, stop);
         }
         self.enter(&stage);

@@ -18,6 +18,15 @@ pub enum StageKind {
     NarrowLight,
     /// The solver makes all maps under the light that was found.
     Maps,
+    /// Optimiser steps on everything, after the solver's maps.
+    Polish,
+}
+
+impl StageKind {
+    /// Whether its steps are the solver's own, each as long as many of the optimiser.
+    pub fn is_of_solver(self) -> bool {
+        matches!(self, StageKind::WideLight | StageKind::NarrowLight | StageKind::Maps)
+    }
 }
 
 /// A run of steps at one resolution.
@@ -46,6 +55,7 @@ impl Stage {
             StageKind::WideLight => return "wide light".into(),
             StageKind::NarrowLight => return "narrow light".into(),
             StageKind::Maps => return "maps".into(),
+            StageKind::Polish => return "polish".into(),
         };
         format!("{kind} 1/{}", 1usize << self.photo_level)
     }
@@ -62,7 +72,7 @@ impl Stage {
         match self.kind {
             StageKind::Diffuse => 0.0,
             StageKind::All if ramp == 0 => 1.0,
-            StageKind::WideLight | StageKind::NarrowLight | StageKind::Maps => 1.0,
+            StageKind::WideLight | StageKind::NarrowLight | StageKind::Maps | StageKind::Polish => 1.0,
             StageKind::All => ((self.steps_before + step + 1) as f32 / ramp as f32).min(1.0),
         }
     }
@@ -96,6 +106,7 @@ fn positions(settings: &FitSettings) -> Vec<Position> {
         add(StageKind::WideLight, wide, 1, false);
         add(StageKind::NarrowLight, settings.solver_rounds - wide, 1, false);
         add(StageKind::Maps, 1, 1, false);
+        add(StageKind::Polish, settings.solver_polish, 1, false);
         return positions;
     }
     let levels = settings.levels;
@@ -144,7 +155,7 @@ fn add_stage(stages: &mut Vec<Stage>, position: &Position, before: usize, end: u
 /// the result is `plan`.
 ///
 /// # Errors
-/// `InvalidSetting` at `steps-diffuse` or `steps-all` when fewer steps are asked for than are done, or when the step
+/// `InvalidSetting` at `steps-diffuse`, `steps-all` or `solver-polish` when fewer steps are asked for than are done, or when the step
 /// they belong to is over; without a place when `plan` is not one of these settings at all.
 pub fn revised(settings: &FitSettings, plan: &[Stage], stage: usize, step_in_stage: usize) -> Result<Vec<Stage>> {
     let foreign = || {
@@ -219,6 +230,7 @@ fn of_steps(settings: &FitSettings, kind: StageKind, message: String) -> Error {
     let name = match (kind, settings.steps) {
         (StageKind::Diffuse, _) => "steps-diffuse",
         (StageKind::All, _) => "steps-all",
+        (StageKind::Polish, _) => "solver-polish",
         _ => "solver-rounds",
     };
     Error::new(ErrorKind::InvalidSetting, message)

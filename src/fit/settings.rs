@@ -156,6 +156,11 @@ pub struct FitSettings {
     /// used.
     #[arg(long, default_value_t = FitSettings::default().solver_grid)]
     pub solver_grid: usize,
+    /// Optimiser steps after the solver's maps, on all maps and the light, by the gradient of whole paths: for photos of
+    /// real places, whose edges, background and geometry the solver's model does not carry. Where its model holds, they
+    /// make maps worse.
+    #[arg(long, default_value_t = FitSettings::default().solver_polish)]
+    pub solver_polish: usize,
     /// Optimiser steps between two looks at the held-out views; 0 never looks.
     #[arg(long, default_value_t = FitSettings::default().held_out_interval)]
     pub held_out_interval: usize,
@@ -195,6 +200,7 @@ impl Default for FitSettings {
             first_hits_mib: 0,
             solver_rounds: 8,
             solver_grid: 256,
+            solver_polish: 0,
             held_out_interval: 10,
             exclude: Vec::new(),
         }

@@ -1,7 +1,7 @@
 //! The solver's steps as steps of a fit: same state, same history, same checkpoint.
 //!
 //! A step is a round on the light, or all maps. What it needs and no checkpoint holds, the traced cache, is made before
-//! the first step, and again after a resume. Nothing is random but by the seed, so a fit that is taken up goes on bit
+//! the first step, and again after a resume. Steps that polish what it found are Adam's ([`super::advance`]). Nothing is random but by the seed, so a fit that is taken up goes on bit
 //! for bit.
 
 use super::fitter::{Fitter, StepOutcome};
@@ -29,7 +29,9 @@ impl Fitter {
         let step = match stage.kind {
             StageKind::Maps => SolverStep::Maps,
             StageKind::NarrowLight => SolverStep::Light(settings.coarse_rounds + self.state.step_in_stage),
-            StageKind::WideLight | StageKind::Diffuse | StageKind::All => SolverStep::Light(self.state.step_in_stage),
+            StageKind::WideLight | StageKind::Diffuse | StageKind::All | StageKind::Polish => {
+                SolverStep::Light(self.state.step_in_stage)
+            }
         };
         let mut estimate = self.lend_estimate(&solver);
         let report = solver.step(step, &mut estimate, stop);
@@ -48,12 +50,16 @@ impl Fitter {
     /// Standard deviations of the maps' values given the light, as maps: only the solver knows them, and only at its end.
     pub fn deviations(&self) -> Option<MaterialMaps> {
         self.knows_deviations()
-            .then(|| Estimate::deviations(&self.state.texels, &self.state.moments.second, self.state.map_size))
+            .then(|| Estimate::deviations(&self.state.texels, &self.state.variances, self.state.map_size))
     }
 
     fn knows_deviations(&self) -> bool {
         self.settings.method == Method::Solver
-            && self.stage().is_none_or(|stage| stage.kind == StageKind::Maps && self.state.step_in_stage >= stage.steps)
+            && self.state.variances.len() == self.state.texels.len()
+            && self.stage().is_none_or(|stage| match stage.kind {
+                StageKind::Maps => self.state.step_in_stage >= stage.steps,
+                kind => kind == StageKind::Polish,
+            })
     }
 
     /// How far the solver's model is from the path tracer's with what was found. `None` under Adam, before the first step
@@ -81,7 +87,7 @@ impl Fitter {
     pub fn lobe_sharing(&self) -> Option<GreyImage> {
         let size = self.state.map_size;
         self.knows_deviations()
-            .then(|| Image::from_fn(size, size, |row, column| self.state.moments.second[row * size + column][7]))
+            .then(|| Image::from_fn(size, size, |row, column| self.state.variances[row * size + column][7]))
     }
 
     /// Moves the unknowns out of the state, so that none is held twice.
@@ -89,11 +95,12 @@ impl Fitter {
         let state = &mut self.state;
         let mut estimate = Estimate {
             texels: std::mem::take(&mut state.texels),
-            variances: std::mem::take(&mut state.moments.second),
+            variances: std::mem::take(&mut state.variances),
             light: std::mem::take(&mut state.light),
             light_evidence: std::mem::take(&mut self.light_evidence),
             log_gains: solver.views.iter().map(|&view| state.log_gains[view]).collect(),
         };
+        estimate.variances.resize(estimate.texels.len(), [0.0; 8]);
         // The paper's start is black: nothing could be told apart under it.
         if estimate.light.iter().all(|radiance| *radiance == [0.0; 3]) {
             let light = solver.constant_light();
@@ -105,7 +112,7 @@ impl Fitter {
     fn take_estimate(&mut self, solver: &SolverScene, estimate: Estimate) {
         let state = &mut self.state;
         state.texels = estimate.texels;
-        state.moments.second = estimate.variances;
+        state.variances = estimate.variances;
         state.light = estimate.light;
         self.light_evidence = estimate.light_evidence;
         for (&view, gain) in solver.views.iter().zip(estimate.log_gains) {

@@ -43,9 +43,11 @@ pub struct FitState {
     pub map_size: usize,
     /// Texels of the maps.
     pub texels: Vec<Texel<f32>>,
-    /// Moments of the texels under Adam. The solver keeps the variances of their numbers in `second`, see
-    /// [`Estimate::variances`](crate::fit::solver::Estimate::variances).
+    /// Moments of the texels under Adam.
     pub moments: Moments,
+    /// What the solver knows of each texel, see [`Estimate::variances`](crate::fit::solver::Estimate::variances); empty
+    /// before its first step and under Adam.
+    pub variances: Vec<Texel<f32>>,
     /// Radiance of the light's texels.
     pub light: Vec<[f32; 3]>,
     /// Moments of the light.

@@ -6,7 +6,7 @@ use super::save::Saver;
 use super::{Command, Event, Progress, Slot, Snapshot, SolverTold};
 use crate::error::{Error, ErrorKind, Finding, Result, Severity, text_of_panic};
 use crate::export::RunFolder;
-use crate::fit::{FitSettings, Fitter, LossRow, Method, StepOutcome};
+use crate::fit::{FitSettings, Fitter, LossRow, StepOutcome};
 use crate::insight::report::data::StageTime;
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use std::sync::Arc;
@@ -224,7 +224,7 @@ impl Worker {
                 self.set_paused(true);
             }
             // While it holds, what is seen is what a single step did; the solver's steps are few, and each is shown.
-            let is_large_step = self.settings.fit.method == Method::Solver;
+            let is_large_step = self.fitter.stage().is_some_and(|stage| stage.kind.is_of_solver());
             if self.paused || is_large_step || last_snapshot.elapsed() > SNAPSHOT_INTERVAL {
                 self.put_snapshot();
                 last_snapshot = Instant::now();

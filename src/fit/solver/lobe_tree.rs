@@ -201,6 +201,7 @@ impl Tree<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::cell_sums::System;
+    use super::super::lobe_evidence::LobeKind;
     use super::super::lobe_widths::weighed_log_widths;
     use super::*;
 
@@ -248,6 +249,27 @@ mod tests {
             let (specular, log_width, _) = of(index / 8, index % 8);
             assert!((belief.mean[0] - specular).abs() < 0.05, "{index}: {belief:?}");
             assert!((belief.mean[3] - log_width).abs() < 0.1, "{index}: {belief:?}");
+        }
+    }
+
+    #[test]
+    fn a_lobe_does_not_outshine_what_is_seen() {
+        // Light arrives alike through the lobe and diffusely, so pixels say how much is sent back in all, 0.1, and no more.
+        // What is believed of a metal would make F0 0.127 of it, over a diffuse reflectance of -0.027.
+        let texels: Vec<TreeTexel> =
+            (0..64).map(|k| TreeTexel { row: k / 8, column: k % 8, colour: [0.05; 3] }).collect();
+        let grey = weighed_log_widths().map(|_| {
+            let mut sums = System::default();
+            sums.observe(1e4, 1.0, 1.0, 0.1);
+            [sums; 3]
+        });
+        let kinds = LobePrior::default().kinds.map(|kind| LobeKind { share: 1.0, ..kind });
+        for kind in kinds {
+            let prior = LobePrior { kinds: [kind; 3], ..LobePrior::default() };
+            let sums = vec![LobeSumsOfGroup(grey); texels.len()];
+            for belief in beliefs(&texels, &sums, 8, &weighed_log_widths(), &prior) {
+                assert!(belief.mean[0] < 0.105, "{kind:?}: {belief:?}");
+            }
         }
     }
 
