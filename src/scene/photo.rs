@@ -39,6 +39,11 @@ impl PixelState {
         matches!(self, PixelState::SurfaceClipped | PixelState::BackgroundClipped)
     }
 
+    /// Whether the mask says background.
+    pub fn is_background(self) -> bool {
+        matches!(self, PixelState::Background | PixelState::BackgroundClipped)
+    }
+
     /// Whether the mask says surface. Without a mask every pixel does, and rays decide.
     pub fn is_surface(self) -> bool {
         matches!(self, PixelState::Surface | PixelState::SurfaceClipped)

@@ -178,12 +178,14 @@ fn background_pixels(
     let mut seen = 0usize;
     for (index, (&view, footprints)) in views.iter().zip(footprints).enumerate() {
         let view = &scene.views[view];
+        // Without a mask every pixel is said to be surface, and rays decide.
+        let has_mask = view.states.pixels().iter().any(|state| state.is_background());
         for (pixel, _) in footprints.escaped.iter().enumerate().filter(|(_, share)| **share >= 1.0) {
             seen += 1;
             let (row, column) = (pixel / footprints.width, pixel % footprints.width);
             let state = view.states[(row, column)];
             let radiance = view.photo.radiance(row, column);
-            let says_nothing = state == PixelState::Ignored || state.is_clipped() || state.is_surface();
+            let says_nothing = state == PixelState::Ignored || state.is_clipped() || (has_mask && state.is_surface());
             if !seen.is_multiple_of(stride) || says_nothing || !is_radiance(radiance) {
                 continue;
             }
