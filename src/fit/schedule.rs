@@ -155,8 +155,8 @@ fn add_stage(stages: &mut Vec<Stage>, position: &Position, before: usize, end: u
 /// the result is `plan`.
 ///
 /// # Errors
-/// `InvalidSetting` at `steps-diffuse`, `steps-all` or `solver-polish` when fewer steps are asked for than are done, or when the step
-/// they belong to is over; without a place when `plan` is not one of these settings at all.
+/// `InvalidSetting` at `steps-diffuse`, `steps-all` or `solver-polish` when fewer steps are asked for than are done, or
+/// when the step they belong to is over; without a place when `plan` is not one of these settings at all.
 pub fn revised(settings: &FitSettings, plan: &[Stage], stage: usize, step_in_stage: usize) -> Result<Vec<Stage>> {
     let foreign = || {
         Error::new(ErrorKind::InvalidSetting, "the stages that are done are not those of these settings")

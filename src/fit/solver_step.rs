@@ -1,8 +1,8 @@
 //! The solver's steps as steps of a fit: same state, same history, same checkpoint.
 //!
 //! A step is a round on the light, or all maps. What it needs and no checkpoint holds, the traced cache, is made before
-//! the first step, and again after a resume. Steps that polish what it found are Adam's ([`super::advance`]). Nothing is random but by the seed, so a fit that is taken up goes on bit
-//! for bit.
+//! the first step, and again after a resume. Steps that polish what it found are Adam's ([`super::advance`]). Nothing is
+//! random but by the seed, so a fit that is taken up goes on bit for bit.
 
 use super::fitter::{Fitter, StepOutcome};
 use super::schedule::{Stage, StageKind};

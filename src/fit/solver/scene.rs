@@ -211,9 +211,9 @@ fn set_scatter(pixels: &mut [BackgroundPixel], texels: usize) {
     }
     // Gauss and Seidel over the texels; `left` is what they leave of the pixels.
     let mut left: Vec<f64> = pixels.iter().map(|pixel| f64::from(pixel.radiance.iter().sum::<f32>()) / 3.0).collect();
+    let powers: Vec<f64> = of_texel.iter().map(|taps| taps.iter().map(|(_, weight)| weight * weight).sum()).collect();
     for _ in 0..SCATTER_SWEEPS {
-        for taps in &of_texel {
-            let power: f64 = taps.iter().map(|(_, weight)| weight * weight).sum();
+        for (taps, &power) in of_texel.iter().zip(&powers) {
             let side: f64 = taps.iter().map(|&(pixel, weight)| weight * left[pixel]).sum();
             let step = if power > 0.0 { side / power } else { 0.0 };
             for &(pixel, weight) in taps {
