@@ -112,6 +112,37 @@ fn polishing_moves_everything_keeps_what_is_known_and_goes_on_bit_for_bit() {
 }
 
 #[test]
+fn levels_bring_maps_at_half_size_first_and_go_on_bit_for_bit() {
+    let (scene, surface) = scene();
+    let settings = FitSettings { map_size: 256, solver_levels: 3, solver_rounds: 2, ..base() };
+    let mut whole = new_fitter(&settings);
+    let mut sizes = Vec::new();
+    while let StepOutcome::Stepped(row) = whole.step(&GO).unwrap() {
+        sizes.push((row.stage, whole.state().map_size, whole.deviations().is_some()));
+    }
+    let expected = [
+        ("wide light 1/2", 128, false),
+        ("narrow light 1/2", 128, false),
+        ("maps 1/2", 128, true),
+        ("narrow light", 256, true),
+        ("narrow light", 256, true),
+        ("maps", 256, true),
+    ];
+    assert_eq!(sizes, expected.map(|(name, size, known)| (name.to_string(), size, known)));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("checkpoint");
+    for step in [3, 4] {
+        let mut fitter = new_fitter(&settings);
+        (0..step).for_each(|_| drop(fitter.step(&GO).unwrap()));
+        checkpoint::write(&path, fitter.state()).unwrap();
+        let state = checkpoint::read(&path).unwrap();
+        let mut resumed = Fitter::resume(scene.clone(), surface.clone(), settings.clone(), state).unwrap();
+        run(&mut resumed).unwrap();
+        assert!(without_seconds(resumed.state()) == without_seconds(whole.state()), "after step {step}");
+    }
+}
+
+#[test]
 fn the_job_shows_each_step_and_leaves_a_whole_run() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run");

@@ -13,8 +13,18 @@ use super::views::{ViewUse, training_views, uses_of};
 use crate::error::{Error, ErrorKind, Place, Result};
 
 /// Settings that cannot change: shapes, random numbers and the order of stages hang on them.
-const FIXED: [&str; 9] =
-    ["seed", "method", "map-size", "environment-height", "levels", "steps", "start", "solver-rounds", "solver-grid"];
+const FIXED: [&str; 10] = [
+    "seed",
+    "method",
+    "map-size",
+    "environment-height",
+    "levels",
+    "steps",
+    "start",
+    "solver-rounds",
+    "solver-grid",
+    "solver-levels",
+];
 /// Settings that what a stage keeps between its steps was made for.
 const OF_STAGE_WORK: [&str; 7] =
     ["exclude", "samples", "pixel-filter", "views-per-step", "pixels-per-step", "consistency", "first-hits-mib"];

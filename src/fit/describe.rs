@@ -295,6 +295,7 @@ mod tests {
             "method",
             "seed",
             "solver-grid",
+            "solver-levels",
             "solver-rounds",
             "start",
             "steps",

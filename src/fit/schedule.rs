@@ -47,16 +47,19 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// Name for logs: `diffuse 1/4`, `all 1/1` or `wide light`.
+    /// Name for logs: `diffuse 1/4`, `all 1/1`, `maps 1/2` or `maps`.
     pub fn name(&self) -> String {
         let kind = match self.kind {
             StageKind::Diffuse => "diffuse",
             StageKind::All => "all",
-            StageKind::WideLight => return "wide light".into(),
-            StageKind::NarrowLight => return "narrow light".into(),
-            StageKind::Maps => return "maps".into(),
-            StageKind::Polish => return "polish".into(),
+            StageKind::WideLight => "wide light",
+            StageKind::NarrowLight => "narrow light",
+            StageKind::Maps => "maps",
+            StageKind::Polish => "polish",
         };
+        if self.photo_level == 0 && !matches!(self.kind, StageKind::Diffuse | StageKind::All) {
+            return kind.into();
+        }
         format!("{kind} 1/{}", 1usize << self.photo_level)
     }
 
@@ -77,6 +80,11 @@ impl Stage {
         }
     }
 }
+
+/// Width of the solver's maps on a coarse level, at least.
+const LEAST_COARSE_MAP: usize = 128;
+/// Rounds of the solver on the light on each level but the coarsest.
+const FINER_ROUNDS: usize = 2;
 
 /// A place in the order of stages, whether or not steps fall to it.
 struct Position {
@@ -102,12 +110,7 @@ fn positions(settings: &FitSettings) -> Vec<Position> {
         }
     };
     if settings.method == Method::Solver {
-        let wide = settings.solver_rounds / 2;
-        add(StageKind::WideLight, wide, 1, false);
-        add(StageKind::NarrowLight, settings.solver_rounds - wide, 1, false);
-        add(StageKind::Maps, 1, 1, false);
-        add(StageKind::Polish, settings.solver_polish, 1, false);
-        return positions;
+        return positions_of_solver(settings);
     }
     let levels = settings.levels;
     match settings.steps {
@@ -118,6 +121,29 @@ fn positions(settings: &FitSettings) -> Vec<Position> {
         }
         Steps::OneStep => add(StageKind::All, settings.steps_diffuse + settings.steps_all, levels, true),
     }
+    positions
+}
+
+/// Light and maps on the coarsest level; on each finer one some rounds more, and maps anew.
+fn positions_of_solver(settings: &FitSettings) -> Vec<Position> {
+    let mut positions = Vec::new();
+    let mut add = |kind: StageKind, total: usize, photo_level: usize| {
+        let map_size = settings.map_size >> photo_level;
+        if total > 0 {
+            positions.push(Position { kind, photo_level, map_size, total, place: 0, places: 1 });
+        }
+    };
+    let is_large = |level: &usize| settings.map_size >> level >= LEAST_COARSE_MAP;
+    let coarsest = (1..settings.solver_levels).take_while(is_large).last().unwrap_or(0);
+    let wide = settings.solver_rounds / 2;
+    add(StageKind::WideLight, wide, coarsest);
+    add(StageKind::NarrowLight, settings.solver_rounds - wide, coarsest);
+    add(StageKind::Maps, 1, coarsest);
+    for level in (0..coarsest).rev() {
+        add(StageKind::NarrowLight, FINER_ROUNDS, level);
+        add(StageKind::Maps, 1, level);
+    }
+    add(StageKind::Polish, settings.solver_polish, 0);
     positions
 }
 

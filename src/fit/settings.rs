@@ -156,6 +156,10 @@ pub struct FitSettings {
     /// used.
     #[arg(long, default_value_t = FitSettings::default().solver_grid)]
     pub solver_grid: usize,
+    /// Sizes of photos and maps at which the solver works, each half of the next: light and maps are found at the smallest
+    /// first, then made better. A size with maps below 128 x 128 texels is left out.
+    #[arg(long, default_value_t = FitSettings::default().solver_levels)]
+    pub solver_levels: usize,
     /// Optimiser steps after the solver's maps, on all maps and the light, by the gradient of whole paths: for photos of
     /// real places, whose edges, background and geometry the solver's model does not carry. Where its model holds, they
     /// make maps worse.
@@ -200,6 +204,7 @@ impl Default for FitSettings {
             first_hits_mib: 0,
             solver_rounds: 8,
             solver_grid: 256,
+            solver_levels: 2,
             solver_polish: 0,
             held_out_interval: 10,
             exclude: Vec::new(),
@@ -248,6 +253,9 @@ impl FitSettings {
         }
         if !(2..=64).contains(&self.solver_rounds) {
             return wrong("solver-rounds", "must be 2 to 64");
+        }
+        if !(1..=6).contains(&self.solver_levels) {
+            return wrong("solver-levels", "must be 1 to 6");
         }
         if !(16..=4096).contains(&self.solver_grid) {
             return wrong("solver-grid", "must be 16 to 4096");

@@ -9,6 +9,7 @@ use super::schedule::{Stage, StageKind};
 use super::settings::Method;
 use super::solver::{Estimate, SolverScene, SolverSettings, SolverStep, StepReport, TransportError};
 use super::state::LossRow;
+use super::targets::targets;
 use crate::error::Result;
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::material::MaterialMaps;
@@ -16,23 +17,30 @@ use glam::Vec3;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
+/// Width and height of the grid on the coarsest level, at least.
+const LEAST_GRID: usize = 16;
+
 impl Fitter {
     /// Does one step of the solver. A step that is stopped changes nothing.
     pub(super) fn solver_step(&mut self, stage: &Stage, stop: &AtomicBool) -> Result<StepOutcome> {
         let began = Instant::now();
-        let settings = SolverSettings::of(&self.settings);
+        let whole = SolverSettings::of(&self.settings);
+        let grid = (whole.grid >> stage.photo_level).max(LEAST_GRID);
+        let settings = SolverSettings { map_size: stage.map_size, grid, ..whole };
+        if self.solver.as_ref().is_some_and(|solver| solver.settings.map_size != settings.map_size) {
+            self.solver = None;
+        }
         if self.solver.is_none() {
             let (scene, surface) = (&self.scene, &self.surface);
-            self.solver = SolverScene::build(scene, surface, &self.training, &self.held_out, settings, stop)?;
+            let targets = targets(scene, &self.training, stage.photo_level);
+            self.solver = SolverScene::build(scene, surface, targets, &self.held_out, settings, stop)?;
         }
         let Some(solver) = self.solver.take() else { return Ok(StepOutcome::Interrupted) };
         let step = match stage.kind {
             StageKind::Maps => SolverStep::Maps,
-            StageKind::NarrowLight => SolverStep::Light(settings.coarse_rounds + self.state.step_in_stage),
-            StageKind::WideLight | StageKind::Diffuse | StageKind::All | StageKind::Polish => {
-                SolverStep::Light(self.state.step_in_stage)
-            }
+            _ => SolverStep::Light(self.light_rounds_done()),
         };
+        self.grow_maps(stage.map_size);
         let mut estimate = self.lend_estimate(&solver);
         let report = solver.step(step, &mut estimate, stop);
         let held_out = report.as_ref().map(|_| solver.held_out_rmse(&self.scene, &estimate));
@@ -47,6 +55,13 @@ impl Fitter {
         Ok(StepOutcome::Stepped(self.note(stage, &report, held_out_rmse)))
     }
 
+    /// Rounds on the light so far, on all levels.
+    fn light_rounds_done(&self) -> usize {
+        let is_round = |stage: &&Stage| matches!(stage.kind, StageKind::WideLight | StageKind::NarrowLight);
+        let before: usize = self.state.plan[..self.state.stage].iter().filter(is_round).map(|stage| stage.steps).sum();
+        before + self.stage().filter(is_round).map_or(0, |_| self.state.step_in_stage)
+    }
+
     /// Standard deviations of the maps' values given the light, as maps: only the solver knows them, and only at its end.
     pub fn deviations(&self) -> Option<MaterialMaps> {
         self.knows_deviations()
@@ -56,9 +71,9 @@ impl Fitter {
     fn knows_deviations(&self) -> bool {
         self.settings.method == Method::Solver
             && self.state.variances.len() == self.state.texels.len()
-            && self.stage().is_none_or(|stage| match stage.kind {
-                StageKind::Maps => self.state.step_in_stage >= stage.steps,
-                kind => kind == StageKind::Polish,
+            && self.state.plan.iter().enumerate().any(|(number, stage)| {
+                let is_done = number == self.state.stage && self.state.step_in_stage >= stage.steps;
+                stage.kind == StageKind::Maps && (number < self.state.stage || is_done)
             })
     }
 
@@ -68,7 +83,7 @@ impl Fitter {
         let solver = self.solver.as_ref()?;
         let estimate =
             Estimate { texels: self.state.texels.clone(), light: self.state.light.clone(), ..Estimate::default() };
-        solver.transport_error(&self.scene, &self.surface, &estimate, stop)
+        solver.transport_error(&self.surface, &estimate, stop)
     }
 
     /// What each texel of the light is known by, as an image: highlights in red, background pixels in green, diffuse light

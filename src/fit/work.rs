@@ -28,11 +28,7 @@ impl Fitter {
         if self.work.is_some() {
             return;
         }
-        while self.state.map_size < stage.map_size {
-            self.state.texels = doubled(&self.state.texels, self.state.map_size);
-            self.state.map_size *= 2;
-            self.state.moments = Moments::zeros(self.state.texels.len());
-        }
+        self.grow_maps(stage.map_size);
         let covered = covered_texels(self.surface.mesh(), stage.map_size, stage.map_size);
         // Levels of the chain beyond the footprints of shrunken photographs serve bounced rays.
         let weights = PyramidWeights::new(&covered, 6);
@@ -47,6 +43,19 @@ impl Fitter {
         let first_hits = self.cache_first_hits(&targets);
         let mean_of_photos = mean_of_photos(&self.scene, &targets);
         self.work = Some(StageWork { weights, parameters, gradient, targets, first_hits, mean_of_photos });
+    }
+
+    /// Doubles the maps until they have this size; what is known of a texel goes on as known of its four.
+    pub(super) fn grow_maps(&mut self, map_size: usize) {
+        let state = &mut self.state;
+        while state.map_size < map_size {
+            state.texels = doubled(&state.texels, state.map_size);
+            if !state.variances.is_empty() {
+                state.variances = doubled(&state.variances, state.map_size);
+            }
+            state.map_size *= 2;
+            state.moments = Moments::zeros(state.texels.len());
+        }
     }
 
     /// Traces first hits for as many views as the memory budget holds, when each view is likely to be visited often

@@ -177,13 +177,12 @@ fn fetch(tree: &WideTree, reference: u32) {
 fn test_node(node: &WideNode, frame: &Frame, t_max: f32) -> (__m256, u32) {
     // SAFETY: `Frame` holds places of rows of planes, each row is eight numbers, nodes are aligned to 64 bytes.
     let row = |bytes: usize| unsafe { _mm256_load_ps(std::ptr::from_ref(node).cast::<f32>().byte_add(bytes)) };
-    let entry = [0, 1, 2]
-        .map(|axis| _mm256_fmadd_ps(row(frame.entry_plane[axis]), frame.inverse[axis], frame.entry_offset[axis]));
-    let exit = [0, 1, 2]
-        .map(|axis| _mm256_fmadd_ps(row(frame.exit_plane[axis]), frame.inverse[axis], frame.exit_offset[axis]));
+    let entry =
+        |axis: usize| _mm256_fmadd_ps(row(frame.entry_plane[axis]), frame.inverse[axis], frame.entry_offset[axis]);
+    let exit = |axis: usize| _mm256_fmadd_ps(row(frame.exit_plane[axis]), frame.inverse[axis], frame.exit_offset[axis]);
     // Where the first operand is a NaN, these give the second.
-    let entry = _mm256_max_ps(_mm256_max_ps(entry[0], entry[1]), _mm256_max_ps(entry[2], _mm256_setzero_ps()));
-    let exit = _mm256_min_ps(_mm256_min_ps(exit[0], exit[1]), _mm256_min_ps(exit[2], _mm256_set1_ps(t_max)));
+    let entry = _mm256_max_ps(_mm256_max_ps(entry(0), entry(1)), _mm256_max_ps(entry(2), _mm256_setzero_ps()));
+    let exit = _mm256_min_ps(_mm256_min_ps(exit(0), exit(1)), _mm256_min_ps(exit(2), _mm256_set1_ps(t_max)));
     (entry, _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(entry, exit)) as u32)
 }
 

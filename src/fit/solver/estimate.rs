@@ -48,6 +48,12 @@ impl Estimate {
         self.variances[texel][7] > 0.0
     }
 
+    /// Whether a texel was solved for when maps were made, better than any block of a round on the light is.
+    #[inline]
+    pub fn is_mapped(&self, texel: usize) -> bool {
+        self.variances[texel][0] > 0.0
+    }
+
     /// Sets a texel that was solved for; `variance` is 0 where it is not known, its last the number of texels that share
     /// the lobe.
     pub fn set(&mut self, texel: usize, diffuse: [f32; 3], specular: [f32; 3], log_width: f32, variance: Texel<f32>) {

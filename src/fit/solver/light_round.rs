@@ -61,6 +61,9 @@ impl SolverScene {
         for (index, work) in &done {
             let solution = &work.solution;
             for &(texel, cell) in &self.round_blocks[*index].texels {
+                if estimate.is_mapped(texel as usize) {
+                    continue;
+                }
                 let diffuse = solution.cells[usize::from(cell)];
                 estimate.set(texel as usize, diffuse, solution.specular, solution.log_width, [0.0; 8]);
             }

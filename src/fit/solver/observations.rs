@@ -4,9 +4,9 @@
 //! is booked at the texel it covers most; what it covers of the neighbours is put right at the end, when diffuse
 //! reflectance is solved with the full footprints ([`super::diffuse`]).
 
+use crate::fit::targets::Target;
 use crate::render::cached::ViewFootprints;
-use crate::scene::{Scene, View};
-use glam::Vec3;
+use crate::scene::Scene;
 use rayon::prelude::*;
 
 /// A pixel and its texel.
@@ -36,13 +36,13 @@ pub struct Observations {
 }
 
 impl Observations {
-    /// Gathers the observations of views; `views` are indices in the scene, in the order of `footprints`.
-    pub fn gather(scene: &Scene, views: &[usize], footprints: &[ViewFootprints], map_size: usize) -> Self {
-        let per_view: Vec<Vec<Observation>> = views
+    /// Gathers the observations of photographs, in the order of `footprints`.
+    pub fn gather(scene: &Scene, targets: &[Target], footprints: &[ViewFootprints], map_size: usize) -> Self {
+        let per_view: Vec<Vec<Observation>> = targets
             .par_iter()
             .zip(footprints)
             .enumerate()
-            .map(|(index, (&view, footprints))| of_view(&scene.views[view], index as u32, footprints))
+            .map(|(index, (target, footprints))| of_view(scene, target, index as u32, footprints))
             .collect();
         let texels = map_size * map_size;
         let mut of_texel = vec![0u32; texels + 1];
@@ -73,16 +73,14 @@ impl Observations {
     }
 }
 
-fn of_view(view: &View, index: u32, footprints: &ViewFootprints) -> Vec<Observation> {
+fn of_view(scene: &Scene, target: &Target, index: u32, footprints: &ViewFootprints) -> Vec<Observation> {
     let mut made = Vec::new();
     for (point_index, point) in footprints.points.iter().enumerate() {
         if point.share < 0.999 {
             continue;
         }
-        let (row, column) = (point.pixel as usize / footprints.width, point.pixel as usize % footprints.width);
-        let state = view.states[(row, column)];
-        let radiance: Vec3 = view.photo.radiance(row, column);
-        if !state.is_surface() || !crate::fit::targets::is_radiance(radiance) {
+        let (radiance, state) = target.at(scene, point.pixel as usize);
+        if !state.is_surface() {
             continue;
         }
         let mut best = (0u32, 0.0f32);

@@ -4,7 +4,7 @@ use super::observations::Observations;
 use super::plan::{self, Block};
 use super::settings::SolverSettings;
 use crate::error::{Error, ErrorKind, Result};
-use crate::fit::targets::{Target, is_radiance};
+use crate::fit::targets::Target;
 use crate::math::sphere::{BilinearTap, tap_of_direction};
 use crate::render::Surface;
 use crate::render::cached::{CachedSettings, CachedTransport, FootprintSettings, ViewFootprints};
@@ -44,6 +44,8 @@ pub struct SolverScene {
     pub settings: SolverSettings,
     /// Indices in the scene of the views that are fitted to.
     pub views: Vec<usize>,
+    /// Their photographs, of the size they are fitted at.
+    pub targets: Vec<Target>,
     /// The cache.
     pub transport: CachedTransport,
     /// Footprints of the views.
@@ -63,14 +65,14 @@ pub struct SolverScene {
 }
 
 impl SolverScene {
-    /// Traces the cache and gathers the evidence of these views; `held_out` judge. `None` when `stop` was raised.
+    /// Traces the cache and gathers the evidence of these photographs; `held_out` judge. `None` when `stop` was raised.
     ///
     /// # Errors
     /// `InvalidScene` when no pixel of any view is evidence.
     pub fn build(
         scene: &Scene,
         surface: &Surface,
-        views: &[usize],
+        targets: Vec<Target>,
         held_out: &[Target],
         settings: SolverSettings,
         stop: &AtomicBool,
@@ -91,30 +93,20 @@ impl SolverScene {
             seed: settings.seed,
             ..FootprintSettings::default()
         };
-        let mut footprints = Vec::with_capacity(views.len());
-        for &view in views {
-            if stop.load(Ordering::Relaxed) {
-                return Ok(None);
-            }
-            let camera = &scene.views[view].camera;
-            footprints.push(ViewFootprints::trace(surface, &transport.grid, camera, view as u32, &first_hits));
-        }
-        let mut judges = Vec::with_capacity(held_out.len());
-        for target in held_out {
-            if stop.load(Ordering::Relaxed) {
-                return Ok(None);
-            }
-            let traced =
-                ViewFootprints::trace(surface, &transport.grid, &target.camera, target.view as u32, &first_hits);
-            judges.push((target.clone(), traced));
-        }
-        let observations = Observations::gather(scene, views, &footprints, settings.map_size);
+        let traced = |target: &Target| {
+            let (grid, view) = (&transport.grid, target.view as u32);
+            (!stop.load(Ordering::Relaxed))
+                .then(|| ViewFootprints::trace(surface, grid, &target.camera, view, &first_hits))
+        };
+        let all = |targets: &[Target]| targets.iter().map(traced).collect::<Option<Vec<ViewFootprints>>>();
+        let (Some(footprints), Some(judged)) = (all(&targets), all(held_out)) else { return Ok(None) };
+        let observations = Observations::gather(scene, &targets, &footprints, settings.map_size);
         if observations.list.is_empty() {
             return Err(Error::new(ErrorKind::InvalidScene, "no pixel of any view is evidence for the surface")
                 .remedy("check that the masks are not inverted or black, and that the cameras see the mesh"));
         }
         let background = if scene.background == Background::Environment && settings.use_background {
-            background_pixels(scene, views, &footprints, settings.light_size)
+            background_pixels(scene, &targets, &footprints, settings.light_size)
         } else {
             Vec::new()
         };
@@ -124,13 +116,14 @@ impl SolverScene {
             round_blocks: blocks(ROUND_BLOCK),
             map_blocks: blocks(MAP_BLOCK),
             settings,
-            views: views.to_vec(),
+            views: targets.iter().map(|target| target.view).collect(),
+            targets,
             transport,
             footprints,
             observations,
             background,
             gauge,
-            held_out: judges,
+            held_out: held_out.iter().cloned().zip(judged).collect(),
         }))
     }
 
@@ -168,7 +161,7 @@ fn gauge(
 /// Pixels that show nothing but background, thinned out evenly.
 fn background_pixels(
     scene: &Scene,
-    views: &[usize],
+    targets: &[Target],
     footprints: &[ViewFootprints],
     (width, height): (usize, usize),
 ) -> Vec<BackgroundPixel> {
@@ -176,20 +169,18 @@ fn background_pixels(
     let stride = total.div_ceil(MOST_BACKGROUND).max(1);
     let mut found = Vec::new();
     let mut seen = 0usize;
-    for (index, (&view, footprints)) in views.iter().zip(footprints).enumerate() {
-        let view = &scene.views[view];
+    for (index, (target, footprints)) in targets.iter().zip(footprints).enumerate() {
         // Without a mask every pixel is said to be surface, and rays decide.
-        let has_mask = view.states.pixels().iter().any(|state| state.is_background());
+        let has_mask = scene.views[target.view].states.pixels().iter().any(|state| state.is_background());
         for (pixel, _) in footprints.escaped.iter().enumerate().filter(|(_, share)| **share >= 1.0) {
             seen += 1;
             let (row, column) = (pixel / footprints.width, pixel % footprints.width);
-            let state = view.states[(row, column)];
-            let radiance = view.photo.radiance(row, column);
+            let (radiance, state) = target.at(scene, pixel);
             let says_nothing = state == PixelState::Ignored || state.is_clipped() || (has_mask && state.is_surface());
-            if !seen.is_multiple_of(stride) || says_nothing || !is_radiance(radiance) {
+            if !seen.is_multiple_of(stride) || says_nothing {
                 continue;
             }
-            let ray = view.camera.ray_through(Vec2::new(column as f32 + 0.5, row as f32 + 0.5));
+            let ray = target.camera.ray_through(Vec2::new(column as f32 + 0.5, row as f32 + 0.5));
             let tap = tap_of_direction(ray.direction, width, height);
             found.push(BackgroundPixel { view: index, tap, radiance: radiance.to_array(), scatter: 0.0 });
         }

@@ -5,6 +5,7 @@ use super::report::StepReport;
 use super::scene::SolverScene;
 use super::settings::SolverSettings;
 use crate::error::{Error, ErrorKind, Result};
+use crate::fit::targets::targets;
 use crate::image::Image;
 use crate::light::Environment;
 use crate::material::MaterialMaps;
@@ -60,7 +61,8 @@ impl Solver {
         light: Option<&Environment>,
     ) -> Result<Self> {
         let views: Vec<usize> = (0..scene.views.len()).filter(|&view| !scene.views[view].held_out).collect();
-        let made = SolverScene::build(scene, surface, &views, &[], settings, &AtomicBool::new(false))?;
+        let made =
+            SolverScene::build(scene, surface, targets(scene, &views, 0), &[], settings, &AtomicBool::new(false))?;
         let Some(scene) = made else { return Err(Error::new(ErrorKind::Stopped, "stopped")) };
         let (width, height) = settings.light_size;
         let light = light.map_or_else(|| scene.constant_light(), |light| light.resampled(width, height));

@@ -10,7 +10,6 @@ use crate::render::path::PathArena;
 use crate::render::picture::PictureSettings;
 use crate::render::progressive::PictureTracer;
 use crate::render::{Parameters, Surface};
-use crate::scene::Scene;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -42,13 +41,7 @@ type Sums = [f64; 4];
 impl SolverScene {
     /// Compares cache and path tracer with these maps and this light, in held-out views if there are any. `None` when
     /// `stop` was raised or no pixel is covered wholly.
-    pub fn transport_error(
-        &self,
-        scene: &Scene,
-        surface: &Surface,
-        estimate: &Estimate,
-        stop: &AtomicBool,
-    ) -> Option<TransportError> {
+    pub fn transport_error(&self, surface: &Surface, estimate: &Estimate, stop: &AtomicBool) -> Option<TransportError> {
         let planes = self.transport.basis.planes(&estimate.light);
         let at = self.point_light(estimate, &planes);
         let size = self.settings.map_size;
@@ -66,7 +59,7 @@ impl SolverScene {
         let tracer = PictureTracer::new(surface, &parameters, settings);
         let held_out = self.held_out.iter().map(|(target, footprints)| (target.view, target.camera, footprints));
         let training =
-            self.views.iter().zip(&self.footprints).map(|(&view, made)| (view, scene.views[view].camera, made));
+            self.targets.iter().zip(&self.footprints).map(|(target, made)| (target.view, target.camera, made));
         let all: Vec<_> = if self.held_out.is_empty() { training.collect() } else { held_out.collect() };
         let (mut sums, mut compared): (Sums, usize) = ([0.0; 4], 0);
         for (view, camera, footprints) in all.iter().step_by(all.len().div_ceil(VIEWS).max(1)) {

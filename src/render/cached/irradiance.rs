@@ -3,21 +3,14 @@
 //! `E = 1/pi ∑_j share_j max(0, n . moment_j) L_j`: what a white Lambert surface sends back. It is linear in the light.
 
 use super::light_basis::LightBasis;
-#[cfg(target_arch = "x86_64")]
-use super::vector::Avx2;
-use super::vector::{Eight, LANES, Plain, has_avx2};
+use super::vector::{Vector, versions};
 use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 
 /// `E` per channel of a point with this unit normal and these visible shares, under a light in planes of the basis.
 #[inline]
 pub fn irradiance(basis: &LightBasis, normal: Vec3, shares: &[u8], light: &[Vec<f32>; 3]) -> [f32; 3] {
-    #[cfg(target_arch = "x86_64")]
-    if has_avx2() {
-        // SAFETY: the processor has what the function is compiled for.
-        return unsafe { irradiance_avx2(basis, normal, shares, light) };
-    }
-    irradiance_in::<Plain>(basis, normal, shares, light)
+    irradiance_here(basis, normal, shares, light)
 }
 
 /// The transpose of [`irradiance`]: adds the derivative by the light, given that by `E`.
@@ -29,95 +22,76 @@ pub fn irradiance_backward(
     d_irradiance: [f32; 3],
     d_light: &mut [Vec<f32>; 3],
 ) {
-    #[cfg(target_arch = "x86_64")]
-    if has_avx2() {
-        // SAFETY: the processor has what the function is compiled for.
-        return unsafe { backward_avx2(basis, normal, shares, d_irradiance, d_light) };
-    }
-    backward_in::<Plain>(basis, normal, shares, d_irradiance, d_light);
+    backward_here(basis, normal, shares, d_irradiance, d_light);
 }
 
 /// Adds `scale` times the row of [`irradiance`] to a row over the padded texels of the light.
 #[inline]
 pub fn add_irradiance_row(basis: &LightBasis, normal: Vec3, shares: &[u8], scale: f32, row: &mut [f32]) {
-    #[cfg(target_arch = "x86_64")]
-    if has_avx2() {
-        // SAFETY: the processor has what the function is compiled for.
-        return unsafe { row_avx2(basis, normal, shares, scale, row) };
-    }
-    row_in::<Plain>(basis, normal, shares, scale, row);
+    row_here(basis, normal, shares, scale, row);
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn irradiance_avx2(basis: &LightBasis, normal: Vec3, shares: &[u8], light: &[Vec<f32>; 3]) -> [f32; 3] {
-    irradiance_in::<Avx2>(basis, normal, shares, light)
+versions! {
+    fn irradiance_here(basis: &LightBasis, normal: Vec3, shares: &[u8], light: &[Vec<f32>; 3]) -> [f32; 3]
+        = irradiance_in;
+    fn backward_here(basis: &LightBasis, normal: Vec3, shares: &[u8], d: [f32; 3], d_light: &mut [Vec<f32>; 3])
+        = backward_in;
+    fn row_here(basis: &LightBasis, normal: Vec3, shares: &[u8], scale: f32, row: &mut [f32]) = row_in;
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn backward_avx2(basis: &LightBasis, normal: Vec3, shares: &[u8], d: [f32; 3], d_light: &mut [Vec<f32>; 3]) {
-    backward_in::<Avx2>(basis, normal, shares, d, d_light);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn row_avx2(basis: &LightBasis, normal: Vec3, shares: &[u8], scale: f32, row: &mut [f32]) {
-    row_in::<Avx2>(basis, normal, shares, scale, row);
-}
-
-/// `share (n . moment)+` of eight hats, in units of 1/255; `None` when all lie below the horizon.
+/// `share (n . moment)+` of the next hats, in units of 1/255; `None` when all lie below the horizon.
 #[inline(always)]
-fn weights<V: Eight>(basis: &LightBasis, normal: [V; 3], shares: &[u8], at: usize) -> Option<V> {
+fn weights<V: Vector>(basis: &LightBasis, normal: [V; 3], shares: &[u8], at: usize) -> Option<V> {
     let [x, y, z] = &basis.moment;
-    let cosine = normal[0].mul(V::load(&x[at..at + LANES]));
-    let cosine = normal[1].mul_add(V::load(&y[at..at + LANES]), cosine);
-    let cosine = normal[2].mul_add(V::load(&z[at..at + LANES]), cosine);
+    let cosine = normal[0].mul(V::load(&x[at..at + V::LANES]));
+    let cosine = normal[1].mul_add(V::load(&y[at..at + V::LANES]), cosine);
+    let cosine = normal[2].mul_add(V::load(&z[at..at + V::LANES]), cosine);
     if !cosine.any_positive() {
         return None;
     }
-    Some(cosine.max(V::splat(0.0)).mul(V::load_bytes(&shares[at..at + LANES])))
+    Some(cosine.max(V::splat(0.0)).mul(V::load_bytes(&shares[at..at + V::LANES])))
 }
 
 #[inline(always)]
-fn irradiance_in<V: Eight>(basis: &LightBasis, normal: Vec3, shares: &[u8], light: &[Vec<f32>; 3]) -> [f32; 3] {
+fn irradiance_in<V: Vector>(basis: &LightBasis, normal: Vec3, shares: &[u8], light: &[Vec<f32>; 3]) -> [f32; 3] {
     let normal = normal.to_array().map(V::splat);
     let mut sums = [V::splat(0.0); 3];
-    for at in (0..basis.padded()).step_by(LANES) {
+    for at in (0..basis.padded()).step_by(V::LANES) {
         let Some(weight) = weights(basis, normal, shares, at) else { continue };
         for channel in 0..3 {
-            sums[channel] = weight.mul_add(V::load(&light[channel][at..at + LANES]), sums[channel]);
+            sums[channel] = weight.mul_add(V::load(&light[channel][at..at + V::LANES]), sums[channel]);
         }
     }
     sums.map(|sum| sum.sum() * (FRAC_1_PI / 255.0))
 }
 
 #[inline(always)]
-fn backward_in<V: Eight>(basis: &LightBasis, normal: Vec3, shares: &[u8], d: [f32; 3], d_light: &mut [Vec<f32>; 3]) {
+fn backward_in<V: Vector>(basis: &LightBasis, normal: Vec3, shares: &[u8], d: [f32; 3], d_light: &mut [Vec<f32>; 3]) {
     let normal = normal.to_array().map(V::splat);
     let d = d.map(|value| V::splat(value * (FRAC_1_PI / 255.0)));
-    for at in (0..basis.padded()).step_by(LANES) {
+    for at in (0..basis.padded()).step_by(V::LANES) {
         let Some(weight) = weights(basis, normal, shares, at) else { continue };
         for channel in 0..3 {
-            let place = &mut d_light[channel][at..at + LANES];
+            let place = &mut d_light[channel][at..at + V::LANES];
             weight.mul_add(d[channel], V::load(place)).store(place);
         }
     }
 }
 
 #[inline(always)]
-fn row_in<V: Eight>(basis: &LightBasis, normal: Vec3, shares: &[u8], scale: f32, row: &mut [f32]) {
+fn row_in<V: Vector>(basis: &LightBasis, normal: Vec3, shares: &[u8], scale: f32, row: &mut [f32]) {
     let normal = normal.to_array().map(V::splat);
     let scale = V::splat(scale * (FRAC_1_PI / 255.0));
-    for at in (0..basis.padded()).step_by(LANES) {
+    for at in (0..basis.padded()).step_by(V::LANES) {
         let Some(weight) = weights(basis, normal, shares, at) else { continue };
-        let place = &mut row[at..at + LANES];
+        let place = &mut row[at..at + V::LANES];
         weight.mul_add(scale, V::load(place)).store(place);
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::vector::Plain;
     use super::*;
     use crate::math::random::SequentialRandom;
 

@@ -4,7 +4,7 @@
 //! hat are enough for both lobes to see one and the same light: its solid angle `∫ hat dω`, and its moment
 //! `∫ hat ω dω`, whose product with a normal is the hat's irradiance wherever it lies above the horizon.
 
-use super::vector::LANES;
+use super::vector::WIDEST;
 use crate::math::sphere::{direction_of_texel, solid_angle_of_texel, tap_of_direction};
 use glam::{DVec3, Vec3};
 
@@ -45,7 +45,7 @@ impl LightBasis {
                 }
             }
         }
-        let padded = count.next_multiple_of(LANES);
+        let padded = count.next_multiple_of(WIDEST);
         let axis = |values: &[Vec3], axis: usize| {
             let mut plane: Vec<f32> = values.iter().map(|value| value[axis]).collect();
             plane.resize(padded, 0.0);

@@ -1,16 +1,16 @@
-//! The arithmetic of wide lobes: one walk over the hats of the light for several widths, eight hats at a time.
+//! The arithmetic of wide lobes: one walk over the hats of the light for several widths, several hats at a time.
 //!
-//! Written once over [`Eight`]; [`super::lobe_sum`] chooses the version at run time.
+//! Written once over [`Vector`]; [`super::lobe_sum`] chooses the version at run time.
 
 use super::light_basis::LightBasis;
 use super::lobe_sum::{LobePlace, LobeSums};
-use super::vector::{Eight, LANES};
+use super::vector::Vector;
 use std::f32::consts::{LN_2, PI};
 
 /// Widths summed in one walk over the light.
 pub(super) const MOST_AT_ONCE: usize = 8;
 
-/// What eight hats have in common for all widths.
+/// What the next hats have in common for all widths.
 struct Hats<V> {
     /// `n.i`, at least 0.
     cos_in: V,
@@ -23,9 +23,11 @@ struct Hats<V> {
 }
 
 #[inline(always)]
-fn hats<V: Eight>(basis: &LightBasis, normal: [V; 3], viewer: [V; 3], cos_out: V, at: usize) -> Option<Hats<V>> {
-    let direction = [0, 1, 2].map(|axis| V::load(&basis.direction[axis][at..at + LANES]));
-    let dot = |a: [V; 3]| a[2].mul_add(direction[2], a[1].mul_add(direction[1], a[0].mul(direction[0])));
+fn hats<V: Vector>(basis: &LightBasis, normal: [V; 3], viewer: [V; 3], cos_out: V, at: usize) -> Option<Hats<V>> {
+    // Array by array: `map` is not compiled for the processor's vectors, and passes them through memory.
+    let [x, y, z] = &basis.direction;
+    let (x, y, z) = (V::load(&x[at..]), V::load(&y[at..]), V::load(&z[at..]));
+    let dot = |a: [V; 3]| a[2].mul_add(z, a[1].mul_add(y, a[0].mul(x)));
     let cos_in = dot(normal);
     if !cos_in.any_positive() {
         return None;
@@ -41,7 +43,7 @@ fn hats<V: Eight>(basis: &LightBasis, normal: [V; 3], viewer: [V; 3], cos_out: V
         cos_in,
         log_cos_squared: cos_squared.max(V::splat(1e-30)).log2(),
         schlick: squared.mul(squared).mul(rest),
-        weight: cos_in.mul(V::load(&basis.solid_angle[at..at + LANES])),
+        weight: cos_in.mul(V::load(&basis.solid_angle[at..at + V::LANES])),
     })
 }
 
@@ -78,7 +80,7 @@ impl Lobe {
 
 /// [`lobe_sums`](super::lobe_sum::lobe_sums) of at most [`MOST_AT_ONCE`] wide lobes, with vectors of any kind.
 #[inline(always)]
-pub(super) fn sums_in<V: Eight, const DERIVATIVE: bool>(
+pub(super) fn sums_in<V: Vector, const DERIVATIVE: bool>(
     basis: &LightBasis,
     place: &LobePlace,
     light: &[Vec<f32>; 3],
@@ -98,17 +100,20 @@ pub(super) fn sums_in<V: Eight, const DERIVATIVE: bool>(
     let normal = place.normal.to_array().map(V::splat);
     let viewer = place.to_viewer.to_array().map(V::splat);
     let cos_out_all = V::splat(cos_out);
-    for at in (0..basis.padded()).step_by(LANES) {
+    for at in (0..basis.padded()).step_by(V::LANES) {
         let Some(hats) = hats(basis, normal, viewer, cos_out_all, at) else { continue };
-        let share = V::load_bytes(&place.shares[at..at + LANES]).mul(V::splat(1.0 / 255.0));
+        let share = V::load_bytes(&place.shares[at..at + V::LANES]).mul(V::splat(1.0 / 255.0));
         let seen = hats.weight.mul(share);
         let arriving = [
-            seen.mul(V::load(&light[0][at..at + LANES])),
-            seen.mul(V::load(&light[1][at..at + LANES])),
-            seen.mul(V::load(&light[2][at..at + LANES])),
+            seen.mul(V::load(&light[0][at..at + V::LANES])),
+            seen.mul(V::load(&light[1][at..at + V::LANES])),
+            seen.mul(V::load(&light[2][at..at + V::LANES])),
             hats.weight.sub(seen),
         ];
-        let grazing = arriving.map(|value| value.mul(hats.schlick));
+        let mut grazing = arriving;
+        for value in &mut grazing {
+            *value = value.mul(hats.schlick);
+        }
         for which in 0..count {
             let lobe = &lobes[which];
             let power = hats.log_cos_squared.mul(V::splat(lobe.half_exponent)).exp2();
@@ -148,7 +153,7 @@ pub(super) fn sums_in<V: Eight, const DERIVATIVE: bool>(
 
 /// [`add_lobe_row`](super::lobe_sum::add_lobe_row) of a wide lobe, with vectors of any kind.
 #[inline(always)]
-pub(super) fn row_in<V: Eight>(basis: &LightBasis, place: &LobePlace, width: f32, scales: [f32; 2], row: &mut [f32]) {
+pub(super) fn row_in<V: Vector>(basis: &LightBasis, place: &LobePlace, width: f32, scales: [f32; 2], row: &mut [f32]) {
     let cos_out = place.normal.dot(place.to_viewer);
     let lobe = Lobe::new(width, cos_out);
     let normal = place.normal.to_array().map(V::splat);
@@ -156,14 +161,14 @@ pub(super) fn row_in<V: Eight>(basis: &LightBasis, place: &LobePlace, width: f32
     let cos_out_all = V::splat(cos_out);
     let scale = lobe.scale / 255.0;
     let (base, change) = (V::splat(scales[0] * scale), V::splat((scales[1] - scales[0]) * scale));
-    for at in (0..basis.padded()).step_by(LANES) {
+    for at in (0..basis.padded()).step_by(V::LANES) {
         let Some(hats) = hats(basis, normal, viewer, cos_out_all, at) else { continue };
         let power = hats.log_cos_squared.mul(V::splat(lobe.half_exponent)).exp2();
         let q_in = hats.cos_in.mul_add(V::splat(1.0 - lobe.k), V::splat(lobe.k));
-        let value = power.div(q_in).mul(hats.weight).mul(V::load_bytes(&place.shares[at..at + LANES]));
+        let value = power.div(q_in).mul(hats.weight).mul(V::load_bytes(&place.shares[at..at + V::LANES]));
         // base (1 - s) + grazing s.
         let factor = hats.schlick.mul_add(change, base);
-        let place = &mut row[at..at + LANES];
+        let place = &mut row[at..at + V::LANES];
         value.mul_add(factor, V::load(place)).store(place);
     }
 }

@@ -11,9 +11,7 @@
 use super::half_vector;
 use super::light_basis::LightBasis;
 use super::lobe_kernel::{MOST_AT_ONCE, row_in, sums_in};
-#[cfg(target_arch = "x86_64")]
-use super::vector::Avx2;
-use super::vector::{Plain, has_avx2};
+use super::vector::versions;
 use glam::Vec3;
 
 /// Lobes of at least this microfacet width, for a light of 32 rows, are summed over hats. The standard deviation of
@@ -60,7 +58,7 @@ pub fn lobe_sums(basis: &LightBasis, place: &LobePlace, light: &[Vec<f32>; 3], w
         *sum = half_vector::lobe_sums(basis, place, light, width, half_vector::place_count(basis, width));
     }
     for (sums, widths) in sums[narrow..].chunks_mut(MOST_AT_ONCE).zip(widths[narrow..].chunks(MOST_AT_ONCE)) {
-        wide_sums::<false>(basis, place, light, widths, sums);
+        wide_sums(basis, place, light, widths, sums);
     }
 }
 
@@ -71,7 +69,7 @@ pub fn lobe_sums(basis: &LightBasis, place: &LobePlace, light: &[Vec<f32>; 3], w
 pub fn lobe_with_derivative(basis: &LightBasis, place: &LobePlace, light: &[Vec<f32>; 3], width: f32) -> LobeSums {
     let mut sums = [LobeSums::default()];
     if width >= wide_from(basis) {
-        wide_sums::<true>(basis, place, light, &[width], &mut sums);
+        wide_sums_with_derivative(basis, place, light, &[width], &mut sums);
         return sums[0];
     }
     const STEP: f32 = 0.01;
@@ -91,49 +89,30 @@ pub fn add_lobe_row(basis: &LightBasis, place: &LobePlace, width: f32, scales: [
         half_vector::add_lobe_row(basis, place, width, scales, row);
         return;
     }
-    #[cfg(target_arch = "x86_64")]
-    if has_avx2() {
-        // SAFETY: the processor has what the function is compiled for.
-        return unsafe { row_avx2(basis, place, width, scales, row) };
-    }
-    row_in::<Plain>(basis, place, width, scales, row);
+    row_here(basis, place, width, scales, row);
 }
 
-fn wide_sums<const DERIVATIVE: bool>(
-    basis: &LightBasis,
-    place: &LobePlace,
-    light: &[Vec<f32>; 3],
-    widths: &[f32],
-    sums: &mut [LobeSums],
-) {
-    #[cfg(target_arch = "x86_64")]
-    if has_avx2() {
-        // SAFETY: the processor has what the function is compiled for.
-        return unsafe { sums_avx2::<DERIVATIVE>(basis, place, light, widths, sums) };
-    }
-    sums_in::<Plain, DERIVATIVE>(basis, place, light, widths, sums);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn sums_avx2<const DERIVATIVE: bool>(
-    basis: &LightBasis,
-    place: &LobePlace,
-    light: &[Vec<f32>; 3],
-    widths: &[f32],
-    sums: &mut [LobeSums],
-) {
-    sums_in::<Avx2, DERIVATIVE>(basis, place, light, widths, sums);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn row_avx2(basis: &LightBasis, place: &LobePlace, width: f32, scales: [f32; 2], row: &mut [f32]) {
-    row_in::<Avx2>(basis, place, width, scales, row);
+versions! {
+    fn wide_sums(
+        basis: &LightBasis,
+        place: &LobePlace,
+        light: &[Vec<f32>; 3],
+        widths: &[f32],
+        sums: &mut [LobeSums],
+    ) = sums_in[false];
+    fn wide_sums_with_derivative(
+        basis: &LightBasis,
+        place: &LobePlace,
+        light: &[Vec<f32>; 3],
+        widths: &[f32],
+        sums: &mut [LobeSums],
+    ) = sums_in[true];
+    fn row_here(basis: &LightBasis, place: &LobePlace, width: f32, scales: [f32; 2], row: &mut [f32]) = row_in;
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::vector::Plain;
     use super::*;
     use crate::material::{LobeGeometry, Material};
     use crate::math::random::SequentialRandom;

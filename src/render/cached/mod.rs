@@ -29,6 +29,10 @@ pub mod lobe_sum;
 pub mod points;
 pub mod transport;
 pub mod vector;
+#[cfg(target_arch = "aarch64")]
+mod vector_arm;
+#[cfg(target_arch = "x86_64")]
+mod vector_x86;
 pub mod visibility;
 
 #[cfg(test)]

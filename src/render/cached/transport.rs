@@ -7,7 +7,7 @@ use super::irradiance::{irradiance, irradiance_backward};
 use super::light_basis::LightBasis;
 use super::lobe_sum::{LobePlace, LobeSums, lobe_sums};
 use super::points::{NO_POINT, VisibilityGrid};
-use super::vector::LANES;
+use super::vector::WIDEST;
 use super::visibility::Visibility;
 use crate::material::texels::Texel;
 use crate::render::Surface;
@@ -316,11 +316,11 @@ const ALBEDO_SPAN: f32 = 5.0;
 fn lobe_albedo() -> Vec<[f32; 2]> {
     let constant = LightBasis { width: 1, height: 1, ..LightBasis::new(1, 1) };
     let light = [(); 3].map(|()| {
-        let mut plane = vec![0.0f32; constant.padded().max(LANES)];
+        let mut plane = vec![0.0f32; constant.padded().max(WIDEST)];
         plane[0] = 1.0;
         plane
     });
-    let shares = vec![255u8; constant.padded().max(LANES)];
+    let shares = vec![255u8; constant.padded().max(WIDEST)];
     (0..=20)
         .map(|step| {
             let width = (ALBEDO_SPAN * (step as f32 / 20.0 - 1.0)).exp();

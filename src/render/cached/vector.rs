@@ -1,20 +1,31 @@
-//! Eight numbers at a time: the few operations the cached sums need, once in portable Rust, once with AVX2 and FMA.
+//! Several numbers at a time: the few operations the cached sums need, in portable Rust, with AVX2 and FMA, with AVX-512,
+//! and with NEON.
 //!
-//! A kernel is written once, generic over [`Eight`], and compiled twice. Which one runs is decided at run time by
-//! [`has_avx2`]; tests compare the two.
+//! A kernel is written once, generic over [`Vector`], and compiled for each. [`versions!`] makes the function that
+//! decides at run time which one runs; tests compare them.
+//!
+//! A kernel must not pass vectors through closures of `array::map` and the like: those are compiled for any processor,
+//! and take them through memory.
 
-/// Numbers a vector holds.
-pub const LANES: usize = 8;
+#[cfg(target_arch = "aarch64")]
+pub use super::vector_arm::Neon;
+#[cfg(target_arch = "x86_64")]
+pub use super::vector_x86::{Avx2, Avx512};
 
-/// Eight `f32`.
-pub trait Eight: Copy {
-    /// The same number eight times.
+/// Numbers that the widest vector holds: slices are padded to whole ones.
+pub const WIDEST: usize = 16;
+
+/// Some `f32`, a power of two of them.
+pub trait Vector: Copy {
+    /// How many; at most [`WIDEST`].
+    const LANES: usize;
+    /// The same number in each place.
     fn splat(value: f32) -> Self;
-    /// The first eight numbers of a slice, which must be that long.
+    /// The first numbers of a slice, which must be that long.
     fn load(values: &[f32]) -> Self;
-    /// Eight bytes as numbers from 0 to 255; the slice must be that long.
+    /// As many bytes as numbers from 0 to 255; the slice must be that long.
     fn load_bytes(values: &[u8]) -> Self;
-    /// Writes eight numbers to the start of a slice, which must be that long.
+    /// Writes its numbers to the start of a slice, which must be that long.
     fn store(self, values: &mut [f32]);
     /// Sum.
     fn add(self, other: Self) -> Self;
@@ -41,12 +52,19 @@ pub trait Eight: Copy {
     /// The whole number nearest to each, for magnitudes below 2^22.
     fn round(self) -> Self;
 
-    /// Sum of the eight, pair by pair: the same order in every version.
+    /// Sum of all, half onto half.
     #[inline(always)]
     fn sum(self) -> f32 {
-        let mut v = [0.0; LANES];
-        self.store(&mut v);
-        ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7]))
+        let mut values = [0.0; WIDEST];
+        self.store(&mut values);
+        let mut half = Self::LANES / 2;
+        while half > 0 {
+            for k in 0..half {
+                values[k] += values[k + half];
+            }
+            half /= 2;
+        }
+        values[0]
     }
 
     /// Logarithm to base 2 of positive normal numbers; absolute error below 3e-7, relative to the distance from 1 near 1.
@@ -87,17 +105,19 @@ pub trait Eight: Copy {
     }
 }
 
-/// Portable Rust.
+/// Portable Rust, eight numbers.
 #[derive(Clone, Copy, Debug)]
-pub struct Plain([f32; LANES]);
+pub struct Plain([f32; 8]);
 
 /// 1.5 * 2^23: adding it leaves the nearest whole number in the low bits.
-const MAGIC: f32 = 12_582_912.0;
+pub(super) const MAGIC: f32 = 12_582_912.0;
 
-impl Eight for Plain {
+impl Vector for Plain {
+    const LANES: usize = 8;
+
     #[inline(always)]
     fn splat(value: f32) -> Self {
-        Plain([value; LANES])
+        Plain([value; 8])
     }
     #[inline(always)]
     fn load(values: &[f32]) -> Self {
@@ -109,7 +129,7 @@ impl Eight for Plain {
     }
     #[inline(always)]
     fn store(self, values: &mut [f32]) {
-        values[..LANES].copy_from_slice(&self.0);
+        values[..8].copy_from_slice(&self.0);
     }
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -164,116 +184,62 @@ impl Eight for Plain {
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-mod avx2 {
-    use super::{Eight, LANES, MAGIC};
-    use std::arch::x86_64::*;
-
-    /// AVX2 with FMA. Only code that runs behind [`super::has_avx2`] makes one.
-    #[derive(Clone, Copy, Debug)]
-    pub struct Avx2(__m256);
-
-    // SAFETY of every block below: values of this type exist only in functions compiled for AVX2 and FMA and called
-    // after `has_avx2`, into which these methods are inlined; lengths of slices are checked before they are read.
-    impl Eight for Avx2 {
-        #[inline(always)]
-        fn splat(value: f32) -> Self {
-            Avx2(unsafe { _mm256_set1_ps(value) })
-        }
-        #[inline(always)]
-        fn load(values: &[f32]) -> Self {
-            let values = &values[..LANES];
-            Avx2(unsafe { _mm256_loadu_ps(values.as_ptr()) })
-        }
-        #[inline(always)]
-        fn load_bytes(values: &[u8]) -> Self {
-            let values = &values[..LANES];
-            Avx2(unsafe { _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(values.as_ptr().cast()))) })
-        }
-        #[inline(always)]
-        fn store(self, values: &mut [f32]) {
-            let values = &mut values[..LANES];
-            unsafe { _mm256_storeu_ps(values.as_mut_ptr(), self.0) }
-        }
-        #[inline(always)]
-        fn add(self, other: Self) -> Self {
-            Avx2(unsafe { _mm256_add_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn sub(self, other: Self) -> Self {
-            Avx2(unsafe { _mm256_sub_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn mul(self, other: Self) -> Self {
-            Avx2(unsafe { _mm256_mul_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn div(self, other: Self) -> Self {
-            Avx2(unsafe { _mm256_div_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn mul_add(self, factor: Self, term: Self) -> Self {
-            Avx2(unsafe { _mm256_fmadd_ps(self.0, factor.0, term.0) })
-        }
-        #[inline(always)]
-        fn max(self, other: Self) -> Self {
-            Avx2(unsafe { _mm256_max_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn min(self, other: Self) -> Self {
-            Avx2(unsafe { _mm256_min_ps(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn sqrt(self) -> Self {
-            Avx2(unsafe { _mm256_sqrt_ps(self.0) })
-        }
-        #[inline(always)]
-        fn any_positive(self) -> bool {
-            unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(self.0, _mm256_setzero_ps())) != 0 }
-        }
-        #[inline(always)]
-        fn split(self) -> (Self, Self) {
-            unsafe {
-                let bits = _mm256_castps_si256(self.0);
-                let exponent = _mm256_cvtepi32_ps(_mm256_srli_epi32::<23>(bits));
-                let exponent = _mm256_sub_ps(exponent, _mm256_set1_ps(127.0));
-                let mantissa = _mm256_and_si256(bits, _mm256_set1_epi32(0x007f_ffff));
-                let mantissa = _mm256_or_si256(mantissa, _mm256_set1_epi32(0x3f80_0000));
-                (Avx2(exponent), Avx2(_mm256_castsi256_ps(mantissa)))
-            }
-        }
-        #[inline(always)]
-        fn power_of_two(self) -> Self {
-            unsafe {
-                let whole = _mm256_cvtps_epi32(_mm256_add_ps(self.0, _mm256_set1_ps(127.0)));
-                Avx2(_mm256_castsi256_ps(_mm256_slli_epi32::<23>(whole)))
-            }
-        }
-        #[inline(always)]
-        fn round(self) -> Self {
-            unsafe {
-                let magic = _mm256_set1_ps(MAGIC);
-                Avx2(_mm256_sub_ps(_mm256_add_ps(self.0, magic), magic))
-            }
-        }
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-pub use avx2::Avx2;
-
 /// Whether this machine has AVX2 and FMA.
+#[cfg(target_arch = "x86_64")]
 #[inline]
 pub fn has_avx2() -> bool {
-    #[cfg(target_arch = "x86_64")]
-    {
-        is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    {
-        false
-    }
+    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
 }
+
+/// Whether this machine has AVX-512F.
+#[cfg(target_arch = "x86_64")]
+#[inline]
+pub fn has_avx512() -> bool {
+    is_x86_feature_detected!("avx512f")
+}
+
+/// A function that runs a kernel, generic over [`Vector`], with the widest vectors of the machine:
+/// `versions! { fn name(argument: Type) -> Type = kernel; }`. What stands in brackets behind the kernel is its second
+/// generic argument.
+macro_rules! versions {
+    ($($(#[$about:meta])* fn $name:ident($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)?
+        = $kernel:ident $([$constant:expr])?;)*) => {$(
+        $(#[$about])*
+        #[inline]
+        fn $name($($argument: $type),*) $(-> $result)? {
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx512f")]
+                fn avx512($($argument: $type),*) $(-> $result)? {
+                    $kernel::<$crate::render::cached::vector::Avx512 $(, $constant)?>($($argument),*)
+                }
+                #[target_feature(enable = "avx2,fma")]
+                fn avx2($($argument: $type),*) $(-> $result)? {
+                    $kernel::<$crate::render::cached::vector::Avx2 $(, $constant)?>($($argument),*)
+                }
+                if $crate::render::cached::vector::has_avx512() {
+                    // SAFETY: the processor has what the function is compiled for.
+                    return unsafe { avx512($($argument),*) };
+                }
+                if $crate::render::cached::vector::has_avx2() {
+                    // SAFETY: as above.
+                    return unsafe { avx2($($argument),*) };
+                }
+                $kernel::<$crate::render::cached::vector::Plain $(, $constant)?>($($argument),*)
+            }
+            // Every processor of this kind has NEON.
+            #[cfg(target_arch = "aarch64")]
+            {
+                $kernel::<$crate::render::cached::vector::Neon $(, $constant)?>($($argument),*)
+            }
+            #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+            {
+                $kernel::<$crate::render::cached::vector::Plain $(, $constant)?>($($argument),*)
+            }
+        }
+    )*};
+}
+pub(super) use versions;
 
 #[cfg(test)]
 mod tests {
@@ -283,7 +249,7 @@ mod tests {
     fn logarithms_and_powers_keep_their_digits() {
         for step in 1..4000 {
             let x = step as f32 / 4000.0;
-            let mut out = [0.0; LANES];
+            let mut out = [0.0; 8];
             Plain::splat(x).log2().store(&mut out);
             let truth = f64::from(x).log2();
             assert!((f64::from(out[3]) - truth).abs() < 3e-7 * (1.0 + truth.abs()), "{x}: {} {truth}", out[3]);
@@ -293,9 +259,99 @@ mod tests {
             assert!((f64::from(out[5]) / truth - 1.0).abs() < 1e-6, "{y}: {} {truth}", out[5]);
         }
         // Just below 1, where a sharp lobe lives.
-        let mut out = [0.0; LANES];
+        let mut out = [0.0; 8];
         Plain::splat(1.0 - 1e-6).log2().store(&mut out);
         let truth = f64::from(1.0f32 - 1e-6).log2();
         assert!((f64::from(out[0]) / truth - 1.0).abs() < 1e-5);
+    }
+
+    /// What each operation makes of the numbers and of their neighbours, one after the other.
+    fn operations<V: Vector>(numbers: &[f32]) -> Vec<f32> {
+        let mut made = Vec::new();
+        for at in (0..numbers.len() - V::LANES).step_by(V::LANES) {
+            let (a, b) = (V::load(&numbers[at..]), V::load(&numbers[at + 1..]));
+            let bytes: Vec<u8> = numbers[at..].iter().map(|&value| (value * 200.0) as u8).take(V::LANES).collect();
+            let (exponent, mantissa) = a.split();
+            let whole = a.mul(b).mul(V::splat(40.0)).round();
+            for value in [
+                V::load_bytes(&bytes),
+                a.add(b),
+                a.sub(b),
+                a.mul(b),
+                a.div(b),
+                a.mul_add(b, V::splat(0.25)),
+                a.max(b),
+                a.min(b),
+                a.sqrt(),
+                exponent,
+                mantissa,
+                whole,
+                whole.power_of_two(),
+                a.log2(),
+                V::splat(0.0).sub(a).mul(V::splat(50.0)).exp2(),
+            ] {
+                let mut out = [0.0; WIDEST];
+                value.store(&mut out);
+                made.extend(&out[..V::LANES]);
+                made.push(value.sum());
+                made.push(f32::from(u8::from(value.any_positive())));
+            }
+        }
+        made
+    }
+
+    /// The same in the order of vectors of another width: operation by operation. Sums are of eight at least.
+    fn compare<V: Vector>(numbers: &[f32], found: &[f32]) {
+        const OPERATIONS: usize = 15;
+        let plain = operations::<Plain>(numbers);
+        let of = |made: &[f32], lanes: usize, operation: usize, index: usize| {
+            made[(index / lanes * OPERATIONS + operation) * (lanes + 2) + index % lanes]
+        };
+        let count = numbers.len() / WIDEST * WIDEST - WIDEST;
+        for operation in 0..OPERATIONS {
+            for index in 0..count {
+                let (own, truth) = (of(found, V::LANES, operation, index), of(&plain, 8, operation, index));
+                assert!((own - truth).abs() <= 1e-6 * (1.0 + truth.abs()), "{operation} at {index}: {own} {truth}");
+            }
+            for vector in 0..count / V::LANES {
+                let end = (vector * OPERATIONS + operation) * (V::LANES + 2) + V::LANES;
+                let own: f64 = found[end - V::LANES..end].iter().map(|&value| f64::from(value)).sum();
+                assert!((f64::from(found[end]) - own).abs() <= 1e-6 * (1.0 + own.abs()) * V::LANES as f64);
+                let any = found[end - V::LANES..end].iter().any(|&value| value > 0.0);
+                assert_eq!(found[end + 1] > 0.0, any);
+            }
+        }
+    }
+
+    #[test]
+    fn every_kind_of_vector_does_what_plain_ones_do() {
+        let mut random = crate::math::random::SequentialRandom::new(11);
+        let numbers: Vec<f32> = (0..1024).map(|_| 0.01 + 1.2 * random.next_number()).collect();
+        compare::<Plain>(&numbers, &operations::<Plain>(&numbers));
+        #[cfg(target_arch = "x86_64")]
+        {
+            #[target_feature(enable = "avx512f")]
+            fn avx512(numbers: &[f32]) -> Vec<f32> {
+                operations::<Avx512>(numbers)
+            }
+            #[target_feature(enable = "avx2,fma")]
+            fn avx2(numbers: &[f32]) -> Vec<f32> {
+                operations::<Avx2>(numbers)
+            }
+            if has_avx2() {
+                // SAFETY: the processor has what the function is compiled for.
+                compare::<Avx2>(&numbers, &unsafe { avx2(&numbers) });
+            } else {
+                println!("not compared: this processor has no AVX2");
+            }
+            if has_avx512() {
+                // SAFETY: as above.
+                compare::<Avx512>(&numbers, &unsafe { avx512(&numbers) });
+            } else {
+                println!("not compared: this processor has no AVX-512");
+            }
+        }
+        #[cfg(target_arch = "aarch64")]
+        compare::<Neon>(&numbers, &operations::<Neon>(&numbers));
     }
 }
