@@ -30,6 +30,7 @@ fn assert_sound(table: &HardTable, cases: usize) {
     for row in &table.rows {
         assert!(row.scores[0].is_finite() && row.scores[5].is_finite(), "{row:?}");
         assert_eq!(row.non_finite, 0, "{row:?}");
+        assert_eq!(row.intervals.is_some(), row.method == "solver", "{row:?}");
     }
 }
 

@@ -5,6 +5,7 @@
 use glam::{Vec2, Vec3};
 use patina::export::{LossRow, RunFolder, RunResult};
 use patina::image::{Image, RgbImage};
+use patina::insight::intervals::IntervalCoverage;
 use patina::insight::report::data::*;
 use patina::insight::report::{RelitPicture, RelitStrip, ReportData, ReportImages, ViewPictures, write_report};
 use patina::insight::scores::{aggregate, score_view};
@@ -270,6 +271,13 @@ fn write_example(folder: &RunFolder, views: usize) -> ReportData {
         ],
         truth: Some(TruthErrors {
             maps: Some(map_errors(&fitted, &maps, &all_seen).unwrap()),
+            intervals: Some(IntervalCoverage {
+                diffuse: 0.91,
+                specular: 0.84,
+                roughness: 0.77,
+                wrong: 0.02,
+                warned: 0.5,
+            }),
             environment: Some(environment_errors(&fitted_light, &true_light).unwrap()),
             relit: Some(of_kind(true)),
         }),

@@ -9,6 +9,7 @@
 //! | `diffuse_deviation.exr specular_deviation.exr roughness_deviation.exr` | standard deviations of the maps given the light | `patina fit --method solver`, at its end |
 //! | `lobe_sharing.exr` | number of texels that share a texel's lobe, 0 where no pixel shows the texel best | the same |
 //! | `environment_evidence.exr` | what a texel of the light is known by: highlights (red), background (green), diffuse light and shadows (blue); the rest to 1 is belief | the same, unless resumed after its rounds |
+//! | `light_scale.json` | how far photos leave the factor open that light and reflectance have in common: `relative_deviation`, null where they say nothing | the same |
 //! | `loss.csv` | the loss of every step | `patina fit` |
 //! | `report.json report.html` | scores and pictures | `patina fit`, `patina compare` |
 
@@ -134,6 +135,36 @@ impl RunFolder {
     /// Files that cannot be written.
     pub fn write_light_evidence(&self, shares: &RgbImage) -> Result<()> {
         file::write_exr_rgb(&self.file(LIGHT_EVIDENCE_FILE), shares)
+    }
+
+    /// Writes the relative standard deviation of the factor that light and reflectance have in common.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write_light_scale_deviation(&self, deviation: f64) -> Result<()> {
+        // JSON has no infinity: null stands for it.
+        let text = serde_json::json!({ "relative_deviation": deviation }).to_string();
+        crate::files::write_bytes(&self.file(LIGHT_SCALE_FILE), text.as_bytes())
+    }
+
+    /// Reads what [`Self::write_light_scale_deviation`] wrote; `None` where a run does not say.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn read_light_scale_deviation(&self) -> Result<Option<f64>> {
+        let path = self.file(LIGHT_SCALE_FILE);
+        if !path.is_file() {
+            return Ok(None);
+        }
+        let text = std::fs::read_to_string(&path).map_err(|source| Error::reading(&path, source))?;
+        let value: Option<serde_json::Value> = serde_json::from_str(&text).ok();
+        match value.as_ref().and_then(|value| value.get("relative_deviation")) {
+            Some(serde_json::Value::Null) => Ok(Some(f64::INFINITY)),
+            Some(number) if number.is_number() => Ok(number.as_f64()),
+            _ => Err(Error::new(ErrorKind::Malformed, "there is no number `relative_deviation`")
+                .at(Place::File(path))
+                .remedy("delete the file: nothing else depends on it")),
+        }
     }
 
     /// Writes the number of texels that share each texel's lobe.
@@ -268,6 +299,8 @@ const RESULT_FILES: [&str; 6] = ["diffuse.exr", "specular.exr", "roughness.exr",
 const DEVIATION_FILES: [&str; 3] = ["diffuse_deviation.exr", "specular_deviation.exr", "roughness_deviation.exr"];
 /// What each texel of the light is known by, where the solver made it.
 const LIGHT_EVIDENCE_FILE: &str = "environment_evidence.exr";
+/// How far photos leave the scale of the light open.
+const LIGHT_SCALE_FILE: &str = "light_scale.json";
 /// Number of texels that share each texel's lobe, where the solver made them.
 const LOBE_SHARING_FILE: &str = "lobe_sharing.exr";
 

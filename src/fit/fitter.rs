@@ -13,7 +13,7 @@ use super::held_out::held_out_targets;
 use super::schedule::{Stage, stages};
 use super::settings::{FitSettings, Start};
 use super::solver::SolverScene;
-use super::solver::light_evidence::EvidenceShares;
+use super::solver::light_evidence::LightKnown;
 use super::start;
 use super::state::{FitState, LossRow};
 use super::targets::{Target, targets};
@@ -53,8 +53,8 @@ pub struct Fitter {
     pub(super) work: Option<StageWork>,
     /// What the solver traced; `None` under Adam and before its first step.
     pub(super) solver: Option<SolverScene>,
-    /// What the solver's light is known by; empty under Adam and before its first round on the light.
-    pub(super) light_evidence: Vec<EvidenceShares>,
+    /// What the solver's light is known by; of nothing under Adam and before its first round on the light.
+    pub(super) light_known: LightKnown,
 }
 
 impl Fitter {
@@ -149,7 +149,7 @@ impl Fitter {
             figures,
             work: None,
             solver: None,
-            light_evidence: Vec::new(),
+            light_known: LightKnown::default(),
         })
     }
 

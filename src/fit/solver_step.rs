@@ -92,9 +92,15 @@ impl Fitter {
     pub fn light_evidence(&self) -> Option<RgbImage> {
         let height = self.settings.environment_height;
         let width = 2 * height;
-        let shares = &self.light_evidence;
+        let shares = &self.light_known.shares;
         (shares.len() == width * height && !shares.is_empty())
             .then(|| Image::from_pixels(width, height, shares.iter().map(|share| Vec3::from_array(*share)).collect()))
+    }
+
+    /// Standard deviation, relative, of the factor that light and reflectance have in common, by the photos alone, see
+    /// [`LightKnown`](super::solver::light_evidence::LightKnown). `None` as for [`Self::light_evidence`].
+    pub fn light_scale_deviation(&self) -> Option<f64> {
+        (!self.light_known.shares.is_empty()).then_some(self.light_known.scale_deviation)
     }
 
     /// Number of texels that share a texel's lobe, as an image: the mean over all ways to cut the surface into regions,
@@ -112,7 +118,7 @@ impl Fitter {
             texels: std::mem::take(&mut state.texels),
             variances: std::mem::take(&mut state.variances),
             light: std::mem::take(&mut state.light),
-            light_evidence: std::mem::take(&mut self.light_evidence),
+            light_known: std::mem::take(&mut self.light_known),
             log_gains: solver.views.iter().map(|&view| state.log_gains[view]).collect(),
         };
         estimate.variances.resize(estimate.texels.len(), [0.0; 8]);
@@ -129,7 +135,7 @@ impl Fitter {
         state.texels = estimate.texels;
         state.variances = estimate.variances;
         state.light = estimate.light;
-        self.light_evidence = estimate.light_evidence;
+        self.light_known = estimate.light_known;
         for (&view, gain) in solver.views.iter().zip(estimate.log_gains) {
             state.log_gains[view] = gain;
         }

@@ -1,7 +1,7 @@
 //! What can be said about a fit: scores, tables over seeds, and the report.
 //!
 //! Read [`scores`] first: how a picture is compared with a photograph, and which pixels count. [`truth`] compares maps
-//! and light with a known truth, [`report`] makes the one page that shows it all, [`study`] gathers numbers over seeds.
+//! and light with a known truth, [`intervals`] stated uncertainties with it, [`report`] makes the one page that shows it all, [`study`] gathers numbers over seeds.
 //! Every score comes twice, raw and scale-aligned, because reflectance times c with light over c is the same picture.
 //!
 //! [`coverage`] counts which texels photographs see. [`audit`] checks derivatives against differences. [`cursor`] leads
@@ -15,6 +15,7 @@ pub mod audit;
 pub mod bar_picture;
 pub mod coverage;
 pub mod cursor;
+pub mod intervals;
 pub mod label;
 pub mod material_pictures;
 pub mod memory;

@@ -1,6 +1,7 @@
 //! Errors of maps and light against the truth of a scene, where one is known.
 
 use crate::error::Result;
+use crate::insight::intervals::interval_coverage;
 use crate::insight::report::data::TruthErrors;
 use crate::insight::truth::{environment_errors, map_errors};
 use crate::light::Environment;
@@ -8,12 +9,13 @@ use crate::material::MaterialMaps;
 use crate::render::Surface;
 use crate::scene::Scene;
 
-/// Errors of maps and light against the truth of a scene, without relit pictures; `None` where no truth is known. Maps
+/// Errors of maps, their stated deviations and light against the truth of a scene, without relit pictures; `None` where no truth is known. Maps
 /// are compared only where they lie on the texture coordinates of the truth.
 pub(super) fn truth_errors(
     scene: &Scene,
     surface: &Surface,
     maps: &MaterialMaps,
+    deviations: Option<&MaterialMaps>,
     environment: &Environment,
 ) -> Result<Option<TruthErrors>> {
     let Some(truth) = &scene.truth else { return Ok(None) };
@@ -21,7 +23,11 @@ pub(super) fn truth_errors(
     let size = (truth.texels_seen.width(), truth.texels_seen.height());
     if same_atlas(scene, surface) && size == (truth.maps.diffuse.width(), truth.maps.diffuse.height()) {
         let fitted = resampled(maps, size);
-        errors.maps = Some(map_errors(&fitted, &truth.maps, &truth.texels_seen)?);
+        let of_maps = map_errors(&fitted, &truth.maps, &truth.texels_seen)?;
+        errors.intervals = deviations.and_then(|own| {
+            interval_coverage(&fitted, &resampled(own, size), &truth.maps, &truth.texels_seen, &of_maps)
+        });
+        errors.maps = Some(of_maps);
     }
     let light = &truth.environment;
     errors.environment = Some(environment_errors(&environment.resampled(light.width(), light.height()), light)?);

@@ -11,7 +11,8 @@ use super::demo::photograph;
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::fit::{FitSettings, Fitter, StepOutcome};
 use crate::image::{GreyImage, Image, RgbImage};
-use crate::insight::report::number::short;
+use crate::insight::intervals::{IntervalCoverage, WRONG, interval_coverage};
+use crate::insight::report::number::{fixed, short};
 use crate::insight::truth::map_errors;
 use crate::material::MaterialMaps;
 use crate::render::Surface;
@@ -52,6 +53,8 @@ pub struct HardRow {
     /// Aligned error of the diffuse map within one unit of the defect of the mesh, and beyond; `None` where the mesh is
     /// right.
     pub near_and_far: Option<[f64; 2]>,
+    /// Whether stated uncertainties hold; `None` where the method states none.
+    pub intervals: Option<IntervalCoverage>,
     /// Steps done.
     pub steps: usize,
     /// Seconds of the fit.
@@ -141,6 +144,7 @@ fn run_case(
         method: method.name(),
         scores: Vec::new(),
         near_and_far: None,
+        intervals: None,
         steps: 0,
         seconds: 0.0,
         non_finite: 0,
@@ -167,6 +171,10 @@ fn run_case(
     row.non_finite = row.scores.last().copied().unwrap_or(f64::NAN) as u64;
     if let (Some(truth), Some(distance)) = (&hard.scene.truth, &hard.distance_to_defect) {
         row.near_and_far = Some(errors_by_distance(&maps, truth, distance)?);
+    }
+    if let (Some(truth), Some(deviations)) = (&hard.scene.truth, fitter.deviations()) {
+        let errors = map_errors(&maps, &truth.maps, &truth.texels_seen)?;
+        row.intervals = interval_coverage(&maps, &deviations, &truth.maps, &truth.texels_seen, &errors);
     }
     row.told = warnings(&findings);
     Ok(row)
@@ -258,8 +266,9 @@ impl HardTable {
         for column in SHOWN {
             text += &format!(" {} |", COLUMNS[column].0);
         }
-        text += " diffuse near / far of the defect | steps | seconds | non-finite | told |\n| --- | --- |";
-        text += &" ---: |".repeat(SHOWN.len() + 4);
+        text += " diffuse near / far of the defect | 90 % intervals hold: diffuse / specular / roughness | wrong / warned of | steps | \
+                 seconds | non-finite | told |\n| --- | --- |";
+        text += &" ---: |".repeat(SHOWN.len() + 6);
         text += " --- |\n";
         for row in &self.rows {
             text += &format!("| {} | {} |", row.case, row.method);
@@ -269,11 +278,25 @@ impl HardTable {
             let near =
                 row.near_and_far.map_or(String::new(), |[near, far]| format!("{} / {}", short(near), short(far)));
             let told = row.told.join(", ").replace('|', "/");
-            text += &format!(" {near} | {} | {} | {} | {told} |\n", row.steps, short(row.seconds), row.non_finite);
+            let [held, warned] = row.intervals.map_or(Default::default(), |own| {
+                let share = |value: f64| fixed(100.0 * value, 0);
+                let held = [own.diffuse, own.specular, own.roughness].map(share).join(" / ");
+                [held, format!("{} % / {} %", fixed(100.0 * own.wrong, 1), share(own.warned))]
+            });
+            text += &format!(
+                " {near} | {held} | {warned} | {} | {} | {} | {told} |\n",
+                row.steps,
+                short(row.seconds),
+                row.non_finite
+            );
         }
-        text += "\nErrors are root mean squared errors against the truth: pictures against the photos before they were \
-                 spoiled, maps over texels that a view sees, the light relative to its own. `aligned` is after the best \
-                 factor per channel. `told` names warnings of the check and of the fit.\n";
+        text += &format!(
+            "\nErrors are root mean squared errors against the truth: pictures against the photos before they were \
+             spoiled, maps over texels that a view sees, the light relative to its own. `aligned` is after the best \
+             factor per channel. Intervals are those that the solver states, in percent of the texels. Wrong is what is \
+             further than {WRONG} from the truth in diffuse reflectance; of so many of these the stated interval holds \
+             the truth all the same: the uncertainty warned. `told` names warnings of the check and of the fit.\n"
+        );
         for note in &self.notes {
             text += &format!("\n{note}\n");
         }
@@ -286,7 +309,7 @@ impl HardTable {
         for (name, _) in COLUMNS.iter().filter(|(name, _)| *name != "non-finite") {
             text += &format!(",{}", name.replace(' ', "_").replace('.', ""));
         }
-        text += ",diffuse_near,diffuse_far,steps,seconds,non_finite,told\n";
+        text += ",diffuse_near,diffuse_far,held_diffuse,held_specular,held_roughness,wrong,warned,steps,seconds,non_finite,told\n";
         for row in &self.rows {
             text += &format!("{},{}", row.case, row.method);
             for column in 0..COLUMNS.len() - 1 {
@@ -294,7 +317,11 @@ impl HardTable {
             }
             let [near, far] = row.near_and_far.unwrap_or([f64::NAN; 2]);
             let told = row.told.join(" ").replace('"', "'");
-            text += &format!(",{near},{far},{},{},{},\"{told}\"\n", row.steps, row.seconds, row.non_finite);
+            let held = row
+                .intervals
+                .map_or([f64::NAN; 5], |own| [own.diffuse, own.specular, own.roughness, own.wrong, own.warned]);
+            let held = held.map(|share| share.to_string()).join(",");
+            text += &format!(",{near},{far},{held},{},{},{},\"{told}\"\n", row.steps, row.seconds, row.non_finite);
         }
         text
     }

@@ -40,6 +40,7 @@ pub mod shown;
 pub mod slot;
 pub mod solver_told;
 pub mod study;
+pub mod time_left;
 pub mod tracer_speed;
 mod view;
 pub mod worker;

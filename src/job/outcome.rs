@@ -92,7 +92,7 @@ pub fn write(
             data.aggregates.push(NamedAggregate { name: name.into(), score });
         }
     }
-    data.truth = truth_errors(scene, surface, &result.maps, &result.environment)?;
+    data.truth = truth_errors(scene, surface, &result.maps, told.deviations.as_deref(), &result.environment)?;
     if let Some(truth) = data.truth.as_mut().filter(|_| !relit_errors.is_empty()) {
         truth.relit = Some(aggregate(&relit_errors));
     }

@@ -22,6 +22,9 @@ pub struct SolverTold {
     pub lobe_sharing: Option<Arc<GreyImage>>,
     /// What each texel of the light is known by: [`Fitter::light_evidence`].
     pub light_evidence: Option<Arc<RgbImage>>,
+    /// How far photos leave the factor open that light and reflectance have in common, as a relative standard deviation:
+    /// [`Fitter::light_scale_deviation`].
+    pub light_scale_deviation: Option<f64>,
 }
 
 impl SolverTold {
@@ -31,6 +34,7 @@ impl SolverTold {
             deviations: fitter.deviations().map(Arc::new),
             lobe_sharing: fitter.lobe_sharing().map(Arc::new),
             light_evidence: fitter.light_evidence().map(Arc::new),
+            light_scale_deviation: fitter.light_scale_deviation(),
         }
     }
 
@@ -43,6 +47,7 @@ impl SolverTold {
             deviations: folder.read_deviations()?.map(Arc::new),
             lobe_sharing: folder.read_lobe_sharing()?.map(Arc::new),
             light_evidence: folder.read_light_evidence()?.map(Arc::new),
+            light_scale_deviation: folder.read_light_scale_deviation()?,
         })
     }
 
@@ -56,6 +61,9 @@ impl SolverTold {
         }
         if let Some(shares) = &self.light_evidence {
             folder.write_light_evidence(shares)?;
+        }
+        if let Some(deviation) = self.light_scale_deviation {
+            folder.write_light_scale_deviation(deviation)?;
         }
         Ok(())
     }
@@ -78,14 +86,15 @@ impl SolverTold {
         }
         if let Some(shares) = &self.light_evidence {
             let mean = mean_shares(shares).map(|share| 100.0 * share);
-            facts.push(fact(
-            "what the light is known by",
-            format!(
-                "highlights {:.0} %, background {:.0} %, diffuse light and shadows {:.0} %, belief that skies are smooth \
-                 {:.0} % (means over the sphere; environment_evidence.exr has each texel)",
+            let value = format!(
+                "highlights {:.0} %, background {:.0} %, diffuse light and shadows {:.0} %, belief that skies are \
+                 smooth {:.0} % (means over the sphere; environment_evidence.exr has each texel)",
                 mean[0], mean[1], mean[2], mean[3]
-            ),
-        ));
+            );
+            facts.push(fact("what the light is known by", value));
+        }
+        if let Some(deviation) = self.light_scale_deviation {
+            facts.push(fact("factor common to light and reflectance", scale_words(deviation)));
         }
         let (Some(sharing), Some(deviations)) = (&self.lobe_sharing, &self.deviations) else { return facts };
         let solved: Vec<usize> = (0..sharing.pixels().len()).filter(|&texel| sharing.pixels()[texel] > 0.0).collect();
@@ -96,15 +105,13 @@ impl SolverTold {
             let count = solved.iter().filter(|&&texel| of(sharing.pixels()[texel])).count();
             100.0 * count as f64 / solved.len() as f64
         };
-        facts.push(fact(
-        "specular lobes",
-        format!(
+        let value = format!(
             "{:.0} % of the texels share one with at least 63 others, {:.0} % with fewer, {:.0} % have one of their own",
             share(&|count| count >= 64.0),
             share(&|count| (2.0..64.0).contains(&count)),
             share(&|count| count < 2.0)
-        ),
-    ));
+        );
+        facts.push(fact("specular lobes", value));
         let median_of = |of: &dyn Fn(usize) -> f32| {
             let mut values: Vec<f32> = solved.iter().map(|&texel| of(texel)).collect();
             median(&mut values)
@@ -119,6 +126,17 @@ impl SolverTold {
             ),
         ));
         facts
+    }
+}
+
+/// How well the factor is known that light and diffuse reflectance have in common, in words.
+pub fn scale_words(relative_deviation: f64) -> String {
+    // Beyond this the light could as well be half or twice as bright.
+    const OPEN: f64 = 0.5;
+    if relative_deviation.is_finite() && relative_deviation < OPEN {
+        format!("known from the photos to ± {:.1} %, given that the model holds", 100.0 * relative_deviation)
+    } else {
+        "left open by the photos: a convention holds it".into()
     }
 }
 

@@ -3,6 +3,7 @@
 use super::outcome;
 use super::prepare::{Prepared, RunSettings};
 use super::save::Saver;
+use super::time_left;
 use super::{Command, Event, Progress, Slot, Snapshot, SolverTold};
 use crate::error::{Error, ErrorKind, Finding, Result, Severity, text_of_panic};
 use crate::export::RunFolder;
@@ -345,14 +346,9 @@ impl Worker {
     }
 
     fn progress(&self, row: LossRow) -> Progress {
-        let losses = &self.fitter.state().losses;
+        let state = self.fitter.state();
         let steps_total = self.fitter.steps_total();
-        // The pace of the last steps of the same stage; later stages are taken to go as fast.
-        let same_stage = losses.iter().rev().take_while(|other| other.stage == row.stage).take(12).count();
-        let first = losses.len() - same_stage;
-        let before = if first > 0 { losses[first - 1].seconds } else { 0.0 };
-        let steps_per_second = same_stage as f64 / (row.seconds - before).max(1e-9);
-        let seconds_left = steps_total.saturating_sub(row.step) as f64 / steps_per_second;
+        let (steps_per_second, seconds_left) = time_left::pace(&state.plan, &state.losses);
         Progress { row, steps_total, steps_per_second, seconds_left }
     }
 }

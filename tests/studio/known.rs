@@ -51,6 +51,7 @@ fn look_at_the_light(studio: &mut TestStudio) {
     for kind in ["Highlights", "Background", "Diffuse light and shadows", "Belief"] {
         assert!(studio.says(&format!("{kind} ")), "{kind} is not in the legend");
     }
+    assert!(studio.says("Factor common to light and reflectance: "), "how open the scale is");
     let at = studio.control("What the light is known by").rect().center();
     studio.harness.event(Event::PointerMoved(at));
     studio.frames(2);

@@ -1,6 +1,6 @@
 //! What the solver changes: maps, light and gains, and how sure it is of the maps.
 
-use super::light_evidence::EvidenceShares;
+use super::light_evidence::LightKnown;
 use crate::image::Image;
 use crate::light::Environment;
 use crate::material::MaterialMaps;
@@ -18,8 +18,8 @@ pub struct Estimate {
     pub variances: Vec<Texel<f32>>,
     /// Radiance of the light's texels.
     pub light: Vec<[f32; 3]>,
-    /// What each texel of the light is known by; empty before the first round on the light.
-    pub light_evidence: Vec<EvidenceShares>,
+    /// What the light is known by.
+    pub light_known: LightKnown,
     /// Logarithm of each view's gain, in the order of [`super::SolverScene::views`].
     pub log_gains: Vec<f32>,
 }
@@ -37,7 +37,7 @@ impl Estimate {
             texels: vec![START_TEXEL; map_size * map_size],
             variances: vec![[0.0; 8]; map_size * map_size],
             light: light.radiance.pixels().iter().map(|pixel| pixel.to_array()).collect(),
-            light_evidence: Vec::new(),
+            light_known: LightKnown::default(),
             log_gains: vec![0.0; views],
         }
     }

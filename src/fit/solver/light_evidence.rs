@@ -11,6 +11,16 @@ use super::light_step::NormalEquations;
 /// is belief: that a sky is smooth.
 pub type EvidenceShares = [f32; 3];
 
+/// What is known of a light.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LightKnown {
+    /// What each texel is known by; empty before the first round on the light.
+    pub shares: Vec<EvidenceShares>,
+    /// Standard deviation, relative, of the factor that light and reflectance have in common, by the photos alone: what
+    /// the convention that holds it adds is left out. Mean over channels; infinite where no photo tells of it.
+    pub scale_deviation: f64,
+}
+
 /// Precisions of all coefficients of one channel, in one unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Precisions {
@@ -68,6 +78,11 @@ mod tests {
         let surface = equations.diagonal();
         // Background shows two coefficients; nothing else says anything.
         equations.add_sparse(&[(0, 3.0), (1, 1.0)], 2.0);
+        // (3 + 2 . 1)^2, and nothing where nothing was seen.
+        let mut light = vec![0.0f32; count];
+        (light[0], light[1]) = (1.0, 2.0);
+        assert_eq!(equations.power(&light), 25.0);
+        assert_eq!(NormalEquations::new(count).power(&light), 0.0);
         let precisions = Precisions::new(&surface, &equations, vec![1.0; count], 0.5);
         assert_eq!((precisions.evidence[1][0], precisions.evidence[1][1], precisions.evidence[1][2]), (4.5, 0.5, 0.0));
         let shares = evidence_shares(&[precisions], &shape);

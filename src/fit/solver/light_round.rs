@@ -3,7 +3,7 @@
 use super::block::BlockPrior;
 use super::eliminate::BlockRows;
 use super::estimate::Estimate;
-use super::light_evidence::{EvidenceShares, Precisions, evidence_shares};
+use super::light_evidence::{LightKnown, Precisions, evidence_shares};
 use super::light_shape::{LightShape, bright_texels};
 use super::light_step::{Gauge, LightPrior, NormalEquations, solve_channel};
 use super::plan;
@@ -54,9 +54,9 @@ impl SolverScene {
         let mut residuals: Vec<f32> = done.iter().map(|(_, work)| work.solution.residual).collect();
 
         // Nothing is dropped from here on.
-        if let Some((light, evidence)) = light {
+        if let Some((light, known)) = light {
             estimate.light = light;
-            estimate.light_evidence = evidence;
+            estimate.light_known = known;
         }
         for (index, work) in &done {
             let solution = &work.solution;
@@ -169,7 +169,7 @@ impl SolverScene {
         shape: &LightShape,
         estimate: &Estimate,
         stop: &AtomicBool,
-    ) -> Option<(Vec<[f32; 3]>, Vec<EvidenceShares>)> {
+    ) -> Option<(Vec<[f32; 3]>, LightKnown)> {
         let prior = LightPrior {
             variation: self.settings.light_variation,
             independence: self.settings.independence,
@@ -177,19 +177,22 @@ impl SolverScene {
             // far away as a sky (`saharov_bmvs` without this: the light grew by a third a round).
             gauge_slack: if self.background.is_empty() { self.settings.gauge_slack } else { BACKGROUND_GAUGE_SLACK },
         };
-        let channels: Vec<(Vec<f32>, Precisions)> = (0..3usize)
+        let channels: Vec<(Vec<f32>, Precisions, f64)> = (0..3usize)
             .into_par_iter()
             .map(|c| {
                 let own: Vec<f32> = estimate.light.iter().map(|radiance| radiance[c]).collect();
                 let mut x = shape.coefficients_of(&own);
                 let gauge = Gauge { row: &self.gauge.0, mean: self.gauge.1[c] };
                 let belief = solve_channel(&equations[c], shape, &prior, &gauge, &mut x);
-                (shape.expand(&x), Precisions::new(&surface[c], &equations[c], belief, prior.independence))
+                let deviation = 1.0 / (prior.independence * equations[c].power(&x)).sqrt();
+                (shape.expand(&x), Precisions::new(&surface[c], &equations[c], belief, prior.independence), deviation)
             })
             .collect();
         let light = (0..estimate.light.len()).map(|texel| [0, 1, 2].map(|c| channels[c].0[texel])).collect();
-        let precisions: Vec<Precisions> = channels.into_iter().map(|(_, precisions)| precisions).collect();
-        (!stop.load(Ordering::Relaxed)).then(|| (light, evidence_shares(&precisions, shape)))
+        let scale_deviation = channels.iter().map(|(_, _, deviation)| deviation / 3.0).sum();
+        let precisions: Vec<Precisions> = channels.into_iter().map(|(_, precisions, _)| precisions).collect();
+        (!stop.load(Ordering::Relaxed))
+            .then(|| (light, LightKnown { shares: evidence_shares(&precisions, shape), scale_deviation }))
     }
 }
 

@@ -116,6 +116,17 @@ impl NormalEquations {
         (0..self.count).map(|row| self.matrix[row * self.count + row]).collect()
     }
 
+    /// Squared length of what the rows make of coefficients: how well a common factor of all of them is known.
+    pub fn power(&self, x: &[f32]) -> f64 {
+        let mut sum = 0.0;
+        for (row, &own) in x.iter().enumerate() {
+            let entries = &self.matrix[row * self.count..=row * self.count + row];
+            let below: f64 = entries[..row].iter().zip(x).map(|(entry, &x)| entry * f64::from(x)).sum();
+            sum += f64::from(own) * (2.0 * below + entries[row] * f64::from(own));
+        }
+        sum.max(0.0)
+    }
+
     /// See [`BlockRows::powers`].
     pub fn powers(&self) -> &[Vec<f64>; 2] {
         &self.powers

@@ -13,7 +13,8 @@
 //! 5. [`maps`]: block by block, then in tiles ([`tile`]) with the footprints of pixels, where the evidence decides which
 //!    texels share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_widths`]), then [`mod@diffuse`]: all diffuse texels
 //!    together.
-//! 6. [`solver`]: the steps in their order. A fit does them one by one, as [`crate::fit::Fitter`] does those of Adam.
+//! 6. [`solver`]: the steps in their order. A fit does them one by one, as [`crate::fit::Fitter`] does those of Adam: on
+//!    photos and maps of half size first, whose light and maps the full size begins from ([`crate::fit::schedule`]).
 //! 7. [`transport_check`]: how far its model is from the path tracer's, once it is done.
 //!
 //! What it refuses to do: it does not judge itself. Its model is the cache; pictures and scores are made by the path

@@ -30,6 +30,11 @@ const LEAST_NOISE: f64 = 0.005;
 /// By how much a width that was not looked at counts as worse, per unit of its logarithm.
 const UNSEEN_WIDTH: f64 = 20.0;
 
+/// What no number of pixels tells better, since it is wrong in all of them: lobes between widths are interpolated, and
+/// light reaches pixels through a cache. Standard deviations of F0 relative to itself, of F0 relative to the diffuse
+/// reflectance under it, and of the logarithm of the width.
+const MODEL_ERROR: [f64; 3] = [0.05, 0.01, 0.05];
+
 /// A pixel of a tile.
 struct TilePixel {
     terms: PixelTerms,
@@ -292,6 +297,12 @@ impl Tile {
             })
             .collect();
         self.lobes = beliefs(&texels, &sums, TILE, &widths, prior);
+        for (LobeBelief { mean, square, .. }, rho) in self.lobes.iter_mut().zip(&self.rho) {
+            for c in 0..3 {
+                square[c] += (MODEL_ERROR[0] * mean[c]).powi(2) + (MODEL_ERROR[1] * f64::from(rho[c])).powi(2);
+            }
+            square[3] += MODEL_ERROR[2] * MODEL_ERROR[2];
+        }
         let ridge = 1.0 / (DIFFUSE_SPREAD * DIFFUSE_SPREAD);
         for (texel, lobe) in self.lobes.iter().enumerate() {
             let node = widths.partition_point(|&width| width < lobe.mean[3]).min(LOBE_WIDTHS - 1);

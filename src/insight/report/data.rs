@@ -2,6 +2,7 @@
 
 use crate::error::{Finding, Severity};
 use crate::export::LossRow;
+use crate::insight::intervals::IntervalCoverage;
 use crate::insight::scores::{AggregateScore, PictureScore, ViewScores};
 use crate::insight::truth::{EnvironmentErrors, MapErrors};
 use serde::{Deserialize, Serialize};
@@ -157,6 +158,9 @@ pub struct NamedAggregate {
 pub struct TruthErrors {
     /// Of the maps, over the texels some view sees.
     pub maps: Option<MapErrors>,
+    /// Whether the stated uncertainties of the maps hold; `None` where none are stated.
+    #[serde(default)]
+    pub intervals: Option<IntervalCoverage>,
     /// Of the light.
     pub environment: Option<EnvironmentErrors>,
     /// Of pictures under a light that was not in the photographs.

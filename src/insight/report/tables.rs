@@ -120,6 +120,15 @@ pub fn truth(truth: Option<&TruthErrors>) -> String {
         rows.push(pair("specular", &texels, &maps.specular));
         rows.push(pair("roughness r = a²", &texels, &maps.roughness));
     }
+    if let Some(held) = &truth.intervals {
+        let share = |value: f64| format!("{} %", fixed(100.0 * value, 0));
+        let mut row = |name: &str, measure: &str, value: f64| {
+            rows.push(vec![name.into(), measure.into(), share(value), String::new(), String::new()]);
+        };
+        row("diffuse", "stated 90 % intervals hold the truth, after its factor", held.diffuse);
+        row("specular", "stated 90 % intervals hold the truth", held.specular);
+        row("roughness r = a²", "stated 90 % intervals hold the truth", held.roughness);
+    }
     if let Some(light) = &truth.environment {
         rows.push(pair("environment", "relative L2, by solid angle", &light.relative_l2));
         rows.push(pair("environment", "RMSE of natural logarithms", &light.log_rmse));

@@ -92,7 +92,7 @@ pub fn measure(fitter: &Fitter, stop: &AtomicBool) -> Result<Vec<f64>> {
         let pictures = relight.pictures.iter().filter(|(view, _)| !also_judged || judged.contains(view));
         relit = sums(fitter, &lit, pictures.map(|(view, picture)| (*view, picture.clone())), stop);
     }
-    let errors = truth_errors(scene, fitter.surface(), &maps, &environment)?.unwrap_or_default();
+    let errors = truth_errors(scene, fitter.surface(), &maps, None, &environment)?.unwrap_or_default();
     let pair =
         |pair: Option<crate::insight::truth::ErrorPair>| pair.map_or([f64::NAN; 2], |pair| [pair.raw, pair.aligned]);
     let maps = errors.maps.as_ref();

@@ -164,6 +164,7 @@ mod tests {
             deviations: Some(Arc::new(deviations)),
             lobe_sharing: Some(Arc::new(sharing)),
             light_evidence: None,
+            light_scale_deviation: None,
         };
         let known = Known::of(told);
         let diffuse = known.layer(Told::Diffuse).unwrap();

@@ -5,7 +5,7 @@ use super::empty;
 use super::light::place_words;
 use crate::image::RgbImage;
 use crate::image::display::{DisplaySettings, bytes_of_colour};
-use crate::job::solver_told::mean_shares;
+use crate::job::solver_told::{mean_shares, scale_words};
 use crate::studio::model::Model;
 use crate::studio::picture::{self, Overlay, PictureView, Source};
 use egui::{Color32, RichText, Sense, Ui, vec2};
@@ -47,6 +47,12 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut KnownMemory) {
             ui.label(format!("{name} {:.0} %", 100.0 * mean)).on_hover_text(format!("{help}\nMean over the sphere"));
         }
     });
+    if let Some(deviation) = model.project.as_ref().and_then(|project| project.known.told().light_scale_deviation) {
+        ui.label(format!("Factor common to light and reflectance: {}", scale_words(deviation))).on_hover_text(
+            "Light twice as bright over surfaces half as bright gives diffuse surfaces the same pictures. Highlights, \
+             background and interreflection tell the two apart.",
+        );
+    }
     let source = Source::from(Arc::clone(&shares));
     let overlay = Overlay { badge: "up", ..Overlay::default() };
     let height = (ui.available_width() / 2.0).min(ui.available_height()).max(60.0);
