@@ -16,8 +16,9 @@ pub type EvidenceShares = [f32; 3];
 pub struct LightKnown {
     /// What each texel is known by; empty before the first round on the light.
     pub shares: Vec<EvidenceShares>,
-    /// Standard deviation, relative, of the factor that light and reflectance have in common, by the photos alone: what
-    /// the convention that holds it adds is left out. Mean over channels; infinite where no photo tells of it.
+    /// Standard deviation, relative, of the factor that light and reflectance have in common: that of the mean light on
+    /// the surface, by the photos and the belief that skies are smooth. What the convention that holds it adds is left
+    /// out. Mean over channels; infinite where no photo tells of it.
     pub scale_deviation: f64,
 }
 
@@ -78,11 +79,6 @@ mod tests {
         let surface = equations.diagonal();
         // Background shows two coefficients; nothing else says anything.
         equations.add_sparse(&[(0, 3.0), (1, 1.0)], 2.0);
-        // (3 + 2 . 1)^2, and nothing where nothing was seen.
-        let mut light = vec![0.0f32; count];
-        (light[0], light[1]) = (1.0, 2.0);
-        assert_eq!(equations.power(&light), 25.0);
-        assert_eq!(NormalEquations::new(count).power(&light), 0.0);
         let precisions = Precisions::new(&surface, &equations, vec![1.0; count], 0.5);
         assert_eq!((precisions.evidence[1][0], precisions.evidence[1][1], precisions.evidence[1][2]), (4.5, 0.5, 0.0));
         let shares = evidence_shares(&[precisions], &shape);

@@ -183,9 +183,9 @@ impl SolverScene {
                 let own: Vec<f32> = estimate.light.iter().map(|radiance| radiance[c]).collect();
                 let mut x = shape.coefficients_of(&own);
                 let gauge = Gauge { row: &self.gauge.0, mean: self.gauge.1[c] };
-                let belief = solve_channel(&equations[c], shape, &prior, &gauge, &mut x);
-                let deviation = 1.0 / (prior.independence * equations[c].power(&x)).sqrt();
-                (shape.expand(&x), Precisions::new(&surface[c], &equations[c], belief, prior.independence), deviation)
+                let known = solve_channel(&equations[c], shape, &prior, &gauge, &mut x);
+                let precisions = Precisions::new(&surface[c], &equations[c], known.belief, prior.independence);
+                (shape.expand(&x), precisions, known.scale_deviation)
             })
             .collect();
         let light = (0..estimate.light.len()).map(|texel| [0, 1, 2].map(|c| channels[c].0[texel])).collect();

@@ -5,7 +5,8 @@ use super::light_shape::LightShape;
 use super::non_negative::solve_non_negative;
 use crate::math::sphere::solid_angle_of_texel;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
-use faer::{Accum, MatMut, MatRef, Par};
+use faer::linalg::solvers::Solve;
+use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
 
 /// Rows that are added to a normal matrix at once.
 const ROWS_AT_ONCE: usize = 512;
@@ -116,17 +117,6 @@ impl NormalEquations {
         (0..self.count).map(|row| self.matrix[row * self.count + row]).collect()
     }
 
-    /// Squared length of what the rows make of coefficients: how well a common factor of all of them is known.
-    pub fn power(&self, x: &[f32]) -> f64 {
-        let mut sum = 0.0;
-        for (row, &own) in x.iter().enumerate() {
-            let entries = &self.matrix[row * self.count..=row * self.count + row];
-            let below: f64 = entries[..row].iter().zip(x).map(|(entry, &x)| entry * f64::from(x)).sum();
-            sum += f64::from(own) * (2.0 * below + entries[row] * f64::from(own));
-        }
-        sum.max(0.0)
-    }
-
     /// See [`BlockRows::powers`].
     pub fn powers(&self) -> &[Vec<f64>; 2] {
         &self.powers
@@ -153,15 +143,24 @@ pub struct Gauge<'a> {
     pub mean: f64,
 }
 
-/// Solves one channel: coefficients start at `x` and end there. Returns the diagonal of what is believed of the light
-/// (the gauge left out), in the units of the rows times `independence`.
+/// What a channel's solution leaves beside the light.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChannelKnown {
+    /// Diagonal of what is believed of the light, the gauge left out, in the units of the rows times `independence`.
+    pub belief: Vec<f64>,
+    /// Standard deviation, relative, of the mean light on the surface by rows and belief, the gauge left out; infinite
+    /// where they leave it open.
+    pub scale_deviation: f64,
+}
+
+/// Solves one channel: coefficients start at `x` and end there.
 pub fn solve_channel(
     equations: &NormalEquations,
     shape: &LightShape,
     prior: &LightPrior,
     gauge: &Gauge,
     x: &mut [f32],
-) -> Vec<f64> {
+) -> ChannelKnown {
     let count = equations.count;
     let mut matrix = vec![0.0f64; count * count];
     for row in 0..count {
@@ -191,12 +190,13 @@ pub fn solve_channel(
         let scale = 3.0 * (f64::from(entries) + mean);
         matrix[index * count + index] += 1.0 / (scale * scale);
     }
-    let believed = (0..count)
+    let belief = (0..count)
         .map(|row| matrix[row * count + row] - equations.matrix[row * count + row] * prior.independence)
         .collect();
     // The freedom between reflectance and light is held by the mean light on the surface.
     let mut held = vec![0.0f32; count];
     shape.reduce(gauge.row, &mut held);
+    let open = standard_deviation(&matrix, &held);
     let weight = 1.0 / (prior.gauge_slack * gauge.mean.max(1e-9)).powi(2);
     for row in 0..count {
         let own = weight * f64::from(held[row]);
@@ -210,7 +210,22 @@ pub fn solve_channel(
     for (x, value) in x.iter_mut().zip(solution) {
         *x = value as f32;
     }
-    believed
+    let mean: f64 = held.iter().zip(x.iter()).map(|(held, x)| f64::from(held * x)).sum();
+    let scale_deviation = if mean > 0.0 { open / mean } else { f64::INFINITY };
+    ChannelKnown { belief, scale_deviation }
+}
+
+/// Standard deviation of a weighted sum of numbers that are known by this precision matrix; infinite where it leaves the
+/// sum open.
+fn standard_deviation(precision: &[f64], weights: &[f32]) -> f64 {
+    let count = weights.len();
+    let Ok(factor) = MatRef::from_row_major_slice(precision, count, count).llt(Side::Lower) else {
+        return f64::INFINITY;
+    };
+    let side = Mat::from_fn(count, 1, |row, _| f64::from(weights[row]));
+    let solved = factor.solve(&side);
+    let variance: f64 = (0..count).map(|row| side[(row, 0)] * solved[(row, 0)]).sum();
+    if variance >= 0.0 { variance.sqrt() } else { f64::INFINITY }
 }
 
 /// Weights with which coefficients make up the mean radiance over the sphere.
@@ -222,4 +237,21 @@ fn mean_weights(shape: &LightShape) -> Vec<f64> {
     let mut reduced = vec![0.0; shape.count()];
     shape.reduce(&solid, &mut reduced);
     reduced.into_iter().map(f64::from).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sum_is_as_sure_as_its_least_sure_part() {
+        // Two numbers of which the sum is known to 0.1 and the difference hardly.
+        let (sure, hardly) = (100.0, 1e-6);
+        let matrix = [sure + hardly, sure - hardly, sure - hardly, sure + hardly];
+        assert!((standard_deviation(&matrix, &[1.0, 1.0]) - 0.1).abs() < 1e-6);
+        assert!(standard_deviation(&matrix, &[1.0, -1.0]) > 500.0);
+        let alone = [4.0, 0.0, 0.0, 0.0];
+        assert!(standard_deviation(&alone, &[1.0, 0.0]).is_infinite());
+        assert!((standard_deviation(&[4.0], &[3.0]) - 1.5).abs() < 1e-12);
+    }
 }

@@ -7,13 +7,14 @@ use std::arch::aarch64::*;
 #[derive(Clone, Copy, Debug)]
 pub struct Neon(float32x4_t);
 
-// SAFETY of every block below: lengths of slices are checked before they are read or written.
+// SAFETY of every block below: NEON is part of the architecture; lengths of slices are checked before they are read or
+// written.
 impl Vector for Neon {
     const LANES: usize = 4;
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
-        Neon(vdupq_n_f32(value))
+        Neon(unsafe { vdupq_n_f32(value) })
     }
     #[inline(always)]
     fn load(values: &[f32]) -> Self {
@@ -23,8 +24,7 @@ impl Vector for Neon {
     #[inline(always)]
     fn load_bytes(values: &[u8]) -> Self {
         let four = u32::from_le_bytes([values[0], values[1], values[2], values[3]]);
-        let wide = vmovl_u16(vget_low_u16(vmovl_u8(vcreate_u8(u64::from(four)))));
-        Neon(vcvtq_f32_u32(wide))
+        Neon(unsafe { vcvtq_f32_u32(vmovl_u16(vget_low_u16(vmovl_u8(vcreate_u8(u64::from(four)))))) })
     }
     #[inline(always)]
     fn store(self, values: &mut [f32]) {
@@ -33,54 +33,58 @@ impl Vector for Neon {
     }
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        Neon(vaddq_f32(self.0, other.0))
+        Neon(unsafe { vaddq_f32(self.0, other.0) })
     }
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        Neon(vsubq_f32(self.0, other.0))
+        Neon(unsafe { vsubq_f32(self.0, other.0) })
     }
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        Neon(vmulq_f32(self.0, other.0))
+        Neon(unsafe { vmulq_f32(self.0, other.0) })
     }
     #[inline(always)]
     fn div(self, other: Self) -> Self {
-        Neon(vdivq_f32(self.0, other.0))
+        Neon(unsafe { vdivq_f32(self.0, other.0) })
     }
     #[inline(always)]
     fn mul_add(self, factor: Self, term: Self) -> Self {
-        Neon(vfmaq_f32(term.0, self.0, factor.0))
+        Neon(unsafe { vfmaq_f32(term.0, self.0, factor.0) })
     }
     #[inline(always)]
     fn max(self, other: Self) -> Self {
-        Neon(vmaxq_f32(self.0, other.0))
+        Neon(unsafe { vmaxq_f32(self.0, other.0) })
     }
     #[inline(always)]
     fn min(self, other: Self) -> Self {
-        Neon(vminq_f32(self.0, other.0))
+        Neon(unsafe { vminq_f32(self.0, other.0) })
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
-        Neon(vsqrtq_f32(self.0))
+        Neon(unsafe { vsqrtq_f32(self.0) })
     }
     #[inline(always)]
     fn any_positive(self) -> bool {
-        vmaxvq_f32(self.0) > 0.0
+        unsafe { vmaxvq_f32(self.0) > 0.0 }
     }
     #[inline(always)]
     fn split(self) -> (Self, Self) {
-        let bits = vreinterpretq_u32_f32(self.0);
-        let exponent = vsubq_f32(vcvtq_f32_u32(vshrq_n_u32::<23>(bits)), vdupq_n_f32(127.0));
-        let mantissa = vorrq_u32(vandq_u32(bits, vdupq_n_u32(0x007f_ffff)), vdupq_n_u32(0x3f80_0000));
-        (Neon(exponent), Neon(vreinterpretq_f32_u32(mantissa)))
+        unsafe {
+            let bits = vreinterpretq_u32_f32(self.0);
+            let exponent = vsubq_f32(vcvtq_f32_u32(vshrq_n_u32::<23>(bits)), vdupq_n_f32(127.0));
+            let mantissa = vorrq_u32(vandq_u32(bits, vdupq_n_u32(0x007f_ffff)), vdupq_n_u32(0x3f80_0000));
+            (Neon(exponent), Neon(vreinterpretq_f32_u32(mantissa)))
+        }
     }
     #[inline(always)]
     fn power_of_two(self) -> Self {
-        let biased = vcvtq_u32_f32(vaddq_f32(self.0, vdupq_n_f32(127.0)));
-        Neon(vreinterpretq_f32_u32(vshlq_n_u32::<23>(biased)))
+        unsafe {
+            let biased = vcvtq_u32_f32(vaddq_f32(self.0, vdupq_n_f32(127.0)));
+            Neon(vreinterpretq_f32_u32(vshlq_n_u32::<23>(biased)))
+        }
     }
     #[inline(always)]
     fn round(self) -> Self {
-        Neon(vrndnq_f32(self.0))
+        Neon(unsafe { vrndnq_f32(self.0) })
     }
 }
