@@ -83,18 +83,18 @@ pub enum Walk {
     /// Portable Rust.
     Plain,
     /// AVX2, on the processors of x86-64 that have it.
+    #[cfg(target_arch = "x86_64")]
     Avx2,
 }
 
 impl Walk {
     /// The walks this machine can do, the fastest last.
     pub fn available() -> Vec<Walk> {
-        let mut walks = vec![Walk::Plain];
         #[cfg(target_arch = "x86_64")]
         if vector::is_available() {
-            walks.push(Walk::Avx2);
+            return vec![Walk::Plain, Walk::Avx2];
         }
-        walks
+        vec![Walk::Plain]
     }
 }
 

@@ -1,7 +1,7 @@
 //! Several numbers at a time: the few operations the cached sums need, in portable Rust, with AVX2 and FMA, with AVX-512,
 //! and with NEON.
 //!
-//! A kernel is written once, generic over [`Vector`], and compiled for each. [`versions!`] makes the function that
+//! A kernel is written once, generic over [`Vector`], and compiled for each. The macro `versions` makes the function that
 //! decides at run time which one runs; tests compare them.
 //!
 //! A kernel must not pass vectors through closures of `array::map` and the like: those are compiled for any processor,
