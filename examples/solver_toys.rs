@@ -9,6 +9,7 @@
 use glam::Vec3;
 use patina::fit::solver::{Estimate, Solver, SolverSettings};
 use patina::image::{Image, RgbImage};
+use patina::insight::intervals::interval_coverage;
 use patina::insight::truth::{environment_errors, map_errors};
 use patina::light::Environment;
 use patina::material::MaterialMaps;
@@ -99,26 +100,13 @@ fn main() -> Result<()> {
         lights.brightest_angle_degrees.unwrap_or(f64::NAN)
     );
     let deviations = Estimate::deviations(&solver.estimate.texels, &solver.estimate.variances, settings.map_size);
-    let seen = truth.texels_seen.pixels();
-    let share = |inside: &dyn Fn(usize) -> bool| {
-        let all = (0..seen.len()).filter(|&texel| seen[texel]);
-        all.clone().filter(|&texel| inside(texel)).count() as f64 / all.count().max(1) as f64
-    };
-    let within = |own: Vec3, truth: Vec3, deviation: Vec3| (own - truth).abs().y <= 1.645 * deviation.y;
+    if let Some(held) = interval_coverage(&maps, &deviations, &truth.maps, &truth.texels_seen, &errors) {
+        println!(
+            "90 % intervals hold the truth: diffuse (aligned) {:.3}, specular {:.3}, roughness {:.3}",
+            held.diffuse, held.specular, held.roughness
+        );
+    }
     let scale = Vec3::from_array(errors.diffuse.scale.map(|value| value as f32));
-    println!(
-        "90 % intervals hold the truth: diffuse (aligned) {:.3}, specular {:.3}, roughness {:.3}",
-        share(&|t| within(
-            maps.diffuse.pixels()[t] * scale,
-            truth.maps.diffuse.pixels()[t],
-            deviations.diffuse.pixels()[t] * scale
-        )),
-        share(&|t| within(maps.specular.pixels()[t], truth.maps.specular.pixels()[t], deviations.specular.pixels()[t])),
-        share(&|t| {
-            let error = (maps.roughness.pixels()[t] - truth.maps.roughness.pixels()[t]).abs();
-            error <= 1.645 * deviations.roughness.pixels()[t]
-        }),
-    );
     let samples = count("samples", 16);
     if samples > 0 {
         let views: Vec<usize> = (0..8).map(|k| k * scene.views.len() / 8).collect();

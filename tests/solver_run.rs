@@ -31,6 +31,22 @@ fn new_fitter(settings: &FitSettings) -> Fitter {
     Fitter::new(scene, surface, settings.clone(), None).unwrap()
 }
 
+/// A fit that is saved after these numbers of steps and taken up ends as `whole` did.
+fn assert_taken_up_alike(settings: &FitSettings, steps: &[usize], whole: &Fitter) {
+    let (scene, surface) = scene();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("checkpoint");
+    for &step in steps {
+        let mut fitter = new_fitter(settings);
+        (0..step).for_each(|_| drop(fitter.step(&GO).unwrap()));
+        checkpoint::write(&path, fitter.state()).unwrap();
+        let state = checkpoint::read(&path).unwrap();
+        let mut resumed = Fitter::resume(scene.clone(), surface.clone(), settings.clone(), state).unwrap();
+        run(&mut resumed).unwrap();
+        assert!(without_seconds(resumed.state()) == without_seconds(whole.state()), "after step {step}");
+    }
+}
+
 #[test]
 fn it_explains_the_photos_and_views_it_never_saw() {
     let mut fitter = new_fitter(&base());
@@ -80,7 +96,6 @@ fn a_fit_that_is_taken_up_goes_on_bit_for_bit_whatever_the_threads() {
 
 #[test]
 fn polishing_moves_everything_keeps_what_is_known_and_goes_on_bit_for_bit() {
-    let (scene, surface) = scene();
     let mut plain = new_fitter(&base());
     run(&mut plain).unwrap();
     let settings = FitSettings { solver_polish: 3, ..base() };
@@ -94,17 +109,7 @@ fn polishing_moves_everything_keeps_what_is_known_and_goes_on_bit_for_bit() {
         let moved = |fitter: &Fitter| fitter.state().texels.iter().map(|texel| texel[number]).collect::<Vec<f32>>();
         assert_ne!(moved(&whole), moved(&plain), "{number}");
     }
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("checkpoint");
-    for step in [4, 5, 7] {
-        let mut fitter = new_fitter(&settings);
-        (0..step).for_each(|_| drop(fitter.step(&GO).unwrap()));
-        checkpoint::write(&path, fitter.state()).unwrap();
-        let state = checkpoint::read(&path).unwrap();
-        let mut resumed = Fitter::resume(scene.clone(), surface.clone(), settings.clone(), state).unwrap();
-        run(&mut resumed).unwrap();
-        assert!(without_seconds(resumed.state()) == without_seconds(whole.state()), "after step {step}");
-    }
+    assert_taken_up_alike(&settings, &[4, 5, 7], &whole);
     // More steps may be asked for once it has ended.
     plain.change(settings).unwrap();
     run(&mut plain).unwrap();
@@ -113,7 +118,6 @@ fn polishing_moves_everything_keeps_what_is_known_and_goes_on_bit_for_bit() {
 
 #[test]
 fn levels_bring_maps_at_half_size_first_and_go_on_bit_for_bit() {
-    let (scene, surface) = scene();
     let settings = FitSettings { map_size: 256, solver_levels: 3, solver_rounds: 2, ..base() };
     let mut whole = new_fitter(&settings);
     let mut sizes = Vec::new();
@@ -129,17 +133,7 @@ fn levels_bring_maps_at_half_size_first_and_go_on_bit_for_bit() {
         ("maps", 256, true),
     ];
     assert_eq!(sizes, expected.map(|(name, size, known)| (name.to_string(), size, known)));
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("checkpoint");
-    for step in [3, 4] {
-        let mut fitter = new_fitter(&settings);
-        (0..step).for_each(|_| drop(fitter.step(&GO).unwrap()));
-        checkpoint::write(&path, fitter.state()).unwrap();
-        let state = checkpoint::read(&path).unwrap();
-        let mut resumed = Fitter::resume(scene.clone(), surface.clone(), settings.clone(), state).unwrap();
-        run(&mut resumed).unwrap();
-        assert!(without_seconds(resumed.state()) == without_seconds(whole.state()), "after step {step}");
-    }
+    assert_taken_up_alike(&settings, &[3, 4], &whole);
 }
 
 #[test]

@@ -156,7 +156,7 @@ impl RunFolder {
         if !path.is_file() {
             return Ok(None);
         }
-        let text = std::fs::read_to_string(&path).map_err(|source| Error::reading(&path, source))?;
+        let text = self.read_text(LIGHT_SCALE_FILE, "patina fit SCENE -o RUN")?;
         let value: Option<serde_json::Value> = serde_json::from_str(&text).ok();
         match value.as_ref().and_then(|value| value.get("relative_deviation")) {
             Some(serde_json::Value::Null) => Ok(Some(f64::INFINITY)),

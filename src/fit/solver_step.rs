@@ -97,7 +97,7 @@ impl Fitter {
             .then(|| Image::from_pixels(width, height, shares.iter().map(|share| Vec3::from_array(*share)).collect()))
     }
 
-    /// Standard deviation, relative, of the factor that light and reflectance have in common, by the photos alone, see
+    /// Standard deviation, relative, of the factor that light and reflectance have in common, see
     /// [`LightKnown`](super::solver::light_evidence::LightKnown). `None` as for [`Self::light_evidence`].
     pub fn light_scale_deviation(&self) -> Option<f64> {
         (!self.light_known.shares.is_empty()).then_some(self.light_known.scale_deviation)

@@ -7,36 +7,20 @@ use super::vector::{Vector, versions};
 use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 
-/// `E` per channel of a point with this unit normal and these visible shares, under a light in planes of the basis.
-#[inline]
-pub fn irradiance(basis: &LightBasis, normal: Vec3, shares: &[u8], light: &[Vec<f32>; 3]) -> [f32; 3] {
-    irradiance_here(basis, normal, shares, light)
-}
-
-/// The transpose of [`irradiance`]: adds the derivative by the light, given that by `E`.
-#[inline]
-pub fn irradiance_backward(
-    basis: &LightBasis,
-    normal: Vec3,
-    shares: &[u8],
-    d_irradiance: [f32; 3],
-    d_light: &mut [Vec<f32>; 3],
-) {
-    backward_here(basis, normal, shares, d_irradiance, d_light);
-}
-
-/// Adds `scale` times the row of [`irradiance`] to a row over the padded texels of the light.
-#[inline]
-pub fn add_irradiance_row(basis: &LightBasis, normal: Vec3, shares: &[u8], scale: f32, row: &mut [f32]) {
-    row_here(basis, normal, shares, scale, row);
-}
-
 versions! {
-    fn irradiance_here(basis: &LightBasis, normal: Vec3, shares: &[u8], light: &[Vec<f32>; 3]) -> [f32; 3]
+    /// `E` per channel of a point with this unit normal and these visible shares, under a light in planes of the basis.
+    pub fn irradiance(basis: &LightBasis, normal: Vec3, shares: &[u8], light: &[Vec<f32>; 3]) -> [f32; 3]
         = irradiance_in;
-    fn backward_here(basis: &LightBasis, normal: Vec3, shares: &[u8], d: [f32; 3], d_light: &mut [Vec<f32>; 3])
-        = backward_in;
-    fn row_here(basis: &LightBasis, normal: Vec3, shares: &[u8], scale: f32, row: &mut [f32]) = row_in;
+    /// The transpose of [`irradiance`]: adds the derivative by the light, given that by `E`.
+    pub fn irradiance_backward(
+        basis: &LightBasis,
+        normal: Vec3,
+        shares: &[u8],
+        d_irradiance: [f32; 3],
+        d_light: &mut [Vec<f32>; 3],
+    ) = backward_in;
+    /// Adds `scale` times the row of [`irradiance`] to a row over the padded texels of the light.
+    pub fn add_irradiance_row(basis: &LightBasis, normal: Vec3, shares: &[u8], scale: f32, row: &mut [f32]) = row_in;
 }
 
 /// `share (n . moment)+` of the next hats, in units of 1/255; `None` when all lie below the horizon.

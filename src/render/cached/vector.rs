@@ -202,11 +202,11 @@ pub fn has_avx512() -> bool {
 /// `versions! { fn name(argument: Type) -> Type = kernel; }`. What stands in brackets behind the kernel is its second
 /// generic argument.
 macro_rules! versions {
-    ($($(#[$about:meta])* fn $name:ident($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)?
+    ($($(#[$about:meta])* $visibility:vis fn $name:ident($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)?
         = $kernel:ident $([$constant:expr])?;)*) => {$(
         $(#[$about])*
         #[inline]
-        fn $name($($argument: $type),*) $(-> $result)? {
+        $visibility fn $name($($argument: $type),*) $(-> $result)? {
             #[cfg(target_arch = "x86_64")]
             {
                 #[target_feature(enable = "avx512f")]
