@@ -3,11 +3,11 @@
 //! `cargo run --release --no-default-features --example solver_toys -- FOLDER [name=value …]`
 //!
 //! Names are the fields of `SolverSettings`, and `light=truth` to fit the maps under the true light,
-//! `samples` a pixel for the pictures of the path tracer (0: none), `out` for a folder that takes maps and light. Seconds
+//! `maps_steps` for the number of times that maps are made, `samples` a pixel for the pictures of the path tracer (0: none), `out` for a folder that takes maps and light. Seconds
 //! are the solver's own; scoring is left out.
 
 use glam::Vec3;
-use patina::fit::solver::{Estimate, Solver, SolverSettings};
+use patina::fit::solver::{Estimate, Solver, SolverSettings, SolverStep};
 use patina::image::{Image, RgbImage};
 use patina::insight::intervals::interval_coverage;
 use patina::insight::truth::{environment_errors, map_errors};
@@ -76,6 +76,11 @@ fn main() -> Result<()> {
             report.light_unknowns
         );
     });
+    // Maps again, with the kinds of surface that the first ones have shown.
+    for _ in 1..count("maps_steps", 1) {
+        solver.scene.step(SolverStep::Maps, &mut solver.estimate, &stop);
+        println!("{:>7.1} s ({:.1} s of processors)  Maps", began.elapsed().as_secs_f64(), processor_seconds());
+    }
     let (maps, light) = (solver.maps(), solver.environment());
     if let Some(folder) = value("maps") {
         let folder = std::path::Path::new(&folder);

@@ -35,24 +35,27 @@ fn refined(surface: &Surface, lit: &Parameters<f32>, settings: PictureSettings, 
 }
 
 #[test]
-fn the_mean_of_passes_is_the_picture_of_groups() {
+fn passes_together_are_one_picture_of_all_their_samples() {
     let trial = Trial::default();
     let (surface, lit) = (trial.surface(), trial.truth());
-    let settings = PictureSettings { samples: 4, groups: 12, max_bounces: 2, seed: 3, ..Default::default() };
+    let settings = PictureSettings { samples: 48, max_bounces: 2, seed: 3, ..Default::default() };
     let whole = render(&surface, &camera(40, 28), &lit, 0, &settings, &GO);
-    // Same seed: pass k draws the numbers of group k.
-    let same = refined(&surface, &lit, settings, &[4; 12]);
-    assert_eq!((same.samples(), same.passes(), same.non_finite()), (48, 12, 0));
-    for (a, b) in same.picture().pixels().iter().zip(whole.radiance.pixels()) {
-        assert!((*a - *b).abs().max_element() <= 1e-4 * b.max_element().max(0.1), "{a} {b}");
-    }
-    for (a, b) in same.coverage().pixels().iter().zip(whole.coverage.pixels()) {
-        assert!((a - b).abs() < 1e-5);
+    // Same seed: passes of any length draw the numbers of one sequence.
+    for passes in [vec![4; 12], vec![1, 1, 2, 4, 8, 16, 16]] {
+        let same = refined(&surface, &lit, settings, &passes);
+        assert_eq!((same.samples(), same.passes() as usize, same.non_finite()), (48, passes.len(), 0));
+        for (a, b) in same.picture().pixels().iter().zip(whole.radiance.pixels()) {
+            assert!((*a - *b).abs().max_element() <= 1e-4 * b.max_element().max(0.1), "{a} {b}");
+        }
+        for (a, b) in same.coverage().pixels().iter().zip(whole.coverage.pixels()) {
+            assert!((a - b).abs() < 1e-5);
+        }
     }
 
-    // Another seed and passes of uneven length: the means agree within their noise.
+    // Another seed: the means agree within their noise, as groups tell it.
+    let groups = PictureSettings { samples: 4, groups: 12, ..settings };
+    let variance = render(&surface, &camera(40, 28), &lit, 0, &groups, &GO).variance.unwrap();
     let other = refined(&surface, &lit, PictureSettings { seed: 77, ..settings }, &[1, 1, 2, 4, 8, 16, 16]);
-    let variance = whole.variance.unwrap();
     for channel in 0..3 {
         let (mut difference, mut squared) = (0.0f64, 0.0f64);
         for (index, pixel) in other.picture().pixels().iter().enumerate() {
@@ -62,7 +65,24 @@ fn the_mean_of_passes_is_the_picture_of_groups() {
         let z = difference / squared.sqrt();
         assert!(z.abs() < 4.0, "channel {channel}: z = {z}");
     }
-    assert_ne!(other.picture(), same.picture());
+    assert_ne!(other.picture(), &whole.radiance);
+}
+
+#[test]
+fn samples_of_one_sequence_vary_less_than_independent_groups_of_them() {
+    let trial = Trial::default();
+    let (surface, lit) = (trial.surface(), trial.truth());
+    // Mean squared difference of two pictures of 16 samples a pixel: twice their variance.
+    let difference = |settings: [PictureSettings; 2]| {
+        let [a, b] = settings.map(|settings| render(&surface, &camera(40, 28), &lit, 0, &settings, &GO).radiance);
+        a.pixels().iter().zip(b.pixels()).map(|(a, b)| f64::from((*a - *b).length_squared())).sum::<f64>()
+    };
+    let of = |samples, groups| {
+        let settings = PictureSettings { samples, groups, max_bounces: 2, ..Default::default() };
+        difference([11, 12].map(|seed| PictureSettings { seed, ..settings }))
+    };
+    let (together, apart) = (of(16, 1), of(2, 8));
+    assert!(together < 0.6 * apart, "{together} {apart}");
 }
 
 #[test]

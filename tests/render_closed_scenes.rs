@@ -349,7 +349,7 @@ fn first_hits_from_the_cache_give_the_same_mean() {
             } else {
                 CameraRays::fresh(&surface, &camera, PixelFilter::Box, 4)
             };
-            let key = PassKey { seed: if cached { 7 } else { 8 }, step: round, view: 0 };
+            let key = PassKey::halves(if cached { 7 } else { 8 }, round, 0);
             for (pixel, moments) in moments.iter_mut().enumerate() {
                 let estimate: PixelEstimate<f32> = estimate_pixel(&tracer, &rays, pixel, key, &parameters, &mut arena);
                 moments.add(0.5 * f64::from(estimate.first[1] + estimate.second[1]));
@@ -419,7 +419,7 @@ fn pictures_and_gradients_have_the_same_bits_on_one_and_on_two_threads() {
             let tracer = tracer(&surface, &parameters, &sampler);
             let rays = CameraRays::fresh(&surface, &camera, PixelFilter::Tent, 4);
             let pixels: Vec<u32> = (0..72 * 72).collect();
-            let key = PassKey { seed: 3, step: 1, view: 2 };
+            let key = PassKey::halves(3, 1, 2);
             let mut gradient = Parameters {
                 texels: TexelPyramid::zeros(&PyramidWeights::flat(2, 2)),
                 light: vec![[0.0; 3]; parameters.light.len()],

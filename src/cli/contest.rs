@@ -152,6 +152,7 @@ pub fn tracer(options: &TracerArguments, json: bool, threads: Option<usize>) -> 
         threads,
         python: options.python.clone(),
         scripts: options.scripts.clone(),
+        output: options.output.clone(),
     };
     let table = tracer_speed::run(&tracer, &teller("tracer", json))?;
     table.write(&options.output, "tracer")?;

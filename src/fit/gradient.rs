@@ -172,7 +172,7 @@ impl Fitter {
     }
 
     pub(super) fn pass_key(&self, target: &Target) -> PassKey {
-        PassKey { seed: self.settings.seed, step: self.state.step as u32, view: target.view as u32 }
+        PassKey::halves(self.settings.seed, self.state.step as u32, target.view as u32)
     }
 
     /// Name and number of the pixels of a view that were not finite, if any; too many of them end the fit.

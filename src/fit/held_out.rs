@@ -65,7 +65,7 @@ impl Fitter {
         for target in &self.held_out {
             let tracer = self.tracer(stage, &work.parameters, &sampler, target);
             let rays = CameraRays::fresh(&self.surface, &target.camera, self.settings.pixel_filter, 4);
-            let key = PassKey { seed: self.settings.seed ^ 0xe7a1, step: 0, view: target.view as u32 };
+            let key = PassKey::halves(self.settings.seed ^ 0xe7a1, 0, target.view as u32);
             let errors: Vec<Option<f64>> = (0..target.pixel_count())
                 .into_par_iter()
                 .map_init(PathArena::default, |arena, pixel| {

@@ -2,12 +2,16 @@
 //!
 //! Rays are those of a fit: through pixels, from the points they meet into a cosine-weighted direction, and from there
 //! towards the light, where only whether something is in the way is asked. Paths have the length and the lobes of the
-//! truth. A gradient is that of a squared error by all maps and the light. Mitsuba, where it is, times the same on the
-//! same scene (`tests/mitsuba/time_exchange.py`): rays of the same kinds, `path` and `prb`.
+//! truth. Paths are also compared by what they are for: noise is the standard deviation of a pixel relative to the
+//! pictures' mean, found from two pictures of different seeds, and variance times time says how long a megapixel takes to
+//! a noise of one percent, if variance falls with the number of paths (it falls faster where samples are stratified).
+//! A gradient is that of a squared error by all maps and the light. Mitsuba, where it is, times the same on the
+//! same scene (`tests/mitsuba/time_exchange.py`): rays of the same kinds, `path` by two of its samplers, and `prb`.
 
 use super::pictures::parameters;
 use crate::error::{Error, ErrorKind, Result};
 use crate::fit::FitSettings;
+use crate::image::{Image, RgbImage};
 use crate::insight::study::StudyTable;
 use crate::light::{Environment, EnvironmentSampler};
 use crate::material::MaterialMaps;
@@ -18,21 +22,24 @@ use crate::render::first_hits::{CameraRays, PixelFilter};
 use crate::render::path::{PathSettings, PathTracer};
 use crate::render::picture::{PictureSettings, render};
 use crate::render::{Parameters, Surface};
-use crate::scene::{Background, Scene};
+use crate::scene::{Background, Scene, Truth};
 use crate::trace::Ray;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// Columns of the table.
-const COLUMNS: [(&str, &str); 6] = [
+const COLUMNS: [(&str, &str); 8] = [
     ("camera rays", "M/s"),
     ("bounce rays", "M/s"),
     ("shadow rays", "M/s"),
     ("path samples", "M/s"),
+    ("noise", "%"),
+    ("to 1 % noise", "s a megapixel"),
     ("gradient samples", "M/s"),
     ("gradient over picture", "times"),
 ];
@@ -56,6 +63,8 @@ pub struct TracerOptions {
     pub python: Option<PathBuf>,
     /// The folder of `time_exchange.py`.
     pub scripts: PathBuf,
+    /// Where spheres in code are written for Mitsuba, each in a folder of its own.
+    pub output: PathBuf,
 }
 
 /// Times every scene; `tell` hears of each.
@@ -71,22 +80,18 @@ pub fn run(options: &TracerOptions, tell: &dyn Fn(&str)) -> Result<StudyTable> {
         let scene = crate::scene::read(path, &Default::default())?;
         let name = scene.name.clone();
         time(&scene, &format!("{name}, patina"), options, &mut table)?;
-        if let Some(python) = &options.python {
-            match mitsuba(python, path, options) {
-                Ok(rows) => rows.iter().for_each(|row| table.add(&format!("{name}, mitsuba"), row)),
-                Err(why) => table.notes.push(format!("{name}: Mitsuba was left out: {why}.")),
-            }
-        }
+        time_mitsuba(path, &name, options, &mut table);
     }
     for &triangles in &options.triangles {
-        tell(&format!("timing a sphere of {triangles} triangles"));
-        let case = super::scale::ScaleCase { triangles, views: options.most_views.max(1), map_size: 256 };
-        let mut scene = super::scale::scene(case);
-        if scene.mesh.uvs.is_empty() {
-            // One grey texel serves all: only cost is looked at.
-            scene.mesh.uvs = vec![Vec2::splat(0.5); scene.mesh.positions.len()];
+        let name = format!("sphere of {triangles}");
+        tell(&format!("timing a {name} triangles"));
+        let scene = grey_sphere(triangles, options.most_views.max(1));
+        time(&scene, &format!("{name}, patina"), options, &mut table)?;
+        if let (Some(truth), Some(_)) = (&scene.truth, &options.python) {
+            let folder = options.output.join(format!("sphere-{triangles}"));
+            crate::export::exchange::write(&scene, truth, &Default::default(), &folder)?;
+            time_mitsuba(&folder, &name, options, &mut table);
         }
-        time(&scene, &format!("sphere of {triangles}, patina"), options, &mut table)?;
     }
     table.notes.push(format!(
         "Rays of up to {} views with one ray a pixel; paths and gradients with {} samples a pixel. A gradient counts its \
@@ -94,6 +99,20 @@ pub fn run(options: &TracerOptions, tell: &dyn Fn(&str)) -> Result<StudyTable> {
         options.most_views, options.samples
     ));
     Ok(table)
+}
+
+/// Adds Mitsuba's rows, or a note of why there are none.
+fn time_mitsuba(folder: &Path, name: &str, options: &TracerOptions, table: &mut StudyTable) {
+    let Some(python) = &options.python else { return };
+    match mitsuba(python, folder, options) {
+        Ok(repetitions) => {
+            for (sampler, values) in repetitions.iter().flatten() {
+                let values: Vec<f64> = values.iter().map(|value| value.unwrap_or(f64::NAN)).collect();
+                table.add(&format!("{name}, mitsuba, {sampler}"), &values);
+            }
+        }
+        Err(why) => table.notes.push(format!("{name}: Mitsuba was left out: {why}.")),
+    }
 }
 
 /// Adds one value a repetition to a row.
@@ -105,40 +124,74 @@ fn time(scene: &Scene, row: &str, options: &TracerOptions, table: &mut StudyTabl
     }
     let (lit, bounces) = match &scene.truth {
         Some(truth) => (parameters(&truth.maps, &truth.environment), truth.max_bounces),
-        None => (grey(), FitSettings::default().bounces),
+        None => {
+            let (maps, light) = grey();
+            (parameters(&maps, &light), FitSettings::default().bounces)
+        }
     };
     let (camera, bounce, shadow) = rays(scene, &surface, &views);
-    let rate = |count: usize, work: &dyn Fn() -> usize| {
-        let began = Instant::now();
-        std::hint::black_box(work());
-        count as f64 / began.elapsed().as_secs_f64() / 1e6
-    };
-    for _ in 0..options.repetitions.max(1) {
-        let closest = |rays: &[Ray]| rays.par_iter().filter(|ray| surface.closest(ray).is_some()).count();
+    let pixels: usize =
+        views.iter().map(|&view| scene.views[view].camera.width * scene.views[view].camera.height).sum();
+    let samples = pixels * options.samples;
+    let closest = |rays: &[Ray]| rays.par_iter().filter(|ray| surface.closest(ray).is_some()).count();
+    let render = |seed| pictures(scene, &surface, &lit, &views, bounces, options.samples, seed);
+    // What came before the first repetition is not timed: memory is touched for the first time.
+    let mut before = render(0);
+    for repetition in 1..=options.repetitions.max(1) {
         let mut values = vec![
-            rate(camera.len(), &|| closest(&camera)),
-            rate(bounce.len(), &|| closest(&bounce)),
-            rate(shadow.len(), &|| shadow.par_iter().filter(|ray| surface.bvh().is_occluded(ray)).count()),
+            timed_rate(camera.len(), || closest(&camera)).0,
+            timed_rate(bounce.len(), || closest(&bounce)).0,
+            timed_rate(shadow.len(), || shadow.par_iter().filter(|ray| surface.bvh().is_occluded(ray)).count()).0,
         ];
-        let pixels: usize =
-            views.iter().map(|&view| scene.views[view].camera.width * scene.views[view].camera.height).sum();
-        let samples = pixels * options.samples;
-        values.push(rate(samples, &|| pictures(scene, &surface, &lit, &views, bounces, options.samples)));
-        values.push(rate(samples, &|| gradients(scene, &surface, &lit, &views, bounces, options.samples)));
-        values.push(values[3] / values[4]);
+        let (path_rate, made) = timed_rate(samples, || render(repetition as u64));
+        let deviation = relative_deviation(&made, &before);
+        before = made;
+        values.extend([path_rate, 100.0 * deviation, options.samples as f64 / path_rate * (deviation / 0.01).powi(2)]);
+        let gradient_rate =
+            timed_rate(samples, || gradients(scene, &surface, &lit, &views, bounces, options.samples)).0;
+        values.extend([gradient_rate, path_rate / gradient_rate]);
         table.add(row, &values);
     }
     Ok(())
 }
 
-/// A grey surface under a grey light, one texel each way.
-fn grey() -> Parameters<f32> {
-    let map = |value: f32| crate::image::Image::filled(1, 1, Vec3::splat(value));
-    let roughness = crate::image::Image::filled(1, 1, 0.3);
-    parameters(
-        &MaterialMaps { diffuse: map(0.5), specular: map(0.04), roughness },
-        &Environment::constant(64, 32, Vec3::ONE),
-    )
+/// Millions a second of `count` things that `work` does, and what it made.
+fn timed_rate<T>(count: usize, work: impl FnOnce() -> T) -> (f64, T) {
+    let began = Instant::now();
+    let made = std::hint::black_box(work());
+    (count as f64 / began.elapsed().as_secs_f64() / 1e6, made)
+}
+
+/// Standard deviation of a pixel's channel relative to the mean, from two independent sets of the same pictures.
+fn relative_deviation(one: &[RgbImage], other: &[RgbImage]) -> f64 {
+    let pairs = || one.iter().zip(other).flat_map(|(one, other)| one.pixels().iter().zip(other.pixels()));
+    let squares: f64 = pairs().map(|(a, b)| f64::from((*a - *b).length_squared())).sum();
+    let sum: f64 = pairs().map(|(a, b)| f64::from((*a + *b).element_sum())).sum();
+    let channels = 3.0 * pairs().count().max(1) as f64;
+    (0.5 * squares / channels).sqrt() / (0.5 * sum / channels)
+}
+
+/// A grey surface under a grey light.
+fn grey() -> (MaterialMaps, Environment) {
+    let map = |value: f32| Image::filled(4, 4, Vec3::splat(value));
+    let maps = MaterialMaps { diffuse: map(0.5), specular: map(0.04), roughness: Image::filled(4, 4, 0.3) };
+    (maps, Environment::constant(64, 32, Vec3::ONE))
+}
+
+/// A bumpy sphere of the bench of growth, grey under grey light: only cost is looked at.
+fn grey_sphere(triangles: usize, views: usize) -> Scene {
+    let mut scene = super::scale::scene(super::scale::ScaleCase { triangles, views, map_size: 4 });
+    // One texel serves all.
+    scene.mesh.uvs = vec![Vec2::splat(0.5); scene.mesh.positions.len()];
+    let (maps, environment) = grey();
+    scene.truth = Some(Truth {
+        maps,
+        texels_seen: Image::filled(4, 4, true),
+        environment,
+        relight: None,
+        max_bounces: FitSettings::default().bounces,
+    });
+    scene
 }
 
 /// Rays through the middle of pixels, bounces from where they meet a front, and rays from there into even directions.
@@ -174,16 +227,18 @@ fn pictures(
     views: &[usize],
     bounces: usize,
     samples: usize,
-) -> usize {
+    seed: u64,
+) -> Vec<RgbImage> {
     let settings = PictureSettings {
         samples,
         max_bounces: bounces,
+        seed,
         background_visible: scene.background == Background::Environment,
         ..Default::default()
     };
     let stop = AtomicBool::new(false);
     let picture = |&view: &usize| render(surface, &scene.views[view].camera, lit, view as u32, &settings, &stop);
-    views.iter().map(picture).map(|picture| picture.radiance.pixels().len()).sum()
+    views.iter().map(picture).map(|picture| picture.radiance).collect()
 }
 
 /// The squared error against a grey photo.
@@ -227,14 +282,17 @@ fn gradients(
         };
         let rays = CameraRays::fresh(surface, camera, PixelFilter::Box, samples);
         let pixels: Vec<u32> = (0..(camera.width * camera.height) as u32).collect();
-        let key = PassKey { seed: 1, step: 0, view: view as u32 };
+        let key = PassKey::halves(1, 0, view as u32);
         done += accumulate(&tracer, &rays, &pixels, key, lit, &AgainstGrey, &mut gradient, &stop).pixels as usize;
     }
     done
 }
 
-/// Rows of Mitsuba, one a repetition; or why there are none.
-fn mitsuba(python: &Path, scene: &Path, options: &TracerOptions) -> std::result::Result<Vec<Vec<f64>>, String> {
+/// One repetition of Mitsuba: for each of its samplers a value a column, where it has one.
+type MitsubaRows = BTreeMap<String, Vec<Option<f64>>>;
+
+/// What Mitsuba said, one repetition after the other; or why it said nothing.
+fn mitsuba(python: &Path, scene: &Path, options: &TracerOptions) -> std::result::Result<Vec<MitsubaRows>, String> {
     let script = options.scripts.join("time_exchange.py");
     if !script.is_file() {
         return Err(format!("there is no {}", script.display()));
@@ -252,6 +310,6 @@ fn mitsuba(python: &Path, scene: &Path, options: &TracerOptions) -> std::result:
         return Err(format!("the script ended with {} ({})", output.status, last.trim()));
     }
     let text = String::from_utf8_lossy(&output.stdout);
-    let rows: Vec<Vec<f64>> = text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+    let rows: Vec<MitsubaRows> = text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
     if rows.is_empty() { Err("the script said nothing".into()) } else { Ok(rows) }
 }

@@ -56,25 +56,53 @@ pub trait PixelLoss<R>: Sync {
     fn at(&self, pixel: usize, estimate: &PixelEstimate<R>) -> Option<PixelDerivative<R>>;
 }
 
+/// How the samples of a pixel go together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sequence {
+    /// The two halves are independent of each other, as the product of two estimates asks for.
+    Halves,
+    /// All cover their square evenly together, as sample `first` and those after it of one sequence: what a mean asks for.
+    /// Its variance is then less than that of two independent halves.
+    Whole {
+        /// Number of samples of the pixel that were taken before.
+        first: u32,
+    },
+}
+
 /// The random numbers of a pass.
 #[derive(Clone, Copy, Debug)]
 pub struct PassKey {
     /// Seed of the run.
     pub seed: u64,
-    /// Step of the fit.
+    /// Step of the fit, or another number that makes passes independent.
     pub step: u32,
     /// Index of the view.
     pub view: u32,
+    /// How the samples of a pixel go together.
+    pub sequence: Sequence,
 }
 
 impl PassKey {
-    /// The stream of sample `sample` of `samples` at a pixel. The halves of the samples have streams of their own, so
-    /// that the two estimates are independent.
+    /// The key of a pass whose halves are independent.
+    pub fn halves(seed: u64, step: u32, view: u32) -> Self {
+        PassKey { seed, step, view, sequence: Sequence::Halves }
+    }
+
+    /// The key of a pass for a mean, whose samples follow `first` others of the same pixel.
+    pub fn whole(seed: u64, step: u32, view: u32, first: u32) -> Self {
+        PassKey { seed, step, view, sequence: Sequence::Whole { first } }
+    }
+
+    /// The stream of sample `sample` of `samples` at a pixel.
     pub fn stream(&self, pixel: usize, sample: usize, samples: usize) -> SampleStream {
         let half = (samples / 2).max(1);
-        let second = u32::from(sample >= half && samples > 1);
-        let key = StreamKey::new(self.seed ^ (u64::from(second) << 62), self.step, self.view, pixel as u32);
-        SampleStream::new(key, if second == 1 { sample - half } else { sample } as u32)
+        let (second, number) = match self.sequence {
+            Sequence::Halves if sample >= half && samples > 1 => (1, sample - half),
+            Sequence::Halves => (0, sample),
+            Sequence::Whole { first } => (0, first as usize + sample),
+        };
+        let key = StreamKey::new(self.seed ^ (second << 62), self.step, self.view, pixel as u32);
+        SampleStream::new(key, number as u32)
     }
 }
 
@@ -179,7 +207,8 @@ fn work_chunk<R: Real>(
     totals
 }
 
-/// Traces the samples of a pixel into `arena` (cleared first) and adds up its two estimates.
+/// Traces the samples of a pixel into `arena` (cleared first) and adds up its two estimates, which are independent of each
+/// other only if the key says so.
 pub fn estimate_pixel<R: Real>(
     tracer: &PathTracer<'_>,
     rays: &CameraRays<'_>,

@@ -168,7 +168,7 @@ pub fn render_regions(
             }
             let (mut mean, mut squared_deviations, mut escaped) = (Vec3::ZERO, Vec3::ZERO, 0usize);
             for group in 0..groups {
-                let key = PassKey { seed: settings.seed, step: group as u32, view };
+                let key = PassKey::whole(settings.seed, group as u32, view, 0);
                 let mut sum = Vec3::ZERO;
                 for sample in 0..rays.samples() {
                     let mut stream = key.stream(pixel, sample, rays.samples());

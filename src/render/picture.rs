@@ -103,7 +103,7 @@ pub fn render(
             }
             let (mut mean, mut squared_deviations, mut escaped) = (Vec3::ZERO, Vec3::ZERO, 0.0);
             for group in 0..groups {
-                let key = PassKey { seed: settings.seed, step: group as u32, view };
+                let key = PassKey::whole(settings.seed, group as u32, view, 0);
                 let estimate = estimate_pixel(&tracer, &rays, pixel, key, parameters, arena);
                 let half = (rays.samples() / 2).max(1) as f32;
                 let share = if rays.samples() > 1 { half / rays.samples() as f32 } else { 1.0 };

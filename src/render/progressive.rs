@@ -1,8 +1,10 @@
-//! A picture that refines: passes of a few samples a pixel, each with random numbers of its own, and their mean.
+//! A picture that refines: passes of a few samples a pixel, and their mean.
 //!
-//! [`PictureTracer`] holds what all passes share; [`Accumulation`] is the mean so far. Pass `k` depends on the settings,
-//! the view, the number of its samples and `k` alone, never on threads or on what was stopped before, so that the same
-//! passes make the same bits. A pass that is stopped half-way leaves no trace: the mean is one of whole pictures.
+//! [`PictureTracer`] holds what all passes share; [`Accumulation`] is the mean so far. The samples of a pixel are one
+//! sequence over all passes, so that together they cover their square as evenly as if they had been taken at once: a pass depends
+//! on the settings, the view, the number of its samples and the number of those before it, never on threads or on what was
+//! stopped, and the same passes make the same bits. A pass that is stopped half-way leaves no trace: the mean is one of
+//! whole pictures.
 
 use super::accumulate::{PassKey, estimate_pixel};
 use super::first_hits::CameraRays;
@@ -70,19 +72,29 @@ impl<'a> PictureTracer<'a> {
         &self.settings
     }
 
-    /// Mean radiance of a pixel (row-major index) over `samples` paths of pass `pass`, and the share of the pixel that
-    /// the surface covers, in [0, 1].
+    /// Mean radiance of a pixel (row-major index) over `samples` paths, and the share of the pixel that the surface covers,
+    /// in [0, 1]. Sets of different numbers are independent.
     pub fn pixel(
         &self,
         camera: &Camera,
         view: u32,
         pixel: usize,
         samples: usize,
-        pass: u32,
+        set: u32,
+        arena: &mut PathArena,
+    ) -> (Vec3, f32) {
+        self.pixel_by(camera, PassKey::whole(self.settings.seed, set, view, 0), pixel, samples, arena)
+    }
+
+    fn pixel_by(
+        &self,
+        camera: &Camera,
+        key: PassKey,
+        pixel: usize,
+        samples: usize,
         arena: &mut PathArena,
     ) -> (Vec3, f32) {
         let rays = CameraRays::fresh(self.surface, camera, self.settings.filter, samples);
-        let key = PassKey { seed: self.settings.seed, step: pass, view };
         let estimate = estimate_pixel(&self.paths(), &rays, pixel, key, self.parameters, arena);
         let count = rays.samples();
         let first_share = if count > 1 { (count / 2) as f32 / count as f32 } else { 1.0 };
@@ -110,8 +122,8 @@ impl<'a> PictureTracer<'a> {
         };
         let mut accumulation = Accumulation::new(small.width, small.height);
         // Numbers that no pass of the full size uses.
-        let pass = u32::MAX - factor as u32;
-        accumulation.add_numbered(self, &small, view, 1, pass, stop, after_tile).then_some(())?;
+        let key = PassKey::whole(self.settings.seed, u32::MAX - factor as u32, view, 0);
+        accumulation.add_by(self, &small, key, 1, stop, after_tile).then_some(())?;
         // The small picture may reach over the border of the full one by less than one of its pixels.
         let large = enlarge(&accumulation.mean, small.width * factor, small.height * factor);
         Some(Image::from_fn(camera.width, camera.height, |row, column| large[(row, column)]))
@@ -180,16 +192,16 @@ impl Accumulation {
         stop: &AtomicBool,
         after_tile: &(dyn Fn(Duration) + Sync),
     ) -> bool {
-        self.add_numbered(tracer, camera, view, samples, self.passes, stop, after_tile)
+        let key = PassKey::whole(tracer.settings.seed, 0, view, self.samples as u32);
+        self.add_by(tracer, camera, key, samples, stop, after_tile)
     }
 
-    fn add_numbered(
+    fn add_by(
         &mut self,
         tracer: &PictureTracer<'_>,
         camera: &Camera,
-        view: u32,
+        key: PassKey,
         samples: usize,
-        pass: u32,
         stop: &AtomicBool,
         after_tile: &(dyn Fn(Duration) + Sync),
     ) -> bool {
@@ -213,7 +225,7 @@ impl Accumulation {
                     if stop.load(Ordering::Relaxed) {
                         return Vec::new();
                     }
-                    part.push(tracer.pixel(camera, view, pixel, samples, pass, arena));
+                    part.push(tracer.pixel_by(camera, key, pixel, samples, arena));
                 }
                 done.fetch_add(1, Ordering::Relaxed);
                 after_tile(began.elapsed());

@@ -103,7 +103,7 @@ def scene(folder, light, blend_log_width=False):
     })
 
 
-def sensor(view):
+def sensor(view, sampler="independent"):
     """A camera of cameras.json with a box filter. Mitsuba's axes are x left, y up, z forward."""
     k = np.array(view["K"], float)
     if abs(k[0, 0] - k[1, 1]) > 1e-5 * k[0, 0] or abs(k[0, 1]) > 1e-9:
@@ -118,7 +118,7 @@ def sensor(view):
         "near_clip": 1e-3, "far_clip": 1e5, "to_world": mi.ScalarTransform4f(world_from_camera),
         "film": {"type": "hdrfilm", "width": width, "height": height, "rfilter": {"type": "box"},
                  "pixel_format": "rgb", "component_format": "float32"},
-        "sampler": {"type": "independent"},
+        "sampler": {"type": sampler},
     })
 
 

@@ -1,8 +1,11 @@
-"""Times Mitsuba on an exchange folder: one JSON list a repetition, in millions a second.
+"""Times Mitsuba on an exchange folder: one JSON object a repetition, with a list for each sampler.
 
-    [camera rays, bounce rays, shadow rays, path samples, gradient samples, gradient over picture]
+    [camera rays, bounce rays, shadow rays, path samples, noise, seconds to 1 % noise, gradient samples, gradient over picture]
 
-The first pass of each compiles and is not counted. `patina bench tracer` runs this beside the program's own tracer.
+Rays and samples in millions a second; noise is the standard deviation of a pixel in percent of the pictures' mean, from
+the difference to the pictures of the repetition before; seconds are those of a megapixel, as variance times time. Rays and
+gradients do not depend on the sampler and are null but for the first. The first pass of each compiles and is not counted.
+`patina bench tracer` runs this beside the program's own tracer.
 """
 import argparse
 import json
@@ -11,6 +14,8 @@ import time
 import numpy as np
 
 import exchange_scene as ex
+
+SAMPLERS = ["independent", "multijitter"]
 
 
 def main():
@@ -69,9 +74,19 @@ def main():
     path = ex.integrator(depth, hidden)
     prb = mi.load_dict({"type": "prb", "max_depth": depth, "rr_depth": 100000, "hide_emitters": hidden})
 
-    def pictures(seed):
-        for number, sensor in enumerate(sensors):
-            dr.eval(mi.render(world, sensor=sensor, integrator=path, spp=options.spp, seed=seed * 64 + number))
+    sensors_of = {name: [ex.sensor(view, name) for view in views] for name in SAMPLERS}
+
+    def pictures(name, seed):
+        made = []
+        for number, sensor in enumerate(sensors_of[name]):
+            made.append(mi.render(world, sensor=sensor, integrator=path, spp=options.spp, seed=seed * 64 + number))
+            dr.eval(made[-1])
+        return made
+
+    def noise(made, before):
+        """Standard deviation of a pixel over the mean."""
+        made, before = (np.concatenate([np.array(picture, np.float64).ravel() for picture in all_of]) for all_of in (made, before))
+        return np.sqrt(0.5 * np.mean((made - before)**2)) / np.mean(0.5 * (made + before))
 
     parameters = mi.traverse(world)
     keys = [f"surface.bsdf.{name}.data" for name in ("diffuse", "specular", "roughness")] + ["light.data"]
@@ -92,13 +107,24 @@ def main():
         for leaf in leaves:
             dr.eval(dr.grad(leaf))
 
+    before = {}
     for repetition in range(options.repetitions + 1):
         # More rays at once than a view has would flatter nobody: launches are what a fit would do.
-        times = [seconds(lambda: closest(camera)), seconds(lambda: closest(bounce)), seconds(occluded),
-                 seconds(lambda: pictures(repetition)), seconds(lambda: gradients(repetition))]
+        rays = [count / seconds(work) / 1e6 for count, work in
+                zip(counts, (lambda: closest(camera), lambda: closest(bounce), occluded))]
+        rows = {}
+        for name in SAMPLERS:
+            made = []
+            rate = pixels * options.spp / seconds(lambda: made.extend(pictures(name, repetition))) / 1e6
+            if repetition > 0:
+                deviation = noise(made, before[name])
+                rows[name] = [rate, 100 * deviation, options.spp / rate * (deviation / 0.01)**2]
+            before[name] = made
+        gradient = pixels * options.spp / seconds(lambda: gradients(repetition)) / 1e6
         if repetition > 0:
-            rates = [count / spent / 1e6 for count, spent in zip(counts + [pixels * options.spp] * 2, times)]
-            print(json.dumps(rates + [rates[3] / rates[4]]), flush=True)
+            first = SAMPLERS[0]
+            print(json.dumps({name: rays + row + [gradient, row[0] / gradient] if name == first else
+                              [None] * 3 + row + [None] * 2 for name, row in rows.items()}), flush=True)
 
 
 main()

@@ -3,14 +3,12 @@
 //! A surface is a dielectric, a metal, or neither: kinds that differ in F0 and in what lies under the lobe. A metal has
 //! next to no diffuse reflectance; F0 of all others is grey. Without that knowledge a wide lobe of a high F0 stands in
 //! for diffuse reflectance wherever the light is a little wrong, in the complementary colour where it is too much.
-//! The logarithm of the width is normal for all kinds.
+//! The logarithm of the width is normal. Kinds that have the same belief of it make a family: one of them holds for any
+//! scene, others may come from what the scene has shown elsewhere ([`super::lobe_families`]).
 
 use super::cell_sums::System;
 use super::lobe_widths::LOBE_WIDTHS;
 use glam::{DMat3, DVec3};
-
-/// Kinds of surface.
-pub const KINDS: usize = 3;
 
 /// Sums of a texel, or of a group, per width and channel, in units of the noise, with each texel's deviation from its
 /// group's diffuse reflectance eliminated.
@@ -43,19 +41,22 @@ impl LobeSumsOfGroup {
 /// What is believed of a kind of surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LobeKind {
-    /// Mean of F0, standard deviation of what its channels have in common, and of what they do not.
-    pub specular: (f64, f64, f64),
-    /// Mean and standard deviation of a group's diffuse reflectance; `None` for the mean of what lies around.
-    pub diffuse: (Option<f64>, f64),
+    /// Mean of F0 per channel, standard deviation of what its channels have in common, and of what they do not.
+    pub specular: ([f64; 3], f64, f64),
+    /// Mean per channel and standard deviation of a group's diffuse reflectance; `None` for the mean of what lies around.
+    pub diffuse: (Option<[f64; 3]>, f64),
     /// Share of all surface.
     pub share: f64,
 }
 
 impl LobeKind {
-    /// A channel's sums with what is believed of the group's diffuse reflectance.
-    fn with_belief(&self, sums: &System, around: f64) -> System {
+    /// The channels' sums with what is believed of the group's diffuse reflectance.
+    fn with_belief(&self, sums: &[System; 3], around: [f64; 3]) -> [System; 3] {
+        let mean = self.diffuse.0.unwrap_or(around);
         let mut all = *sums;
-        all.observe(self.diffuse.1.powi(-2), 1.0, 0.0, self.diffuse.0.unwrap_or(around));
+        for (sums, mean) in all.iter_mut().zip(mean) {
+            sums.observe(self.diffuse.1.powi(-2), 1.0, 0.0, mean);
+        }
         all
     }
 
@@ -65,13 +66,14 @@ impl LobeKind {
     /// F0 it is held at zero, and F0 found anew. Without that, wide and strong lobes over what they outshine, made up
     /// for by less than black below, took over photographs (`saharov_bmvs`: RMSE of the maps .0446, with it .0367).
     fn at_width(&self, sums: &[System; 3], around: [f64; 3]) -> (f64, [(f64, f64); 3]) {
-        let all = [0, 1, 2].map(|c| self.with_belief(&sums[c], around[c]));
+        let all = self.with_belief(sums, around);
+        let mean = DVec3::from_array(self.specular.0);
         let (precision, mut log_volume) = self.precision();
         log_volume += all.iter().map(|all| (all.ee * self.diffuse.1 * self.diffuse.1).ln()).sum::<f64>();
         let mut held = [false; 3];
         loop {
-            let (mut total, mut side) = (precision, precision * DVec3::splat(self.specular.0));
-            let mut cost = self.specular.0 * side.element_sum();
+            let (mut total, mut side) = (precision, precision * mean);
+            let mut cost = mean.dot(side);
             for (channel, &System { ee, es, ss, ey, sy, yy }) in all.iter().enumerate() {
                 let keep = if held[channel] { 0.0 } else { 1.0 / ee };
                 total.col_mut(channel)[channel] += ss - es * es * keep;
@@ -99,23 +101,35 @@ impl LobeKind {
     }
 }
 
-/// What is believed of lobes before looking.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LobePrior {
-    /// Dielectrics, metals, and what is neither.
-    pub kinds: [LobeKind; KINDS],
+/// Kinds of surface whose widths are believed to be alike.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LobeFamily {
+    /// The kinds.
+    pub kinds: Vec<LobeKind>,
     /// Mean and standard deviation of the logarithm of the width.
     pub log_width: (f64, f64),
+    /// Standard deviations from the mean within which widths are looked at; beyond, another family has to hold.
+    pub reach: f64,
+}
+
+/// What is believed of lobes before looking.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LobePrior {
+    /// All kinds of surface; their shares sum to 1.
+    pub families: Vec<LobeFamily>,
     /// Probability that a group that could be cut shares one lobe.
     pub keep: f64,
 }
 
 impl Default for LobePrior {
+    /// Dielectrics, metals, and what is neither.
     fn default() -> Self {
-        let dielectric = LobeKind { specular: (0.05, 0.025, 0.005), diffuse: (None, 0.35), share: 0.8 };
-        let metal = LobeKind { specular: (0.55, 0.2, 0.15), diffuse: (Some(0.05), 0.1), share: 0.17 };
-        let other = LobeKind { specular: (0.12, 0.08, 0.01), diffuse: (None, 0.35), share: 0.03 };
-        LobePrior { kinds: [dielectric, metal, other], log_width: (-0.6, 0.5), keep: 0.5 }
+        let grey = |value: f64| [value; 3];
+        let dielectric = LobeKind { specular: (grey(0.05), 0.025, 0.005), diffuse: (None, 0.35), share: 0.8 };
+        let metal = LobeKind { specular: (grey(0.55), 0.2, 0.15), diffuse: (Some(grey(0.05)), 0.1), share: 0.17 };
+        let other = LobeKind { specular: (grey(0.12), 0.08, 0.01), diffuse: (None, 0.35), share: 0.03 };
+        let any = LobeFamily { kinds: vec![dielectric, metal, other], log_width: (-0.6, 0.5), reach: f64::INFINITY };
+        LobePrior { families: vec![any], keep: 0.5 }
     }
 }
 
@@ -130,8 +144,19 @@ pub struct LobeBelief {
     pub shared: f64,
 }
 
+impl LobeBelief {
+    /// Adds another's moments with a weight.
+    pub fn mix(&mut self, other: &LobeBelief, weight: f64) {
+        for k in 0..4 {
+            self.mean[k] += weight * other.mean[k];
+            self.square[k] += weight * other.square[k];
+        }
+    }
+}
+
 /// Points between two widths where the posterior is looked at.
 const FINE: usize = 4;
+
 /// Logarithm of the evidence that a group shares one lobe, and what is then believed of it.
 /// `around` is the mean diffuse reflectance of what lies around.
 pub fn shared_lobe(
@@ -140,55 +165,81 @@ pub fn shared_lobe(
     log_widths: &[f64; LOBE_WIDTHS],
     prior: &LobePrior,
 ) -> (f64, LobeBelief) {
-    // Per width: logarithm of the evidence, mean and square of F0.
-    let mut log_at = [0.0f64; LOBE_WIDTHS];
-    let mut specular = [[[0.0f64; 2]; 3]; LOBE_WIDTHS];
-    for node in 0..LOBE_WIDTHS {
-        let kinds = prior.kinds.map(|kind| kind.at_width(&sums.0[node], around));
-        log_at[node] = log_sum(kinds.iter().map(|kind| kind.0));
-        for (log_kind, of_channels) in kinds {
-            let weight = (log_kind - log_at[node]).exp();
-            for (channel, (mean, variance)) in of_channels.into_iter().enumerate() {
-                specular[node][channel][0] += weight * mean;
-                specular[node][channel][1] += weight * (variance + mean * mean);
+    let of = |family: &LobeFamily| family.lobe(sums, around, log_widths);
+    if let [family] = prior.families.as_slice() {
+        return of(family);
+    }
+    let families: Vec<(f64, LobeBelief)> = prior.families.iter().map(of).collect();
+    let total = log_sum(families.iter().map(|family| family.0));
+    let mut belief = LobeBelief::default();
+    for (log, own) in &families {
+        belief.mix(own, (log - total).exp());
+    }
+    (total, belief)
+}
+
+impl LobeFamily {
+    /// Logarithm of the evidence of all kinds together, with their shares, and what is believed if it is one of them.
+    fn lobe(&self, sums: &LobeSumsOfGroup, around: [f64; 3], log_widths: &[f64; LOBE_WIDTHS]) -> (f64, LobeBelief) {
+        let (centre, deviation) = self.log_width;
+        // Three widths at least: the curvature between them is asked for.
+        let first = log_widths.partition_point(|&x| x < centre - self.reach * deviation).clamp(1, LOBE_WIDTHS - 2) - 1;
+        let last =
+            log_widths.partition_point(|&x| x <= centre + self.reach * deviation).clamp(first + 2, LOBE_WIDTHS - 1);
+        // Per width: logarithm of the evidence, mean and square of F0.
+        let mut log_at = [0.0f64; LOBE_WIDTHS];
+        let mut specular = [[[0.0f64; 2]; 3]; LOBE_WIDTHS];
+        let mut of_kinds = Vec::with_capacity(self.kinds.len());
+        for node in first..=last {
+            of_kinds.clear();
+            of_kinds.extend(self.kinds.iter().map(|kind| kind.at_width(&sums.0[node], around)));
+            log_at[node] = log_sum(of_kinds.iter().map(|kind| kind.0));
+            for (log_kind, of_channels) in &of_kinds {
+                let weight = (log_kind - log_at[node]).exp();
+                for (channel, (mean, variance)) in of_channels.iter().enumerate() {
+                    specular[node][channel][0] += weight * mean;
+                    specular[node][channel][1] += weight * (variance + mean * mean);
+                }
             }
         }
-    }
-    // Between widths the logarithm of the evidence is a parabola, as that of a normal distribution is.
-    let mut points = [(0.0f64, 0usize, 0.0f64, 0.0f64); (LOBE_WIDTHS - 1) * FINE + 1];
-    for (index, point) in points.iter_mut().enumerate() {
-        let (node, part) = ((index / FINE).min(LOBE_WIDTHS - 2), index);
-        let share = (part - node * FINE) as f64 / FINE as f64;
-        let x = log_widths[node] * (1.0 - share) + log_widths[node + 1] * share;
-        let step = (log_widths[node + 1] - log_widths[node]) / FINE as f64;
-        let log = between(log_widths, &log_at, node, x) - 0.5 * ((x - prior.log_width.0) / prior.log_width.1).powi(2);
-        *point = (log + step.ln(), node, share, x);
-    }
-    let norm = (prior.log_width.1 * (2.0 * std::f64::consts::PI).sqrt()).ln();
-    let total = log_sum(points.iter().map(|point| point.0));
-    let mut belief = LobeBelief::default();
-    for (log, node, share, x) in points {
-        let weight = (log - total).exp();
-        if weight < 1e-9 {
-            continue;
+        // Between widths the logarithm of the evidence is a parabola, as that of a normal distribution is.
+        let mut points = [(0.0f64, 0usize, 0.0f64, 0.0f64); (LOBE_WIDTHS - 1) * FINE + 1];
+        let points = &mut points[..(last - first) * FINE + 1];
+        for (index, point) in points.iter_mut().enumerate() {
+            let node = (first + index / FINE).min(last - 1);
+            let share = (index - (node - first) * FINE) as f64 / FINE as f64;
+            let x = log_widths[node] * (1.0 - share) + log_widths[node + 1] * share;
+            let step = (log_widths[node + 1] - log_widths[node]) / FINE as f64;
+            let log = between(&log_widths[first..=last], &log_at[first..=last], node - first, x)
+                - 0.5 * ((x - centre) / deviation).powi(2);
+            *point = (log + step.ln(), node, share, x);
         }
-        for c in 0..3 {
-            let mixed = |k: usize| specular[node][c][k] * (1.0 - share) + specular[node + 1][c][k] * share;
-            belief.mean[c] += weight * mixed(0);
-            belief.square[c] += weight * mixed(1);
+        let norm = (deviation * (2.0 * std::f64::consts::PI).sqrt()).ln();
+        let total = log_sum(points.iter().map(|point| point.0));
+        let mut belief = LobeBelief::default();
+        for &(log, node, share, x) in points.iter() {
+            let weight = (log - total).exp();
+            if weight < 1e-9 {
+                continue;
+            }
+            for c in 0..3 {
+                let mixed = |k: usize| specular[node][c][k] * (1.0 - share) + specular[node + 1][c][k] * share;
+                belief.mean[c] += weight * mixed(0);
+                belief.square[c] += weight * mixed(1);
+            }
+            belief.mean[3] += weight * x;
+            belief.square[3] += weight * x * x;
         }
-        belief.mean[3] += weight * x;
-        belief.square[3] += weight * x * x;
+        (total - norm, belief)
     }
-    (total - norm, belief)
 }
 
 /// Between two nodes: the straight line, and the smaller of the curvatures at both ends where they have one sign. For a
 /// parabola that is the parabola; beside a kink it does not overshoot.
-fn between(x: &[f64; LOBE_WIDTHS], y: &[f64; LOBE_WIDTHS], node: usize, at: f64) -> f64 {
+fn between(x: &[f64], y: &[f64], node: usize, at: f64) -> f64 {
     let slope = |k: usize| (y[k + 1] - y[k]) / (x[k + 1] - x[k]);
     let curvature = |middle: usize| {
-        let middle = middle.clamp(1, LOBE_WIDTHS - 2);
+        let middle = middle.clamp(1, x.len() - 2);
         (slope(middle) - slope(middle - 1)) / (x[middle + 1] - x[middle - 1])
     };
     let (left, right) = (curvature(node), curvature(node + 1));

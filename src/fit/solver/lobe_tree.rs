@@ -143,10 +143,7 @@ impl Tree<'_> {
         };
         for &texel in &node.texels {
             let belief = &mut made[texel as usize];
-            for k in 0..4 {
-                belief.mean[k] += keep * node.leaf.mean[k];
-                belief.square[k] += keep * node.leaf.square[k];
-            }
+            belief.mix(&node.leaf, keep);
             belief.shared += keep * node.texels.len() as f64;
         }
         let cut = ((1.0 - self.prior.keep) / node.cuts.len().max(1) as f64).ln();
@@ -201,7 +198,7 @@ impl Tree<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::cell_sums::System;
-    use super::super::lobe_evidence::LobeKind;
+    use super::super::lobe_evidence::{LobeFamily, LobeKind};
     use super::super::lobe_widths::weighed_log_widths;
     use super::*;
 
@@ -263,9 +260,10 @@ mod tests {
             sums.observe(1e4, 1.0, 1.0, 0.1);
             [sums; 3]
         });
-        let kinds = LobePrior::default().kinds.map(|kind| LobeKind { share: 1.0, ..kind });
-        for kind in kinds {
-            let prior = LobePrior { kinds: [kind; 3], ..LobePrior::default() };
+        let LobePrior { families, keep } = LobePrior::default();
+        for kind in families[0].kinds.iter().map(|kind| LobeKind { share: 1.0, ..*kind }) {
+            let family = LobeFamily { kinds: vec![kind], ..families[0] };
+            let prior = LobePrior { families: vec![family], keep };
             let sums = vec![LobeSumsOfGroup(grey); texels.len()];
             for belief in beliefs(&texels, &sums, 8, &weighed_log_widths(), &prior) {
                 assert!(belief.mean[0] < 0.105, "{kind:?}: {belief:?}");
@@ -280,7 +278,7 @@ mod tests {
         for belief in beliefs {
             // The normal distribution of the width, cut off at widths over 1: mean -0.6 - 0.5 phi(1.2) / Phi(1.2).
             assert!((belief.mean[3] + 0.7097).abs() < 0.02 && belief.square[3].sqrt() > 0.3, "{belief:?}");
-            let mean: f64 = prior.kinds.iter().map(|kind| kind.specular.0 * kind.share).sum();
+            let mean: f64 = prior.families[0].kinds.iter().map(|kind| kind.specular.0[0] * kind.share).sum();
             assert!((belief.mean[0] - mean).abs() < 0.02, "{belief:?}");
         }
     }

@@ -3,6 +3,7 @@
 use super::diffuse::{self, DiffuseRow, Leaning};
 use super::estimate::Estimate;
 use super::lobe_evidence::LobePrior;
+use super::lobe_families;
 use super::plan::Block;
 use super::report::{ErrorSums, StepReport, median};
 use super::round::{BlockWork, Round, open_prior};
@@ -32,6 +33,7 @@ impl SolverScene {
         let planes = self.transport.basis.planes(&estimate.light);
         let at_points = self.point_light(estimate, &planes);
         let round = self.round(estimate, &planes, &at_points);
+        let prior = lobe_families::with_families_of(estimate);
         let mut rows = vec![DiffuseRow::default(); self.observations.list.len()];
         let mut residuals = Vec::new();
         let mut made: Vec<Tile> = Vec::new();
@@ -39,7 +41,7 @@ impl SolverScene {
         let tiles = self.tiles();
         for group in tiles.chunks(16) {
             let results: Vec<TileResult> =
-                group.par_iter().map(|(first, blocks)| self.solve_tile(&round, *first, blocks, stop)).collect();
+                group.par_iter().map(|(first, blocks)| self.solve_tile(&round, *first, blocks, &prior, stop)).collect();
             if stop.load(Ordering::Relaxed) {
                 return None;
             }
@@ -103,7 +105,14 @@ impl SolverScene {
         tiles.into_iter().collect()
     }
 
-    fn solve_tile(&self, round: &Round, first: (usize, usize), blocks: &[&Block], stop: &AtomicBool) -> TileResult {
+    fn solve_tile(
+        &self,
+        round: &Round,
+        first: (usize, usize),
+        blocks: &[&Block],
+        lobes: &LobePrior,
+        stop: &AtomicBool,
+    ) -> TileResult {
         let prior = open_prior(self.observations.mean, 1.0);
         let mut solved = Vec::with_capacity(blocks.len());
         for &block in blocks {
@@ -118,7 +127,7 @@ impl SolverScene {
         }
         let residuals = solved.iter().map(|(_, work)| work.solution.residual).collect();
         let mut tile = Tile::new(round, first, self.settings.map_size, solved);
-        tile.solve(self.settings.map_size, self.observations.mean, self.settings.independence, &LobePrior::default());
+        tile.solve(self.settings.map_size, self.observations.mean, self.settings.independence, lobes);
         TileResult { tile, residuals }
     }
 

@@ -11,7 +11,7 @@
 //!    ([`light_shape`]), with a weak wish for smoothness. [`light_round`] is the round as a whole,
 //!    [`light_evidence`] says what each texel of the light is known by.
 //! 5. [`maps`]: block by block, then in tiles ([`tile`]) with the footprints of pixels, where the evidence decides which
-//!    texels share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_widths`]), then [`mod@diffuse`]: all diffuse texels
+//!    texels share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_widths`], [`lobe_families`]), then [`mod@diffuse`]: all diffuse texels
 //!    together.
 //! 6. [`solver`]: the steps in their order. A fit does them one by one, as [`crate::fit::Fitter`] does those of Adam: on
 //!    photos and maps of half size first, whose light and maps the full size begins from ([`crate::fit::schedule`]).
@@ -30,6 +30,7 @@ pub mod light_round;
 pub mod light_shape;
 pub mod light_step;
 pub mod lobe_evidence;
+pub mod lobe_families;
 pub mod lobe_tree;
 pub mod lobe_widths;
 pub mod maps;

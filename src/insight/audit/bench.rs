@@ -135,7 +135,7 @@ impl<'a> Bench<'a> {
     }
 
     fn key(&self, view: usize) -> PassKey {
-        PassKey { seed: self.settings.seed, step: 0, view: view as u32 }
+        PassKey::halves(self.settings.seed, 0, view as u32)
     }
 
     /// Traces and keeps the paths of all pixels that are evidence.

@@ -57,7 +57,7 @@ pub(super) fn pixels_of_view(
     // An even number: the halves weigh the same.
     let samples = settings.samples.max(2).next_multiple_of(2);
     let rays = CameraRays::fresh(tracer.surface(), camera, settings.filter, samples);
-    let key = PassKey { seed: settings.seed ^ 0x1a7e, step: 0, view: target.view as u32 };
+    let key = PassKey::halves(settings.seed ^ 0x1a7e, 0, target.view as u32);
     let paths = tracer.paths();
     (0..target.pixel_count())
         .into_par_iter()
