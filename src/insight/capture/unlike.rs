@@ -17,9 +17,9 @@ const EDGE_PIXELS: f32 = 0.7;
 /// Pixels of a patch, at least.
 const FEWEST_PIXELS: usize = 6;
 
-/// The pixels of patches in which photo and model differ by more than is usual in this view and than an edge that is off
-/// by [`EDGE_PIXELS`] explains. Values are compressed to [0, 1); `judged` are the pixels that count. What is usual is
-/// told apart for surface and background, which `is_surface` names.
+/// The pixels of patches in which photo and model differ by more than is usual in this view, and by more than an edge
+/// explains that is off by seven tenths of a pixel. Values are compressed to [0, 1); `judged` are the pixels that count.
+/// What is usual is told apart for surface and background, which `is_surface` names.
 pub fn unlike_patches(
     photo: &RgbImage,
     halves: [&RgbImage; 2],
