@@ -5,6 +5,7 @@
 use glam::{Vec2, Vec3};
 use patina::export::{LossRow, RunFolder, RunResult};
 use patina::image::{Image, RgbImage};
+use patina::insight::capture::ViewCapture;
 use patina::insight::intervals::IntervalCoverage;
 use patina::insight::report::data::*;
 use patina::insight::report::{RelitPicture, RelitStrip, ReportData, ReportImages, ViewPictures, write_report};
@@ -264,6 +265,20 @@ fn write_example(folder: &RunFolder, views: usize) -> ReportData {
         .into(),
         peak_memory_bytes: patina::insight::memory::peak_bytes(),
         loss_history: example_rows(),
+        capture: vec![ViewCapture {
+            name: "00000017".into(),
+            shift_x_pixels: 0.42,
+            shift_y_pixels: -1.31,
+            shift_error_pixels: 0.07,
+            roll_degrees: -0.12,
+            roll_error_degrees: 0.04,
+            roll_corner_pixels: 0.4,
+            shift_explains: 0.81,
+            gain: 1.24,
+            gain_error: 0.004,
+            doubtful_mask_share: 0.013,
+            unlike_share: 0.002,
+        }],
         views: lines,
         aggregates: vec![
             NamedAggregate { name: "held-out views".into(), score: of_kind(true) },

@@ -11,6 +11,7 @@
 //! | `environment_evidence.exr` | what a texel of the light is known by: highlights (red), background (green), diffuse light and shadows (blue); the rest to 1 is belief | the same, unless resumed after its rounds |
 //! | `light_scale.json` | how far photos leave the factor open that light and reflectance have in common: `relative_deviation`, null where they say nothing | the same |
 //! | `loss.csv` | the loss of every step | `patina fit` |
+//! | `capture.csv` | how each photo lies against the model's picture: shift, roll, gain, doubtful mask | `patina fit`, at its end |
 //! | `report.json report.html` | scores and pictures | `patina fit`, `patina compare` |
 
 use super::{LossRow, convention, loss_log, obj};

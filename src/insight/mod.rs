@@ -4,6 +4,7 @@
 //! and light with a known truth, [`intervals`] stated uncertainties with it, [`report`] makes the one page that shows it all, [`study`] gathers numbers over seeds.
 //! Every score comes twice, raw and scale-aligned, because reflectance times c with light over c is the same picture.
 //!
+//! [`capture`] tells after a fit what is wrong with photos, cameras, masks or mesh.
 //! [`coverage`] counts which texels photographs see. [`audit`] checks derivatives against differences. [`cursor`] leads
 //! between photo, surface and map; [`record`] says what each photo and the model say of one point,
 //! [`surface_layers`] what all photos together say of each texel. [`material_pictures`] shows measured reflectance,
@@ -13,6 +14,7 @@
 
 pub mod audit;
 pub mod bar_picture;
+pub mod capture;
 pub mod coverage;
 pub mod cursor;
 pub mod intervals;

@@ -11,6 +11,7 @@ use super::demo::photograph;
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::fit::{FitSettings, Fitter, StepOutcome};
 use crate::image::{GreyImage, Image, RgbImage};
+use crate::insight::capture;
 use crate::insight::intervals::{IntervalCoverage, WRONG, interval_coverage};
 use crate::insight::report::number::{fixed, short};
 use crate::insight::truth::map_errors;
@@ -163,6 +164,7 @@ fn run_case(
         }
     };
     findings.extend(fitter.findings());
+    findings.extend(capture::check(&fitter, stop).findings);
     row.steps = fitter.state().step;
     let counted = fitter.state().non_finite.iter().map(|(_, count)| count).sum();
     let (maps, light) = (fitter.maps(), fitter.environment());
@@ -295,7 +297,7 @@ impl HardTable {
              spoiled, maps over texels that a view sees, the light relative to its own. `aligned` is after the best \
              factor per channel. Intervals are those that the solver states, in percent of the texels. Wrong is what is \
              further than {WRONG} from the truth in diffuse reflectance; of so many of these the stated interval holds \
-             the truth all the same: the uncertainty warned. `told` names warnings of the check and of the fit.\n"
+             the truth all the same: the uncertainty warned. `told` names warnings of the check before the fit, of the fit, and of the look at its capture after it.\n"
         );
         for note in &self.notes {
             text += &format!("\n{note}\n");

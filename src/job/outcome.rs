@@ -1,5 +1,6 @@
 //! What a finished fit leaves behind: maps, scores, pictures, report.
 
+use super::Event;
 use super::against_truth::truth_errors;
 use super::facts::describe;
 use super::pictures::parameters;
@@ -16,7 +17,7 @@ use crate::image::{GreyImage, Image};
 use crate::insight::report::data::{NamedAggregate, ReportData, StageTime, ViewLine};
 use crate::insight::report::{ReportImages, write_report};
 use crate::insight::scores::aggregate;
-use crate::insight::{coverage, memory};
+use crate::insight::{capture, coverage, memory};
 use crate::material::MaterialMaps;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -35,7 +36,8 @@ pub fn loss_rows(state: &FitState) -> Vec<LossRow> {
     state.losses.iter().map(row).collect()
 }
 
-/// Renders, scores and writes everything into the run folder; returns what the report says.
+/// Renders, scores and writes everything into the run folder; returns what the report says. What is wrong with the capture
+/// is told on the way, as events.
 pub fn write(
     fitter: &Fitter,
     mut prepared: Prepared,
@@ -43,14 +45,15 @@ pub fn write(
     folder: &RunFolder,
     began: Instant,
     stop: &AtomicBool,
-    tell: &dyn Fn(&str),
+    tell: &dyn Fn(Event),
 ) -> Result<ReportData> {
+    let finishing = |what: &str| tell(Event::Finishing(what.into()));
     let scene = fitter.scene().as_ref();
     let surface = fitter.surface().as_ref();
     let mut timings = std::mem::take(&mut prepared.timings);
     // The clock of the job began after these, and after earlier sessions of a resumed fit.
     let before_job: f64 = timings.iter().filter(|time| time.stage != "fit").map(|time| time.seconds).sum();
-    tell("maps");
+    finishing("maps");
     let training = views_of(fitter.view_uses(), ViewUse::Training);
     let times_seen =
         timed(&mut timings, "coverage", || coverage::times_seen_by(scene, surface, &training, settings.fit.map_size));
@@ -63,10 +66,17 @@ pub fn write(
     told.write(folder)?;
     folder.write_loss(&loss_rows(fitter.state()))?;
 
-    tell("pictures of the views");
+    finishing("pictures of the views");
     let own = parameters(&result.maps, &result.environment);
     let views = timed(&mut timings, "score views", || score_views(fitter, surface, &own, settings, stop))?;
-    tell("relit pictures");
+    finishing("look at the capture");
+    let capture = timed(&mut timings, "capture", || capture::check(fitter, stop));
+    crate::files::write_bytes(&folder.file(capture::table::FILE), capture::table::to_csv(&capture.views).as_bytes())?;
+    for finding in &capture.findings {
+        tell(Event::Finding(finding.clone()));
+    }
+    prepared.findings.extend(capture.findings);
+    finishing("relit pictures");
     let (relit, relit_errors) =
         timed(&mut timings, "relight", || relit_strips(fitter, surface, &own, &result, settings, stop))?;
     if stop.load(Ordering::Relaxed) {
@@ -77,6 +87,7 @@ pub fn write(
     let mut data = describe(fitter, &prepared, settings, &result, &covered);
     let transport = timed(&mut timings, "check of transport", || fitter.transport_error(stop));
     data.scene_facts.extend(told.facts(transport));
+    data.capture = capture.views;
     data.views = views
         .iter()
         .map(|view| {
@@ -102,7 +113,7 @@ pub fn write(
     data.timings = timings;
     data.peak_memory_bytes = memory::peak_bytes();
 
-    tell("report");
+    finishing("report");
     let truth = scene.truth.as_ref();
     let images = ReportImages {
         // What was left out is no evidence of how good the fit is: its scores are listed, its pictures are not shown.

@@ -235,7 +235,7 @@ impl Worker {
         self.save();
         prepared.timings.push(StageTime { stage: "fit".into(), seconds: self.fitter.state().seconds });
         let folder = self.saver.folder();
-        let tell = |what: &str| self.teller.send(Event::Finishing(what.into()));
+        let tell = |event: Event| self.teller.send(event);
         let data = outcome::write(&self.fitter, prepared, &self.settings, folder, self.began, &self.stop, &tell)?;
         self.teller.send(Event::Finished(Box::new(data)));
         Ok(())

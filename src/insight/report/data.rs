@@ -2,6 +2,7 @@
 
 use crate::error::{Finding, Severity};
 use crate::export::LossRow;
+use crate::insight::capture::ViewCapture;
 use crate::insight::intervals::IntervalCoverage;
 use crate::insight::scores::{AggregateScore, PictureScore, ViewScores};
 use crate::insight::truth::{EnvironmentErrors, MapErrors};
@@ -29,6 +30,8 @@ pub struct ReportData {
     pub loss_history: Vec<LossRow>,
     /// Scores of every view.
     pub views: Vec<ViewLine>,
+    /// What is wrong with the capture, in figures of the views that were looked at.
+    pub capture: Vec<ViewCapture>,
     /// Scores of many views together: `held-out views`, `training views`.
     pub aggregates: Vec<NamedAggregate>,
     /// Errors against a known truth; `None` for real photographs.

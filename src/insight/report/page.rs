@@ -15,6 +15,7 @@ pub fn html(data: &ReportData, images: &ReportImages) -> String {
         ("findings", "Findings", tables::findings(data)),
         ("views", "Photographs and fit", gallery::views(data, images)),
         ("scores", "Scores", scores(data)),
+        ("capture", "Capture", tables::capture(data)),
         ("relit", "Under other lights", gallery::relit(images)),
         ("maps", "Maps", gallery::maps(images)),
         ("light", "Light", gallery::light(images)),

@@ -3,6 +3,7 @@
 use super::data::{ReportData, TruthErrors};
 use super::number::{duration, escaped, fixed, percent, significant, whole};
 use crate::error::Severity;
+use crate::insight::capture::ViewCapture;
 use crate::insight::scores::{AggregateScore, PictureScore};
 use crate::insight::truth::ErrorPair;
 
@@ -184,6 +185,48 @@ pub fn views(data: &ReportData) -> String {
     head.extend(["gain", "clipped", "pixels", "not finite"]);
     let open = if rows.len() <= 16 { " open" } else { "" };
     format!("<details{open}><summary>Each view ({})</summary>{}</details>", rows.len(), table("scores", &head, &rows))
+}
+
+/// How each photo lies against the model's picture of it.
+pub fn capture(data: &ReportData) -> String {
+    if data.capture.is_empty() {
+        return empty("The photographs were not compared with the fitted model one by one.");
+    }
+    let with_error = |value: f64, error: f64, digits: usize| match value.is_finite() {
+        true => format!("{} <small>± {}</small>", fixed(value, digits), fixed(error, digits)),
+        false => "–".into(),
+    };
+    let share = |value: f64| if value.is_finite() { percent(value) } else { "–".into() };
+    let row = |own: &ViewCapture| {
+        vec![
+            escaped(&own.name),
+            with_error(own.shift_x_pixels, own.shift_error_pixels, 2),
+            with_error(own.shift_y_pixels, own.shift_error_pixels, 2),
+            with_error(own.roll_degrees, own.roll_error_degrees, 2),
+            with_error(own.gain, own.gain * own.gain_error, 3),
+            share(own.doubtful_mask_share),
+            share(own.unlike_share),
+        ]
+    };
+    let rows: Vec<Vec<String>> = data.capture.iter().map(row).collect();
+    let head = [
+        "view",
+        "right<small>pixels</small>",
+        "down<small>pixels</small>",
+        "roll<small>degrees</small>",
+        "gain",
+        "mask in doubt",
+        "unlike the model",
+    ];
+    let note = "<p class=note>How each photo lies against the fitted model's picture of it, with one standard error; the \
+                gain is what no fitted exposure explains. Maps are fitted to the same photos: where cameras are off, \
+                shifts are relative to what all of them show.</p>";
+    let open = if rows.len() <= 16 { " open" } else { "" };
+    format!(
+        "{note}<details{open}><summary>Each view ({})</summary>{}</details>",
+        rows.len(),
+        table("scores", &head, &rows)
+    )
 }
 
 /// Settings, the changed ones first and marked.

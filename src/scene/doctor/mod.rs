@@ -7,6 +7,7 @@
 //! | file | what it asks |
 //! |---|---|
 //! | [`geometry`] | is the mesh a surface: degenerate, duplicated, unreferenced parts; winding |
+//! | [`normals`] | do its normals belong to its triangles |
 //! | [`cameras`] | do the cameras look at the mesh, upright, not mirrored |
 //! | [`silhouette`] | do masks and mesh agree |
 //! | [`pixel_centre`], [`edge_profile`] | where do pixel centres lie in the intrinsics, to a hundredth of a pixel |
@@ -19,6 +20,7 @@ pub mod cameras;
 pub mod edge_profile;
 pub mod exposure;
 pub mod geometry;
+pub mod normals;
 pub mod overlay;
 pub mod pictures;
 pub mod pixel_centre;
@@ -117,6 +119,7 @@ pub fn check_with(scene: &Scene, bvh: &Bvh) -> Report {
         .map(|view| ViewCheck { name: view.name.clone(), held_out: view.held_out, ..Default::default() })
         .collect();
     geometry::check(scene, &probes, &mut report);
+    normals::check(scene, &mut report);
     cameras::check_sight(scene, &probes, &mut report);
     silhouette::check(scene, &probes, &mut report);
     pictures::check(scene, &probes, &mut report);
