@@ -1,5 +1,8 @@
 //! Maps under the light that was found: blocks, then tiles of blocks with their lobes, then all reflectances together.
 
+use super::choice::alternatives::TileAlternatives;
+use super::choice::apply::Undecided;
+use super::choice::check::Check;
 use super::diffuse::{self, DiffuseRow, Leaning};
 use super::estimate::Estimate;
 use super::lobe_evidence::LobePrior;
@@ -12,6 +15,7 @@ use crate::atlas::{dilate, nearest_covered};
 use crate::image::Image;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 /// Most observations of a block.
 const MOST_OBSERVATIONS: usize = 256;
@@ -24,6 +28,10 @@ const ITERATIONS: usize = 20;
 struct TileResult {
     tile: Tile,
     residuals: Vec<f32>,
+    /// With less, where that is judged.
+    alternatives: Option<TileAlternatives>,
+    /// Seconds of one processor until blocks were solved.
+    block_seconds: f64,
 }
 
 impl SolverScene {
@@ -32,14 +40,18 @@ impl SolverScene {
         let planes = self.transport.basis.planes(&estimate.light);
         let at_points = self.point_light(estimate, &planes);
         let round = self.round(estimate, &planes, &at_points);
+        let mut check = Check::begin(self, &at_points);
         let mut rows = vec![DiffuseRow::default(); self.observations.list.len()];
         let mut residuals = Vec::new();
         let mut made: Vec<Tile> = Vec::new();
+        let mut undecided: Vec<Undecided> = Vec::new();
         // Few tiles at a time: their terms are large.
         let tiles = self.tiles();
         for group in tiles.chunks(16) {
-            let results: Vec<TileResult> =
-                group.par_iter().map(|(first, blocks)| self.solve_tile(&round, *first, blocks, stop)).collect();
+            let results: Vec<TileResult> = group
+                .par_iter()
+                .map(|(first, blocks)| self.solve_tile(&round, *first, blocks, check.as_ref(), stop))
+                .collect();
             if stop.load(Ordering::Relaxed) {
                 return None;
             }
@@ -55,7 +67,23 @@ impl SolverScene {
                     };
                 }
                 result.tile.drop_pixels();
+                if let (Some(check), Some(mut alternatives)) = (&mut check, result.alternatives) {
+                    check.add(&alternatives, result.block_seconds, result.tile.seconds);
+                    if self.settings.apply_choices {
+                        undecided.push(Undecided::of(&mut alternatives, result.tile.one_lobe));
+                    }
+                }
                 made.push(result.tile);
+            }
+        }
+        let mut choices = match check {
+            Some(check) => Some(check.end(self, estimate, (&planes, &at_points), stop)?),
+            None => None,
+        };
+        if let Some(choices) = choices.as_mut().filter(|_| self.settings.apply_choices) {
+            choices.are_applied = true;
+            for (tile, undecided) in made.iter_mut().zip(&undecided) {
+                undecided.decide(choices, tile, &mut rows);
             }
         }
         let mut rho: Vec<[f32; 3]> = estimate.texels.iter().map(|texel| [texel[0], texel[1], texel[2]]).collect();
@@ -88,6 +116,7 @@ impl SolverScene {
             blocks: residuals.len(),
             light_unknowns: 0,
             view_errors: errors.of_views(&self.views),
+            choices,
         })
     }
 
@@ -103,7 +132,15 @@ impl SolverScene {
         tiles.into_iter().collect()
     }
 
-    fn solve_tile(&self, round: &Round, first: (usize, usize), blocks: &[&Block], stop: &AtomicBool) -> TileResult {
+    fn solve_tile(
+        &self,
+        round: &Round,
+        first: (usize, usize),
+        blocks: &[&Block],
+        check: Option<&Check>,
+        stop: &AtomicBool,
+    ) -> TileResult {
+        let began = Instant::now();
         let prior = open_prior(self.observations.mean, 1.0);
         let mut solved = Vec::with_capacity(blocks.len());
         for &block in blocks {
@@ -116,10 +153,12 @@ impl SolverScene {
                 solved.push((block, work));
             }
         }
+        let block_seconds = began.elapsed().as_secs_f64();
         let residuals = solved.iter().map(|(_, work)| work.solution.residual).collect();
         let mut tile = Tile::new(round, first, self.settings.map_size, solved);
         tile.solve(self.settings.map_size, self.observations.mean, self.settings.independence, &LobePrior::default());
-        TileResult { tile, residuals }
+        let alternatives = check.map(|check| check.of_tile(self, &mut tile));
+        TileResult { tile, residuals, alternatives, block_seconds }
     }
 
     /// Squared errors of the pixels that tiles used.
