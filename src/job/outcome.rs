@@ -13,6 +13,7 @@ use crate::fit::state::FitState;
 use crate::fit::views::views_of;
 use crate::fit::{Fitter, ViewUse};
 use crate::image::{GreyImage, Image};
+use crate::insight::report::choices::ChoiceTable;
 use crate::insight::report::data::{NamedAggregate, ReportData, StageTime, ViewLine};
 use crate::insight::report::{ReportImages, write_report};
 use crate::insight::scores::aggregate;
@@ -77,6 +78,7 @@ pub fn write(
     let mut data = describe(fitter, &prepared, settings, &result, &covered);
     let transport = timed(&mut timings, "check of transport", || fitter.transport_error(stop));
     data.scene_facts.extend(told.facts(transport));
+    data.choices = fitter.choices().map(|choices| ChoiceTable::of(choices));
     data.views = views
         .iter()
         .map(|view| {
@@ -114,6 +116,7 @@ pub fn write(
         environment: Some(&result.environment),
         truth_environment: truth.map(|truth| &truth.environment),
         relit,
+        choices: told.choice_map.as_deref(),
     };
     write_report(folder, &data, &images)?;
     Ok(data)
