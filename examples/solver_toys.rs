@@ -3,7 +3,9 @@
 //! `cargo run --release --no-default-features --example solver_toys -- FOLDER [name=value …]`
 //!
 //! Names are the fields of `SolverSettings`, and `light=truth` to fit the maps under the true light,
-//! `maps_steps` for the number of times that maps are made, `samples` a pixel for the pictures of the path tracer (0: none), `out` for a folder that takes maps and light. Seconds
+//! `choices=tell` to let views judge which freedoms are needed, `choices=apply` to take over what they chose, `held_out` to
+//! hold out every so many of them (0: none), `maps_steps` for the number of times that maps are made, `samples` a pixel for
+//! the pictures of the path tracer (0: none), `out` for a folder that takes maps and light. Seconds
 //! are the solver's own; scoring is left out.
 
 use glam::Vec3;
@@ -30,7 +32,8 @@ fn main() -> Result<()> {
         |name: &str| arguments.iter().find_map(|text| text.strip_prefix(&format!("{name}="))).map(str::to_string);
     let number = |name: &str, default: f64| value(name).and_then(|text| text.parse().ok()).unwrap_or(default);
     let count = |name: &str, default: usize| number(name, default as f64) as usize;
-    let scene = read(folder.as_ref(), &ReadSettings { hold_out_every: 0, ..ReadSettings::default() })?;
+    let scene =
+        read(folder.as_ref(), &ReadSettings { hold_out_every: count("held_out", 0), ..ReadSettings::default() })?;
     let Some(truth) = scene.truth.as_ref() else {
         return Err(Error::new(ErrorKind::InvalidScene, "the scene has no truth"));
     };
@@ -49,6 +52,8 @@ fn main() -> Result<()> {
         independence: number("independence", standard.independence),
         gauge_slack: number("gauge_slack", standard.gauge_slack),
         fixed_light: value("light").is_some(),
+        check_choices: value("choices").is_some(),
+        apply_choices: value("choices").is_some_and(|value| value == "apply"),
         seed: count("seed", 1) as u64,
         ..standard
     };
@@ -75,6 +80,9 @@ fn main() -> Result<()> {
             report.blocks,
             report.light_unknowns
         );
+        if let Some(choices) = &report.choices {
+            println!("{choices}");
+        }
     });
     // Maps again, with the kinds of surface that the first ones have shown.
     for _ in 1..count("maps_steps", 1) {

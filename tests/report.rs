@@ -7,6 +7,7 @@ use patina::export::{LossRow, RunFolder, RunResult};
 use patina::image::{Image, RgbImage};
 use patina::insight::capture::ViewCapture;
 use patina::insight::intervals::IntervalCoverage;
+use patina::insight::report::choices::{ChoiceRow, ChoiceTable};
 use patina::insight::report::data::*;
 use patina::insight::report::{RelitPicture, RelitStrip, ReportData, ReportImages, ViewPictures, write_report};
 use patina::insight::scores::{aggregate, score_view};
@@ -300,6 +301,12 @@ fn write_example(folder: &RunFolder, views: usize) -> ReportData {
             "The mean of the light over the sphere is kept at its start value; reflectance takes the rest.".into(),
         evidence_statement: "Background pixels were used as pictures of the light.".into(),
         non_finite: vec![NonFiniteCount { name: "gradient of roughness".into(), count: 3 }],
+        choices: Some(ChoiceTable {
+            lines: vec![ChoiceRow { name: "no lobe".into(), share: Some(0.7), rmse: Some(0.04), ..Default::default() }],
+            views: 4,
+            pixels: 7273,
+            ..ChoiceTable::default()
+        }),
         texels: TexelCounts { seen: 201_331, unseen: 24_001 },
     };
     let relit = ["noon_grass_1k", "venice_sunset_1k"].map(|light| RelitStrip {
@@ -322,6 +329,7 @@ fn write_example(folder: &RunFolder, views: usize) -> ReportData {
         environment: Some(&fitted_light),
         truth_environment: Some(&true_light),
         relit: relit.into(),
+        choices: None,
     };
     result.write(folder).unwrap();
     write_report(folder, &data, &images).unwrap();
@@ -343,7 +351,7 @@ fn a_full_report_holds_every_section_in_one_file() {
     let folder = RunFolder::create(kept.as_ref().map_or(parent.path(), Path::new)).unwrap();
     let data = write_example(&folder, 10);
     let html = std::fs::read_to_string(folder.report_html_path()).unwrap();
-    for id in ["findings", "views", "scores", "relit", "maps", "light", "loss", "run"] {
+    for id in ["findings", "views", "scores", "relit", "maps", "light", "choices", "loss", "run"] {
         assert!(html.contains(&format!("<section id={id}>")), "{id}");
     }
     for text in [

@@ -164,6 +164,14 @@ fn the_job_shows_each_step_and_leaves_a_whole_run() {
     for name in ["diffuse_deviation.exr", "specular_deviation.exr", "roughness_deviation.exr"] {
         assert!(folder.file(name).is_file(), "{name}");
     }
+    // One view is held out, which has no standard error: training views judge, withheld from that alone.
+    let choices = data.choices.as_ref().unwrap();
+    assert!(choices.are_withheld && choices.views == 2 && choices.lines.len() == 5, "{choices:?}");
+    assert_eq!(choices.lines.iter().filter_map(|line| line.share).sum::<f64>().round(), 1.0);
+    let codes = folder.read_choices().unwrap().unwrap();
+    assert!(codes.pixels().iter().all(|code| [0.0, 1.0, 2.0, 3.0].contains(code)));
+    let told: patina::insight::ReportData = folder.read_report_json().unwrap();
+    assert_eq!(told.choices.as_ref(), Some(choices));
     assert_eq!(folder.read_loss().unwrap().len(), 5);
     assert_eq!(folder.read_settings::<RunSettings>().unwrap().fit, base());
 }

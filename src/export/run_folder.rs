@@ -8,6 +8,7 @@
 //! | `diffuse.exr specular.exr roughness.exr seen.exr env.exr mesh.obj` | the result | `patina fit`, at its end |
 //! | `diffuse_deviation.exr specular_deviation.exr roughness_deviation.exr` | standard deviations of the maps given the light | `patina fit --method solver`, at its end |
 //! | `lobe_sharing.exr` | number of texels that share a texel's lobe, 0 where no pixel shows the texel best | the same |
+//! | `choices.exr` | what views that took no part chose: 1 no lobe, 2 one lobe a region, 3 lobes of their own; 0 where less than two judge | the same, unless resumed after its maps |
 //! | `environment_evidence.exr` | what a texel of the light is known by: highlights (red), background (green), diffuse light and shadows (blue); the rest to 1 is belief | the same, unless resumed after its rounds |
 //! | `light_scale.json` | how far photos leave the factor open that light and reflectance have in common: `relative_deviation`, null where they say nothing | the same |
 //! | `loss.csv` | the loss of every step | `patina fit` |
@@ -176,6 +177,22 @@ impl RunFolder {
         file::write_exr_grey(&self.file(LOBE_SHARING_FILE), sharing)
     }
 
+    /// Writes what judging views chose for each texel.
+    ///
+    /// # Errors
+    /// Files that cannot be written.
+    pub fn write_choices(&self, choices: &GreyImage) -> Result<()> {
+        file::write_exr_grey(&self.file(CHOICES_FILE), choices)
+    }
+
+    /// Reads what judging views chose for each texel; `None` where a run does not say.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn read_choices(&self) -> Result<Option<GreyImage>> {
+        self.file(CHOICES_FILE).is_file().then(|| self.read_grey(CHOICES_FILE)).transpose()
+    }
+
     /// Reads standard deviations of the maps; `None` where a run has none.
     ///
     /// # Errors
@@ -302,6 +319,8 @@ const DEVIATION_FILES: [&str; 3] = ["diffuse_deviation.exr", "specular_deviation
 const LIGHT_EVIDENCE_FILE: &str = "environment_evidence.exr";
 /// How far photos leave the scale of the light open.
 const LIGHT_SCALE_FILE: &str = "light_scale.json";
+/// What judging views chose for each texel, where the solver was judged.
+const CHOICES_FILE: &str = "choices.exr";
 /// Number of texels that share each texel's lobe, where the solver made them.
 const LOBE_SHARING_FILE: &str = "lobe_sharing.exr";
 

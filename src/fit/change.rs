@@ -13,7 +13,7 @@ use super::views::{ViewUse, training_views, uses_of};
 use crate::error::{Error, ErrorKind, Place, Result};
 
 /// Settings that cannot change: shapes, random numbers and the order of stages hang on them.
-const FIXED: [&str; 10] = [
+const FIXED: [&str; 11] = [
     "seed",
     "method",
     "map-size",
@@ -21,6 +21,7 @@ const FIXED: [&str; 10] = [
     "levels",
     "steps",
     "start",
+    "solver-choices",
     "solver-rounds",
     "solver-grid",
     "solver-levels",

@@ -294,6 +294,7 @@ mod tests {
             "map-size",
             "method",
             "seed",
+            "solver-choices",
             "solver-grid",
             "solver-levels",
             "solver-rounds",

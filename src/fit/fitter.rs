@@ -12,8 +12,8 @@ use super::gauge::GaugeRule;
 use super::held_out::held_out_targets;
 use super::schedule::{Stage, stages};
 use super::settings::{FitSettings, Start};
-use super::solver::SolverScene;
 use super::solver::light_evidence::LightKnown;
+use super::solver::{Choices, SolverScene};
 use super::start;
 use super::state::{FitState, LossRow};
 use super::targets::{Target, targets};
@@ -55,6 +55,8 @@ pub struct Fitter {
     pub(super) solver: Option<SolverScene>,
     /// What the solver's light is known by; of nothing under Adam and before its first round on the light.
     pub(super) light_known: LightKnown,
+    /// What judging views say of the model's freedoms; `None` under Adam and before the maps of full size.
+    pub(super) choices: Option<Arc<Choices>>,
 }
 
 impl Fitter {
@@ -150,6 +152,7 @@ impl Fitter {
             work: None,
             solver: None,
             light_known: LightKnown::default(),
+            choices: None,
         })
     }
 

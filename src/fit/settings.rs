@@ -1,5 +1,6 @@
 //! Every choice of a fit, once: the command line, the settings file and the window read this structure.
 
+use super::solver::settings::Choosing;
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::render::first_hits::PixelFilter;
 use serde::{Deserialize, Serialize};
@@ -160,6 +161,9 @@ pub struct FitSettings {
     /// first, then made better. A size with maps below 128 x 128 texels is left out.
     #[arg(long, default_value_t = FitSettings::default().solver_levels)]
     pub solver_levels: usize,
+    /// Whether views that took no part judge what lobes, light between surfaces and the light's resolution bought.
+    #[arg(long, value_enum, default_value_t)]
+    pub solver_choices: Choosing,
     /// Optimiser steps after the solver's maps, on all maps and the light, by the gradient of whole paths: for photos of
     /// real places, whose edges, background and geometry the solver's model does not carry. Where its model holds, they
     /// make maps worse.
@@ -205,6 +209,7 @@ impl Default for FitSettings {
             solver_rounds: 8,
             solver_grid: 256,
             solver_levels: 2,
+            solver_choices: Choosing::Tell,
             solver_polish: 0,
             held_out_interval: 10,
             exclude: Vec::new(),

@@ -7,13 +7,14 @@
 use super::fitter::{Fitter, StepOutcome};
 use super::schedule::{Stage, StageKind};
 use super::settings::Method;
-use super::solver::{Estimate, SolverScene, SolverSettings, SolverStep, StepReport, TransportError};
+use super::solver::{Choices, Estimate, SolverScene, SolverSettings, SolverStep, StepReport, TransportError};
 use super::state::LossRow;
 use super::targets::targets;
 use crate::error::Result;
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::material::MaterialMaps;
 use glam::Vec3;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -26,7 +27,8 @@ impl Fitter {
         let began = Instant::now();
         let whole = SolverSettings::of(&self.settings);
         let grid = (whole.grid >> stage.photo_level).max(LEAST_GRID);
-        let settings = SolverSettings { map_size: stage.map_size, grid, ..whole };
+        let check_choices = whole.check_choices && stage.photo_level == 0;
+        let settings = SolverSettings { map_size: stage.map_size, grid, check_choices, ..whole };
         if self.solver.as_ref().is_some_and(|solver| solver.settings.map_size != settings.map_size) {
             self.solver = None;
         }
@@ -46,9 +48,12 @@ impl Fitter {
         let held_out = report.as_ref().map(|_| solver.held_out_rmse(&self.scene, &estimate));
         self.take_estimate(&solver, estimate);
         self.solver = Some(solver);
-        let (Some(report), Some((held_out_rmse, of_views))) = (report, held_out) else {
+        let (Some(mut report), Some((held_out_rmse, of_views))) = (report, held_out) else {
             return Ok(StepOutcome::Interrupted);
         };
+        if let Some(choices) = report.choices.take() {
+            self.choices = Some(Arc::new(choices));
+        }
         self.figures.keep_errors(&report.view_errors);
         self.figures.keep_errors(&of_views);
         self.state.seconds += began.elapsed().as_secs_f64();
@@ -101,6 +106,13 @@ impl Fitter {
     /// [`LightKnown`](super::solver::light_evidence::LightKnown). `None` as for [`Self::light_evidence`].
     pub fn light_scale_deviation(&self) -> Option<f64> {
         (!self.light_known.shares.is_empty()).then_some(self.light_known.scale_deviation)
+    }
+
+    /// What views that took no part say of the model's freedoms: which are needed where, what they bought and what they
+    /// cost. `None` unless the maps of full size were made since the fit was started or taken up, and where less than two
+    /// views can judge.
+    pub fn choices(&self) -> Option<&Arc<Choices>> {
+        self.choices.as_ref()
     }
 
     /// Number of texels that share a texel's lobe, as an image: the mean over all ways to cut the surface into regions,

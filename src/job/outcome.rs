@@ -14,6 +14,7 @@ use crate::fit::state::FitState;
 use crate::fit::views::views_of;
 use crate::fit::{Fitter, ViewUse};
 use crate::image::{GreyImage, Image};
+use crate::insight::report::choices::ChoiceTable;
 use crate::insight::report::data::{NamedAggregate, ReportData, StageTime, ViewLine};
 use crate::insight::report::{ReportImages, write_report};
 use crate::insight::scores::aggregate;
@@ -88,6 +89,7 @@ pub fn write(
     let transport = timed(&mut timings, "check of transport", || fitter.transport_error(stop));
     data.scene_facts.extend(told.facts(transport));
     data.capture = capture.views;
+    data.choices = fitter.choices().map(|choices| ChoiceTable::of(choices));
     data.views = views
         .iter()
         .map(|view| {
@@ -125,6 +127,7 @@ pub fn write(
         environment: Some(&result.environment),
         truth_environment: truth.map(|truth| &truth.environment),
         relit,
+        choices: told.choice_map.as_deref(),
     };
     write_report(folder, &data, &images)?;
     Ok(data)

@@ -20,6 +20,9 @@ pub struct SolverTold {
     pub deviations: Option<Arc<MaterialMaps>>,
     /// Number of texels that share a texel's lobe, 0 where none was found; known once the maps are made.
     pub lobe_sharing: Option<Arc<GreyImage>>,
+    /// By texel, what judging views chose: 1 no lobe, 2 one lobe a region, 3 lobes of their own; 0 where none judge. Known
+    /// once the maps are made.
+    pub choice_map: Option<Arc<GreyImage>>,
     /// What each texel of the light is known by: [`Fitter::light_evidence`].
     pub light_evidence: Option<Arc<RgbImage>>,
     /// How far photos leave the factor open that light and reflectance have in common, as a relative standard deviation:
@@ -33,6 +36,7 @@ impl SolverTold {
         SolverTold {
             deviations: fitter.deviations().map(Arc::new),
             lobe_sharing: fitter.lobe_sharing().map(Arc::new),
+            choice_map: fitter.choices().map(|choices| Arc::new(choices.map.clone())),
             light_evidence: fitter.light_evidence().map(Arc::new),
             light_scale_deviation: fitter.light_scale_deviation(),
         }
@@ -46,6 +50,7 @@ impl SolverTold {
         Ok(SolverTold {
             deviations: folder.read_deviations()?.map(Arc::new),
             lobe_sharing: folder.read_lobe_sharing()?.map(Arc::new),
+            choice_map: folder.read_choices()?.map(Arc::new),
             light_evidence: folder.read_light_evidence()?.map(Arc::new),
             light_scale_deviation: folder.read_light_scale_deviation()?,
         })
@@ -58,6 +63,9 @@ impl SolverTold {
         }
         if let Some(sharing) = &self.lobe_sharing {
             folder.write_lobe_sharing(sharing)?;
+        }
+        if let Some(choices) = &self.choice_map {
+            folder.write_choices(choices)?;
         }
         if let Some(shares) = &self.light_evidence {
             folder.write_light_evidence(shares)?;

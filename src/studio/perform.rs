@@ -160,6 +160,7 @@ fn perform_on_view(act: Act, model: &mut Model) {
         Act::LayerSpecularDeviation => edits.layer = Layer::SpecularDeviation,
         Act::LayerRoughnessDeviation => edits.layer = Layer::RoughnessDeviation,
         Act::LayerLobeSharing => edits.layer = Layer::LobeSharing,
+        Act::LayerChoice => edits.layer = Layer::Choice,
         Act::LayerPhotoError | Act::LayerCoverage | Act::LayerDisagreement => {
             edits.layer = match act {
                 Act::LayerPhotoError => Layer::PhotoError,

@@ -78,6 +78,7 @@ impl SolverScene {
             blocks: done.len(),
             light_unknowns: if self.settings.fixed_light { 0 } else { shape.count() },
             view_errors: errors.of_views(&self.views),
+            choices: None,
         })
     }
 

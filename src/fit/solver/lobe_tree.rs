@@ -50,12 +50,7 @@ pub fn beliefs(
     log_widths: &[f64; LOBE_WIDTHS],
     prior: &LobePrior,
 ) -> Vec<LobeBelief> {
-    let mut around = [0.0f64; 3];
-    for texel in texels {
-        for (sum, value) in around.iter_mut().zip(texel.colour) {
-            *sum += f64::from(value) / texels.len() as f64;
-        }
-    }
+    let around = mean_colour(texels);
     let alone = sums.iter().map(|sums| shared_lobe(sums, around, log_widths, prior)).collect();
     let tree = Tree { texels, sums, alone, around, log_widths, prior };
     let root = tree.grow((0..texels.len() as u32).collect(), (0, 0), side, true);
@@ -67,6 +62,30 @@ pub fn beliefs(
         }
     }
     made
+}
+
+/// What is believed of a lobe that all texels of a tile share, whatever the evidence for it.
+pub fn one_lobe(
+    texels: &[TreeTexel],
+    sums: &[LobeSumsOfGroup],
+    log_widths: &[f64; LOBE_WIDTHS],
+    prior: &LobePrior,
+) -> LobeBelief {
+    let mut all = LobeSumsOfGroup::default();
+    sums.iter().for_each(|sums| all.add(sums));
+    let mut belief = shared_lobe(&all, mean_colour(texels), log_widths, prior).1;
+    belief.square = std::array::from_fn(|k| (belief.square[k] - belief.mean[k] * belief.mean[k]).max(0.0));
+    belief
+}
+
+fn mean_colour(texels: &[TreeTexel]) -> [f64; 3] {
+    let mut mean = [0.0f64; 3];
+    for texel in texels {
+        for (sum, value) in mean.iter_mut().zip(texel.colour) {
+            *sum += f64::from(value) / texels.len() as f64;
+        }
+    }
+    mean
 }
 
 struct Tree<'a> {

@@ -1,5 +1,8 @@
 //! Maps under the light that was found: blocks, then tiles of blocks with their lobes, then all reflectances together.
 
+use super::choice::alternatives::TileAlternatives;
+use super::choice::apply::Undecided;
+use super::choice::check::Check;
 use super::diffuse::{self, DiffuseRow, Leaning};
 use super::estimate::Estimate;
 use super::lobe_evidence::LobePrior;
@@ -13,6 +16,7 @@ use crate::atlas::{dilate, nearest_covered};
 use crate::image::Image;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 /// Most observations of a block.
 const MOST_OBSERVATIONS: usize = 256;
@@ -25,6 +29,10 @@ const ITERATIONS: usize = 20;
 struct TileResult {
     tile: Tile,
     residuals: Vec<f32>,
+    /// With less, where that is judged.
+    alternatives: Option<TileAlternatives>,
+    /// Seconds of one processor until blocks were solved.
+    block_seconds: f64,
 }
 
 impl SolverScene {
@@ -34,14 +42,18 @@ impl SolverScene {
         let at_points = self.point_light(estimate, &planes);
         let round = self.round(estimate, &planes, &at_points);
         let prior = lobe_families::with_families_of(estimate);
+        let mut check = Check::begin(self, &at_points, &prior);
         let mut rows = vec![DiffuseRow::default(); self.observations.list.len()];
         let mut residuals = Vec::new();
         let mut made: Vec<Tile> = Vec::new();
+        let mut undecided: Vec<Undecided> = Vec::new();
         // Few tiles at a time: their terms are large.
         let tiles = self.tiles();
         for group in tiles.chunks(16) {
-            let results: Vec<TileResult> =
-                group.par_iter().map(|(first, blocks)| self.solve_tile(&round, *first, blocks, &prior, stop)).collect();
+            let results: Vec<TileResult> = group
+                .par_iter()
+                .map(|(first, blocks)| self.solve_tile(&round, *first, blocks, &prior, check.as_ref(), stop))
+                .collect();
             if stop.load(Ordering::Relaxed) {
                 return None;
             }
@@ -57,7 +69,23 @@ impl SolverScene {
                     };
                 }
                 result.tile.drop_pixels();
+                if let (Some(check), Some(mut alternatives)) = (&mut check, result.alternatives) {
+                    check.add(&alternatives, result.block_seconds, result.tile.seconds);
+                    if self.settings.apply_choices {
+                        undecided.push(Undecided::of(&mut alternatives, result.tile.one_lobe));
+                    }
+                }
                 made.push(result.tile);
+            }
+        }
+        let mut choices = match check {
+            Some(check) => Some(check.end(self, estimate, (&planes, &at_points), stop)?),
+            None => None,
+        };
+        if let Some(choices) = choices.as_mut().filter(|_| self.settings.apply_choices) {
+            choices.are_applied = true;
+            for (tile, undecided) in made.iter_mut().zip(&undecided) {
+                undecided.decide(choices, tile, &mut rows);
             }
         }
         let mut rho: Vec<[f32; 3]> = estimate.texels.iter().map(|texel| [texel[0], texel[1], texel[2]]).collect();
@@ -90,6 +118,7 @@ impl SolverScene {
             blocks: residuals.len(),
             light_unknowns: 0,
             view_errors: errors.of_views(&self.views),
+            choices,
         })
     }
 
@@ -111,8 +140,10 @@ impl SolverScene {
         first: (usize, usize),
         blocks: &[&Block],
         lobes: &LobePrior,
+        check: Option<&Check>,
         stop: &AtomicBool,
     ) -> TileResult {
+        let began = Instant::now();
         let prior = open_prior(self.observations.mean, 1.0);
         let mut solved = Vec::with_capacity(blocks.len());
         for &block in blocks {
@@ -125,10 +156,12 @@ impl SolverScene {
                 solved.push((block, work));
             }
         }
+        let block_seconds = began.elapsed().as_secs_f64();
         let residuals = solved.iter().map(|(_, work)| work.solution.residual).collect();
         let mut tile = Tile::new(round, first, self.settings.map_size, solved);
         tile.solve(self.settings.map_size, self.observations.mean, self.settings.independence, lobes);
-        TileResult { tile, residuals }
+        let alternatives = check.map(|check| check.of_tile(self, &mut tile));
+        TileResult { tile, residuals, alternatives, block_seconds }
     }
 
     /// Squared errors of the pixels that tiles used.

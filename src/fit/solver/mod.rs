@@ -13,15 +13,17 @@
 //! 5. [`maps`]: block by block, then in tiles ([`tile`]) with the footprints of pixels, where the evidence decides which
 //!    texels share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_widths`], [`lobe_families`]), then [`mod@diffuse`]: all diffuse texels
 //!    together.
-//! 6. [`solver`]: the steps in their order. A fit does them one by one, as [`crate::fit::Fitter`] does those of Adam: on
+//! 6. [`choice`]: views that took no part say what lobes, light between surfaces and the light's resolution bought.
+//! 7. [`solver`]: the steps in their order. A fit does them one by one, as [`crate::fit::Fitter`] does those of Adam: on
 //!    photos and maps of half size first, whose light and maps the full size begins from ([`crate::fit::schedule`]).
-//! 7. [`transport_check`]: how far its model is from the path tracer's, once it is done.
+//! 8. [`transport_check`]: how far its model is from the path tracer's, once it is done.
 //!
-//! What it refuses to do: it does not judge itself. Its model is the cache; pictures and scores are made by the path
+//! What it refuses to do: it does not score itself. Its model is the cache; pictures and scores are made by the path
 //! tracer. It knows nothing of threads that watch it, nor of files.
 
 pub mod block;
 mod cell_sums;
+pub mod choice;
 pub mod diffuse;
 pub mod eliminate;
 pub mod estimate;
@@ -49,6 +51,7 @@ pub mod transport_check;
 #[cfg(test)]
 mod tests;
 
+pub use choice::Choices;
 pub use estimate::Estimate;
 pub use report::StepReport;
 pub use scene::SolverScene;

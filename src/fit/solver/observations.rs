@@ -73,7 +73,8 @@ impl Observations {
     }
 }
 
-fn of_view(scene: &Scene, target: &Target, index: u32, footprints: &ViewFootprints) -> Vec<Observation> {
+/// The observations of one view, in the order of its shading points.
+pub(super) fn of_view(scene: &Scene, target: &Target, index: u32, footprints: &ViewFootprints) -> Vec<Observation> {
     let mut made = Vec::new();
     for (point_index, point) in footprints.points.iter().enumerate() {
         if point.share < 0.999 {

@@ -1,6 +1,7 @@
 //! What a step of the solver did, for the curve and for whoever watches.
 
 use super::block::PixelTerms;
+use super::choice::Choices;
 use super::estimate::Estimate;
 use super::round::{BlockWork, Round};
 use super::scene::SolverScene;
@@ -20,6 +21,8 @@ pub struct StepReport {
     pub light_unknowns: usize,
     /// Root mean squared error of views, by index in the scene.
     pub view_errors: Vec<(usize, f32)>,
+    /// What judging views say of the model's freedoms; only where maps were made and that was asked for.
+    pub choices: Option<Choices>,
 }
 
 /// Squared errors, view by view.

@@ -1,6 +1,6 @@
 //! A scene made ready for the solver: all that follows from photos, geometry and settings and never changes in a fit.
 
-use super::observations::Observations;
+use super::observations::{Observation, Observations, of_view};
 use super::plan::{self, Block};
 use super::settings::SolverSettings;
 use crate::error::{Error, ErrorKind, Result};
@@ -62,6 +62,8 @@ pub struct SolverScene {
     pub map_blocks: Vec<Block>,
     /// Views that judge, with their footprints.
     pub held_out: Vec<(Target, ViewFootprints)>,
+    /// The pixels of the views that judge, where [`SolverSettings::check_choices`] asks for them.
+    pub held_out_pixels: Vec<Vec<Observation>>,
 }
 
 impl SolverScene {
@@ -110,6 +112,15 @@ impl SolverScene {
         } else {
             Vec::new()
         };
+        let held_out: Vec<(Target, ViewFootprints)> = held_out.iter().cloned().zip(judged).collect();
+        let held_out_pixels = if settings.check_choices {
+            let pixels = |(index, (target, footprints)): (usize, &(Target, ViewFootprints))| {
+                of_view(scene, target, index as u32, footprints)
+            };
+            held_out.iter().enumerate().map(pixels).collect()
+        } else {
+            Vec::new()
+        };
         let gauge = gauge(&transport, &footprints, &observations);
         let blocks = |(side, cell)| plan::blocks(&observations, &transport.grid, settings.map_size, side, cell);
         Ok(Some(SolverScene {
@@ -123,7 +134,8 @@ impl SolverScene {
             observations,
             background,
             gauge,
-            held_out: held_out.iter().cloned().zip(judged).collect(),
+            held_out,
+            held_out_pixels,
         }))
     }
 

@@ -1,6 +1,20 @@
 //! What can be chosen in the solver.
 
 use crate::fit::settings::{BackgroundEvidence, FitSettings};
+use serde::{Deserialize, Serialize};
+
+/// What becomes of what views that took no part say of the model's freedoms, see [`super::choice`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Choosing {
+    /// They are not asked.
+    Off,
+    /// The report says it; maps stay as the evidence of the pixels made them.
+    #[default]
+    Tell,
+    /// Maps take it over: regions without a lobe that is borne out lose it, others share one.
+    Apply,
+}
 
 /// Settings of the solver.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,6 +54,11 @@ pub struct SolverSettings {
     pub use_background: bool,
     /// Keep the light as it is.
     pub fixed_light: bool,
+    /// Let views that took no part judge what lobes, light between surfaces and the light's resolution bought, when maps
+    /// are made.
+    pub check_choices: bool,
+    /// Let the maps take over what those views chose.
+    pub apply_choices: bool,
     /// Seed of all random choices.
     pub seed: u64,
 }
@@ -57,6 +76,8 @@ impl SolverSettings {
             exposure: settings.exposure,
             use_background: settings.background == BackgroundEvidence::Use,
             fixed_light: settings.fixed_light,
+            check_choices: settings.solver_choices != Choosing::Off,
+            apply_choices: settings.solver_choices == Choosing::Apply,
             seed: settings.seed,
             ..SolverSettings::default()
         }
@@ -82,6 +103,8 @@ impl Default for SolverSettings {
             exposure: false,
             use_background: true,
             fixed_light: false,
+            check_choices: false,
+            apply_choices: false,
             seed: 1,
         }
     }

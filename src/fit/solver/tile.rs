@@ -6,9 +6,10 @@
 use super::block::PixelTerms;
 use super::cell_sums::System;
 use super::lobe_evidence::{LobeBelief, LobePrior, LobeSumsOfGroup};
-use super::lobe_tree::{TreeTexel, beliefs};
+use super::lobe_tree::{TreeTexel, beliefs, one_lobe};
 use super::lobe_widths::{LOBE_WIDTHS, WidthStencil, weighed_log_widths, weighed_stencils};
 use super::round::{BlockWork, Round, log_widths};
+use std::time::Instant;
 
 /// Texels along a tile's side.
 pub const TILE: usize = 32;
@@ -36,17 +37,19 @@ const UNSEEN_WIDTH: f64 = 20.0;
 const MODEL_ERROR: [f64; 3] = [0.05, 0.01, 0.05];
 
 /// A pixel of a tile.
-struct TilePixel {
-    terms: PixelTerms,
+pub(super) struct TilePixel {
+    pub(super) terms: PixelTerms,
     /// First and last but one width whose terms are set.
     nodes: (usize, usize),
     texel: usize,
-    observation: u32,
-    clipped: bool,
+    pub(super) observation: u32,
+    pub(super) clipped: bool,
     /// Where its taps lie.
     taps: std::ops::Range<usize>,
     /// What its lobe sends.
-    lobe: [f32; 3],
+    pub(super) lobe: [f32; 3],
+    /// Takes no part: it judges.
+    pub(super) withheld: bool,
 }
 
 /// A tile at work.
@@ -60,11 +63,27 @@ pub struct Tile {
     pub lobes: Vec<LobeBelief>,
     /// Variance of diffuse reflectance.
     pub variance: Vec<[f32; 3]>,
-    pixels: Vec<TilePixel>,
+    /// What would be believed of one lobe that the whole tile shares.
+    pub one_lobe: LobeBelief,
+    /// Seconds of one processor that sums over pixels took, and the beliefs from them.
+    pub seconds: [f64; 2],
+    pub(super) pixels: Vec<TilePixel>,
     taps: Vec<(u32, f32)>,
     /// Place of each texel of the square in `texels`, or `u32::MAX`.
     local: Vec<u32>,
-    noise: f64,
+    pub(super) noise: f64,
+}
+
+/// Least variance of the noise, in squared radiance.
+pub(super) fn least_noise(mean_radiance: f32) -> f64 {
+    (LEAST_NOISE * f64::from(mean_radiance).max(1e-6)).powi(2)
+}
+
+/// By how much the squared residual of a pixel of this radiance is forgiven for its brightness, in (0, 1].
+pub(super) fn forgiven(radiance: &[f32; 3], mean_radiance: f32) -> f32 {
+    let bright = RELATIVE_NOISE * (radiance[0] + radiance[1] + radiance[2]) / 3.0;
+    let mean = mean_radiance.max(1e-6);
+    mean * mean / (mean * mean + bright * bright)
 }
 
 impl Tile {
@@ -122,6 +141,7 @@ impl Tile {
                     clipped: observation.clipped,
                     taps: start..tile.taps.len(),
                     lobe: [0.0; 3],
+                    withheld: false,
                 });
             }
         }
@@ -158,7 +178,7 @@ impl Tile {
         self.taps = Vec::new();
     }
 
-    fn set_lobes(&mut self) {
+    pub(super) fn set_lobes(&mut self) {
         let widths = log_widths();
         for pixel in &mut self.pixels {
             let mean = &self.lobes[pixel.texel].mean;
@@ -173,12 +193,12 @@ impl Tile {
         self.taps[pixel.taps.clone()].iter().map(|&(texel, weight)| weight * self.rho[texel as usize][c]).sum()
     }
 
-    fn residual(&self, pixel: &TilePixel) -> [f32; 3] {
+    pub(super) fn residual(&self, pixel: &TilePixel) -> [f32; 3] {
         [0, 1, 2].map(|c| pixel.terms.radiance[c] - pixel.lobe[c] - pixel.terms.arriving[c] * self.under(pixel, c))
     }
 
     /// Gauss and Seidel over the texels, leaning weakly on what they were.
-    fn solve_diffuse(&mut self) {
+    pub(super) fn solve_diffuse(&mut self) {
         let mut of_texel: Vec<Vec<(u32, f32)>> = vec![Vec::new(); self.texels.len()];
         for (index, pixel) in self.pixels.iter().enumerate() {
             for &(texel, weight) in &self.taps[pixel.taps.clone()] {
@@ -214,12 +234,8 @@ impl Tile {
     }
 
     /// Weights of the pixels by how well they fit (Cauchy), and the noise.
-    fn weigh(&mut self, mean_radiance: f32) {
-        let scale_of = |terms: &PixelTerms| {
-            let bright = RELATIVE_NOISE * (terms.radiance[0] + terms.radiance[1] + terms.radiance[2]) / 3.0;
-            let mean = mean_radiance.max(1e-6);
-            mean * mean / (mean * mean + bright * bright)
-        };
+    pub(super) fn weigh(&mut self, mean_radiance: f32) {
+        let scale_of = |terms: &PixelTerms| forgiven(&terms.radiance, mean_radiance);
         let squared: Vec<f32> = self
             .pixels
             .iter()
@@ -228,14 +244,23 @@ impl Tile {
                 scale_of(&pixel.terms) * (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]) / 3.0
             })
             .collect();
-        let mut sorted = squared.clone();
+        let taking_part = squared.iter().zip(&self.pixels).filter(|(_, pixel)| !pixel.withheld);
+        let mut sorted: Vec<f32> = taking_part.map(|(&square, _)| square).collect();
+        let least = least_noise(mean_radiance);
         let middle = sorted.len() / 2;
+        if sorted.is_empty() {
+            self.noise = least;
+            return;
+        }
         let median = *sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
-        let least = (LEAST_NOISE * f64::from(mean_radiance).max(1e-6)).powi(2);
         let (mut sum, mut count) = (0.0f64, 0.0f64);
         for index in 0..self.pixels.len() {
             let darker = self.residual(&self.pixels[index]).iter().all(|&e| e > 0.0);
             let pixel = &mut self.pixels[index];
+            if pixel.withheld {
+                pixel.terms.weight = 0.0;
+                continue;
+            }
             let robust = 1.0 / (1.0 + squared[index] / (TOLERANCE * median + least as f32));
             // A clipped pixel says nothing until the model is darker than it.
             pixel.terms.weight = if pixel.clipped && !darker { 0.0 } else { robust * scale_of(&pixel.terms) };
@@ -249,7 +274,8 @@ impl Tile {
         self.noise = (sum / freedom.max(1e-9)).max(least);
     }
 
-    fn solve_lobes(&mut self, map_size: usize, independence: f64, prior: &LobePrior) {
+    pub(super) fn solve_lobes(&mut self, map_size: usize, independence: f64, prior: &LobePrior) {
+        let began = Instant::now();
         let scale = independence / self.noise;
         let count = self.texels.len();
         let widths = weighed_log_widths();
@@ -296,7 +322,11 @@ impl Tile {
                 colour,
             })
             .collect();
+        self.seconds[0] += began.elapsed().as_secs_f64();
+        let began = Instant::now();
+        self.one_lobe = one_lobe(&texels, &sums, &widths, prior);
         self.lobes = beliefs(&texels, &sums, TILE, &widths, prior);
+        self.seconds[1] += began.elapsed().as_secs_f64();
         for (LobeBelief { mean, square, .. }, rho) in self.lobes.iter_mut().zip(&self.rho) {
             for c in 0..3 {
                 square[c] += (MODEL_ERROR[0] * mean[c]).powi(2) + (MODEL_ERROR[1] * f64::from(rho[c])).powi(2);

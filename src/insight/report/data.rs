@@ -4,6 +4,7 @@ use crate::error::{Finding, Severity};
 use crate::export::LossRow;
 use crate::insight::capture::ViewCapture;
 use crate::insight::intervals::IntervalCoverage;
+use crate::insight::report::choices::ChoiceTable;
 use crate::insight::scores::{AggregateScore, PictureScore, ViewScores};
 use crate::insight::truth::{EnvironmentErrors, MapErrors};
 use serde::{Deserialize, Serialize};
@@ -42,6 +43,8 @@ pub struct ReportData {
     pub evidence_statement: String,
     /// Numbers that were not finite, by name of the quantity. An empty list means none was found.
     pub non_finite: Vec<NonFiniteCount>,
+    /// What views that took no part say of the model's freedoms; `None` where none were asked.
+    pub choices: Option<ChoiceTable>,
     /// Texels of the atlas that some photograph sees, and that none does.
     pub texels: TexelCounts,
 }

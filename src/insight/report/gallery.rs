@@ -17,7 +17,7 @@ const MOST_RELIT_LIGHTS: usize = 12;
 const MOST_RELIT_PICTURES: usize = 6;
 
 /// Width of a map on the page in pixels.
-const MAP_WIDTH: usize = 640;
+pub(super) const MAP_WIDTH: usize = 640;
 
 /// Encodes pictures at the first of [`SIZES`] at which `parts` stay below `most_bytes` together, in their order.
 ///
@@ -128,7 +128,7 @@ fn ramp(low: &str, high: &str) -> String {
     )
 }
 
-fn chip([r, g, b]: [u8; 3], meaning: &str) -> String {
+pub(super) fn chip([r, g, b]: [u8; 3], meaning: &str) -> String {
     format!("<span class=scale><i class=chip style='background:rgb({r},{g},{b})'></i><span>{meaning}</span></span>")
 }
 
@@ -203,7 +203,7 @@ pub fn relit(images: &ReportImages) -> String {
     html
 }
 
-fn figure(image: &str, caption: &str) -> String {
+pub(super) fn figure(image: &str, caption: &str) -> String {
     format!("<figure>{image}<figcaption>{caption}</figcaption></figure>")
 }
 

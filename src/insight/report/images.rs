@@ -23,6 +23,8 @@ pub struct ReportImages<'a> {
     pub truth_environment: Option<&'a Environment>,
     /// Pictures under other lights.
     pub relit: Vec<RelitStrip>,
+    /// What judging views chose for each texel, see [`super::choices`].
+    pub choices: Option<&'a GreyImage>,
 }
 
 /// A photograph and its fit.

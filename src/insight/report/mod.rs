@@ -1,12 +1,13 @@
 //! One page that shows what a fit found and how good it is: `report.html`, with its numbers in `report.json`.
 //!
 //! Read [`data`] for what is shown, [`images`] for the pictures that come with it, `page` for the order of the
-//! sections, `gallery`, `curves` and `tables` fill them. [`picture`] makes bytes on a screen of linear pixels, [`number`] makes text of numbers.
+//! sections, `gallery`, `curves`, [`choices`] and `tables` fill them. [`picture`] makes bytes on a screen of linear pixels, [`number`] makes text of numbers.
 //!
 //! The page is one file that works offline: pictures are embedded, there is no script, and it follows the reader's
 //! choice of light or dark. It stays below about 15 MB whatever the number of views. Every section that is empty says
 //! why. What it refuses to do: it computes no score (that is [`super::scores`]) and hides no number that is not finite.
 
+pub mod choices;
 mod curves;
 pub mod data;
 mod gallery;

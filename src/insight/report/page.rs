@@ -3,7 +3,7 @@
 use super::data::ReportData;
 use super::images::ReportImages;
 use super::number::{duration, escaped, fixed, memory, percent, significant, whole};
-use super::{curves, gallery, tables};
+use super::{choices, curves, gallery, tables};
 use crate::error::Severity;
 use crate::insight::plot;
 
@@ -19,6 +19,7 @@ pub fn html(data: &ReportData, images: &ReportImages) -> String {
         ("relit", "Under other lights", gallery::relit(images)),
         ("maps", "Maps", gallery::maps(images)),
         ("light", "Light", gallery::light(images)),
+        ("choices", "What the scene needs", choices::section(data.choices.as_ref(), images.choices)),
         ("loss", "Loss", curves::loss(&data.loss_history)),
         ("run", "Run", run(data)),
     ];

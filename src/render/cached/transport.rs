@@ -14,6 +14,7 @@ use crate::render::Surface;
 use glam::Vec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 /// How fine the cache is. Its error against the path tracer falls as these rise.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +50,8 @@ pub struct CachedTransport {
     pub visibility: Visibility,
     /// What each point sees of other points; `None` for direct light only.
     pub bounces: Option<BounceMatrix>,
+    /// Seconds that tracing what points see of other points took.
+    pub bounce_seconds: f64,
     /// Share of light that lobes send back on average, without and with Schlick's factor, over log width.
     albedo: Vec<[f32; 2]>,
 }
@@ -77,10 +80,12 @@ impl CachedTransport {
         let basis = LightBasis::new(light_size.0, light_size.1);
         let grid = VisibilityGrid::new(surface, settings.grid);
         let visibility = Visibility::trace(surface, &grid, &basis, stop)?;
+        let began = Instant::now();
         let bounces = (settings.max_bounces > 1)
             .then(|| BounceMatrix::trace(surface, &grid, settings.bounce_rays, settings.seed, stop));
+        let bounce_seconds = began.elapsed().as_secs_f64();
         let albedo = lobe_albedo();
-        let made = CachedTransport { settings, basis, grid, visibility, bounces, albedo };
+        let made = CachedTransport { settings, basis, grid, visibility, bounces, bounce_seconds, albedo };
         (!stop.load(Ordering::Relaxed)).then_some(made)
     }
 

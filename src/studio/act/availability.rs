@@ -106,7 +106,8 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
         | Act::LayerDiffuseDeviation
         | Act::LayerSpecularDeviation
         | Act::LayerRoughnessDeviation
-        | Act::LayerLobeSharing => need(has_maps, "there are no maps yet: start a fit"),
+        | Act::LayerLobeSharing
+        | Act::LayerChoice => need(has_maps, "there are no maps yet: start a fit"),
         Act::FittedLight => need(has_maps, "there is no fitted light yet"),
         Act::ChartBorders => {
             need(project.is_some_and(|project| project.surface.is_some()), "the atlas is not made yet")

@@ -54,6 +54,7 @@ pub enum Act {
     LayerSpecularDeviation,
     LayerRoughnessDeviation,
     LayerLobeSharing,
+    LayerChoice,
     ExposureUp,
     ExposureDown,
     ExposureAuto,
@@ -230,6 +231,7 @@ pub const LIST: &[ActInfo] = &[
     info(Act::LayerSpecularDeviation, Group::View, "Uncertainty of specular", "Shows the standard deviation of each texel's specular reflectance given the light, as the solver tells it.", None),
     info(Act::LayerRoughnessDeviation, Group::View, "Uncertainty of roughness", "Shows the standard deviation of each texel's roughness given the light, as the solver tells it.", None),
     info(Act::LayerLobeSharing, Group::View, "Texels that share a lobe", "Shows how many texels the solver gave the same specular lobe.", None),
+    info(Act::LayerChoice, Group::View, "Lobes that are needed", "Shows what views that took no part in the solver's maps chose: no lobe, one a region, or lobes of their own.", None),
     info(Act::SurfaceLayers, Group::View, "Measure photo error", "Renders every photo again and spreads its error over the surface.", None),
 
     info(Act::ExposureUp, Group::Display, "Brighter", "Raises the exposure by a quarter of a stop.", key(Key::E)),

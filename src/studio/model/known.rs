@@ -21,11 +21,13 @@ pub enum Told {
     Roughness,
     /// Number of texels that share the texel's lobe.
     LobeSharing,
+    /// What judging views chose: 1 no lobe, 2 one lobe a region, 3 lobes of their own.
+    Choice,
 }
 
 impl Told {
     /// All of them.
-    pub const ALL: [Told; 4] = [Told::Diffuse, Told::Specular, Told::Roughness, Told::LobeSharing];
+    pub const ALL: [Told; 5] = [Told::Diffuse, Told::Specular, Told::Roughness, Told::LobeSharing, Told::Choice];
 }
 
 /// One number a texel, and the colour scale for it.
@@ -50,7 +52,7 @@ impl ToldLayer {
 #[derive(Default)]
 pub struct Known {
     told: SolverTold,
-    layers: [OnceLock<Option<ToldLayer>>; 4],
+    layers: [OnceLock<Option<ToldLayer>>; 5],
 }
 
 impl Known {
@@ -68,6 +70,7 @@ impl Known {
     pub fn has(&self, what: Told) -> bool {
         match what {
             Told::LobeSharing => self.told.lobe_sharing.is_some(),
+            Told::Choice => self.told.choice_map.is_some(),
             _ => self.told.deviations.is_some(),
         }
     }
@@ -82,6 +85,8 @@ impl Known {
         let mean = |image: &Image<Vec3>| image.map(|value| value.element_sum() / 3.0);
         let mut texels = match what {
             Told::LobeSharing => sharing?.clone(),
+            // Where nobody judges, nothing is known.
+            Told::Choice => self.told.choice_map.as_ref()?.map(|&code| if code > 0.0 { code } else { f32::NAN }),
             Told::Diffuse => mean(&self.told.deviations.as_ref()?.diffuse),
             Told::Specular => mean(&self.told.deviations.as_ref()?.specular),
             Told::Roughness => self.told.deviations.as_ref()?.roughness.clone(),
@@ -100,6 +105,9 @@ impl Known {
             return Some(ToldLayer { texels: Arc::new(texels), even, range: [1.0, high.max(2.0)] });
         }
         let texels = Arc::new(texels);
+        if what == Told::Choice {
+            return Some(ToldLayer { even: Arc::clone(&texels), texels, range: [1.0, 3.0] });
+        }
         Some(ToldLayer { even: Arc::clone(&texels), texels, range: [0.0, high] })
     }
 }
@@ -163,8 +171,8 @@ mod tests {
         let told = SolverTold {
             deviations: Some(Arc::new(deviations)),
             lobe_sharing: Some(Arc::new(sharing)),
-            light_evidence: None,
-            light_scale_deviation: None,
+            choice_map: Some(Arc::new(Image::from_pixels(4, 1, vec![0.0, 1.0, 2.0, 3.0]))),
+            ..SolverTold::default()
         };
         let known = Known::of(told);
         let diffuse = known.layer(Told::Diffuse).unwrap();
@@ -175,6 +183,9 @@ mod tests {
         assert_eq!(sharing.texels.pixels()[1..], [1.0, 8.0, 64.0]);
         assert_eq!(sharing.even.pixels()[1..], [0.0, 3.0, 6.0]);
         assert!(known.has(Told::Roughness) && known.layer(Told::Roughness).unwrap().range == [0.0, 0.25]);
+        let choice = known.layer(Told::Choice).unwrap();
+        assert!(choice.texels.pixels()[0].is_nan() && choice.texels.pixels()[1..] == [1.0, 2.0, 3.0]);
+        assert!(choice.range == [1.0, 3.0] && !choice.is_by_factors());
         let nothing = Known::default();
         assert!(Told::ALL.iter().all(|&what| !nothing.has(what) && nothing.layer(what).is_none()));
     }

@@ -28,7 +28,7 @@ enum Map {
 }
 
 impl Map {
-    const ALL: [(Map, &'static str, &'static str); 10] = [
+    const ALL: [(Map, &'static str, &'static str); 11] = [
         (Map::Diffuse, "Diffuse", "Diffuse reflectance, linear RGB"),
         (Map::Specular, "Specular", "Specular reflectance F0, linear RGB"),
         (Map::Roughness, "Roughness", "r, the square of the microfacet width"),
@@ -46,6 +46,11 @@ impl Map {
             Map::Told(Told::LobeSharing),
             "Shared lobe",
             "How many texels share a texel's lobe; hatched: taken over from neighbours",
+        ),
+        (
+            Map::Told(Told::Choice),
+            "Lobe needed",
+            "What judging views chose: 1 no lobe, 2 one for its region, 3 lobes of their own; hatched: none judge",
         ),
     ];
 }

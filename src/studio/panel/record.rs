@@ -187,11 +187,20 @@ fn uncertainty(model: &Model, (row, column): (usize, usize)) -> Vec<(&'static st
         (Told::Specular, "± specular", "Standard deviation given the light, mean of the channels"),
         (Told::Roughness, "± roughness", "Standard deviation given the light"),
         (Told::LobeSharing, "Shared lobe", "Texels that share this texel's specular lobe"),
+        (
+            Told::Choice,
+            "Lobe needed",
+            "What judging views chose: 1 no lobe, 2 one for its region, 3 lobes of their own",
+        ),
     ];
     let line = |(what, name, help): (Told, &'static str, &'static str)| {
         let texels = &project.known.layer(what)?.texels;
         let value = (row < texels.height() && column < texels.width()).then(|| texels[(row, column)])?;
-        let words = if value.is_nan() { "taken over from neighbours".into() } else { three_digits(value) };
+        let words = match what {
+            _ if !value.is_nan() => three_digits(value),
+            Told::Choice => "no view judges".into(),
+            _ => "taken over from neighbours".into(),
+        };
         Some((name, words, help))
     };
     named.into_iter().filter_map(line).collect()

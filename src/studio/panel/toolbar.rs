@@ -92,6 +92,7 @@ fn layers(ui: &mut Ui, model: &mut Model) {
         (Act::LayerSpecularDeviation, Layer::SpecularDeviation),
         (Act::LayerRoughnessDeviation, Layer::RoughnessDeviation),
         (Act::LayerLobeSharing, Layer::LobeSharing),
+        (Act::LayerChoice, Layer::Choice),
     ];
     let chosen = further.iter().find(|(_, layer)| *layer == model.edits.layer);
     let text = chosen.map_or("More", |(act, _)| act.name());

@@ -43,13 +43,15 @@ pub enum Layer {
     RoughnessDeviation,
     /// The quantity of the content: how many texels share a lobe.
     LobeSharing,
+    /// The quantity of the content: what judging views chose.
+    Choice,
     /// A checker of texture coordinates.
     Uv,
 }
 
 impl Layer {
     /// All layers with their names on screen.
-    pub const NAMED: [(Layer, &str); 14] = [
+    pub const NAMED: [(Layer, &str); 15] = [
         (Layer::Lit, "Lit"),
         (Layer::Diffuse, "Diffuse"),
         (Layer::Specular, "Specular"),
@@ -63,6 +65,7 @@ impl Layer {
         (Layer::SpecularDeviation, "Uncertainty of specular"),
         (Layer::RoughnessDeviation, "Uncertainty of roughness"),
         (Layer::LobeSharing, "Texels that share a lobe"),
+        (Layer::Choice, "Lobes that are needed"),
         (Layer::Uv, "Texture coordinates"),
     ];
 
@@ -70,7 +73,7 @@ impl Layer {
     pub fn is_quantity(self) -> bool {
         use Layer::*;
         matches!(self, PhotoError | Coverage | TimesSeen | Disagreement)
-            || matches!(self, DiffuseDeviation | SpecularDeviation | RoughnessDeviation | LobeSharing)
+            || matches!(self, DiffuseDeviation | SpecularDeviation | RoughnessDeviation | LobeSharing | Choice)
     }
 }
 

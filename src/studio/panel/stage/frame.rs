@@ -195,6 +195,7 @@ pub(super) fn told_by(layer: Layer) -> Option<Told> {
         Layer::SpecularDeviation => Some(Told::Specular),
         Layer::RoughnessDeviation => Some(Told::Roughness),
         Layer::LobeSharing => Some(Told::LobeSharing),
+        Layer::Choice => Some(Told::Choice),
         _ => None,
     }
 }
