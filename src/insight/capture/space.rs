@@ -17,11 +17,11 @@ const CELLS: usize = 40;
 /// Views that must see a cell before it is judged.
 const FEWEST_VIEWS: usize = 5;
 /// Share of them that must find it unlike.
-const MOST_OF_THEM: f64 = 0.85;
+const MOST_OF_THEM: f64 = 0.75;
 /// How far a cell must be in front of the surface in every view, in cells.
 const CLEARANCE: f32 = 1.5;
 /// Cells of a part, at least.
-const FEWEST_CELLS: usize = 3;
+const FEWEST_CELLS: usize = 8;
 
 /// A part that the mesh lacks.
 #[derive(Clone, Debug, PartialEq)]
