@@ -6,7 +6,7 @@
 use crate::render::Surface;
 use crate::render::surface::SurfacePoint;
 use crate::scene::{Mesh, Scene};
-use crate::trace::{Hit, Ray};
+use crate::trace::Hit;
 use glam::{Vec2, Vec3};
 
 /// Cells of the index for each triangle, about.
@@ -128,10 +128,7 @@ pub fn uv_of_texel(row: usize, column: usize, width: usize, height: usize) -> Ve
 /// Where a point of the world falls on a view's picture, in pixels; `None` behind the camera, outside the picture, or
 /// without such a view. What stands in between is not asked: see [`seen_at`].
 pub fn place_in_view(scene: &Scene, view: usize, point_in_world: Vec3) -> Option<Vec2> {
-    let camera = &scene.views.get(view)?.camera;
-    let (place, _) = camera.project(point_in_world)?;
-    let is_inside = place.x >= 0.0 && place.y >= 0.0 && place.x < camera.width as f32 && place.y < camera.height as f32;
-    is_inside.then_some(place)
+    scene.views.get(view)?.camera.place_in_picture(point_in_world)
 }
 
 /// The surface behind a place of a view's picture, in pixels; `None` where the ray meets nothing, or the back of a
@@ -145,14 +142,7 @@ pub fn point_of_pixel(scene: &Scene, surface: &Surface, view: usize, place: Vec2
 /// Where a view sees a point of the surface, in pixels: inside its picture, from the front, with nothing in between.
 pub fn seen_at(scene: &Scene, surface: &Surface, view: usize, point: &SurfacePoint) -> Option<Vec2> {
     let place = place_in_view(scene, view, point.position)?;
-    let to_camera = scene.views[view].camera.position_in_world() - point.position;
-    let direction = to_camera.try_normalize()?;
-    if point.geometric_normal.dot(direction) <= 0.0 {
-        return None;
-    }
-    // The rest of the way from where the ray leaves the surface: what stands behind the camera hides nothing.
-    let ray = surface.ray_from(point, direction);
-    let ray =
-        Ray { t_max: (to_camera.length() - (ray.origin - point.position).length()).max(f32::MIN_POSITIVE), ..ray };
-    (!surface.bvh().is_occluded(&ray)).then_some(place)
+    let eye = scene.views[view].camera.position_in_world();
+    let is_front = point.geometric_normal.dot(eye - point.position) > 0.0;
+    (is_front && !surface.bvh().is_hidden_from(point.position, point.geometric_normal, eye)).then_some(place)
 }

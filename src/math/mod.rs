@@ -13,6 +13,12 @@ pub mod real;
 pub mod sphere;
 pub mod statistics;
 
+/// At most so many of a list, in its order, evenly spread over it and with its first.
+pub fn evenly_spread<T: Copy>(list: &[T], most: usize) -> Vec<T> {
+    let count = list.len().min(most);
+    (0..count).map(|index| list[index * list.len() / count]).collect()
+}
+
 /// Luminance of a linear RGB value by the weights of Rec. 709.
 pub fn luminance(rgb: glam::Vec3) -> f32 {
     rgb.dot(glam::Vec3::new(0.2126, 0.7152, 0.0722))

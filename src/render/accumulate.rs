@@ -11,6 +11,7 @@ use crate::material::{Material, TextureTap};
 use crate::math::random::{SampleStream, StreamKey};
 use crate::math::real::Real;
 use crate::math::sphere::BilinearTap;
+use glam::Vec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -31,6 +32,14 @@ pub struct PixelEstimate<R> {
     pub second: [R; 3],
     /// Share of the camera rays that met nothing, in [0, 1].
     pub escaped: f32,
+}
+
+impl PixelEstimate<f32> {
+    /// Mean over all samples of the pixel, of which there were so many.
+    pub fn mean(&self, samples: usize) -> Vec3 {
+        let share = if samples > 1 { (samples / 2) as f32 / samples as f32 } else { 1.0 };
+        Vec3::from_array(self.first) * share + Vec3::from_array(self.second) * (1.0 - share)
+    }
 }
 
 /// The derivative of the loss by the two estimates of a pixel.

@@ -105,10 +105,7 @@ pub fn render(
             for group in 0..groups {
                 let key = PassKey::whole(settings.seed, group as u32, view, 0);
                 let estimate = estimate_pixel(&tracer, &rays, pixel, key, parameters, arena);
-                let half = (rays.samples() / 2).max(1) as f32;
-                let share = if rays.samples() > 1 { half / rays.samples() as f32 } else { 1.0 };
-                let value =
-                    Vec3::from_array(estimate.first) * share + Vec3::from_array(estimate.second) * (1.0 - share);
+                let value = estimate.mean(rays.samples());
                 let delta = value - mean;
                 mean += delta / (group + 1) as f32;
                 squared_deviations += delta * (value - mean);

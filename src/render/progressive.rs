@@ -96,10 +96,7 @@ impl<'a> PictureTracer<'a> {
     ) -> (Vec3, f32) {
         let rays = CameraRays::fresh(self.surface, camera, self.settings.filter, samples);
         let estimate = estimate_pixel(&self.paths(), &rays, pixel, key, self.parameters, arena);
-        let count = rays.samples();
-        let first_share = if count > 1 { (count / 2) as f32 / count as f32 } else { 1.0 };
-        let (first, second) = (Vec3::from_array(estimate.first), Vec3::from_array(estimate.second));
-        (first * first_share + second * (1.0 - first_share), 1.0 - estimate.escaped)
+        (estimate.mean(rays.samples()), 1.0 - estimate.escaped)
     }
 
     /// A picture of one sample a pixel at `1/factor` of the camera's size, enlarged bilinearly to the full size: an

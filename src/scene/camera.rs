@@ -46,6 +46,14 @@ impl Camera {
         (point.z > 0.0).then(|| (point.truncate() / point.z * self.focal_pixels + self.centre_pixels, point.z))
     }
 
+    /// Where a point of the world falls on the picture, in pixels; `None` when it lies behind the camera or beyond the
+    /// picture's border.
+    pub fn place_in_picture(&self, point_in_world: Vec3) -> Option<Vec2> {
+        let (place, _) = self.project(point_in_world)?;
+        let (width, height) = (self.width as f32, self.height as f32);
+        (place.x >= 0.0 && place.y >= 0.0 && place.x < width && place.y < height).then_some(place)
+    }
+
     /// Angle that one pixel covers at the centre of the picture, in radians.
     pub fn pixel_angle_radians(&self) -> f32 {
         1.0 / (self.focal_pixels.x * self.focal_pixels.y).sqrt()

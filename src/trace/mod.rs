@@ -143,6 +143,13 @@ impl Bvh {
         }
     }
 
+    /// Whether something stands between a point on the surface and an eye. `geometric_normal` is that of the triangle
+    /// the point lies on, see [`Bvh::offset_origin`]; what lies behind the eye hides nothing.
+    pub fn is_hidden_from(&self, point: Vec3, geometric_normal: Vec3, eye: Vec3) -> bool {
+        let origin = self.offset_origin(point, geometric_normal, eye - point);
+        self.is_occluded(&Ray { origin, direction: eye - origin, t_max: 1.0 })
+    }
+
     /// Moves a point that was computed on the surface off it, to the side that `direction` leaves to, by just more
     /// than the rounding errors of the point and of the ray test.
     ///

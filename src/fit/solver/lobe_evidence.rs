@@ -60,16 +60,22 @@ impl LobeKind {
         all
     }
 
-    /// Logarithm of the evidence at one width, with mean and variance of F0 per channel.
+    /// Logarithm of the evidence at one width, with mean and variance of F0 per channel; given what
+    /// [`LobeKind::precision`] says.
     ///
     /// Diffuse reflectance is integrated out, and it is at least zero: in a channel where it would be less at the best
     /// F0 it is held at zero, and F0 found anew. Without that, wide and strong lobes over what they outshine, made up
     /// for by less than black below, took over photographs (`saharov_bmvs`: RMSE of the maps .0446, with it .0367).
-    fn at_width(&self, sums: &[System; 3], around: [f64; 3]) -> (f64, [(f64, f64); 3]) {
+    fn at_width(
+        &self,
+        (precision, log_determinant): (DMat3, f64),
+        sums: &[System; 3],
+        around: [f64; 3],
+    ) -> (f64, [(f64, f64); 3]) {
         let all = self.with_belief(sums, around);
         let mean = DVec3::from_array(self.specular.0);
-        let (precision, mut log_volume) = self.precision();
-        log_volume += all.iter().map(|all| (all.ee * self.diffuse.1 * self.diffuse.1).ln()).sum::<f64>();
+        let log_volume =
+            log_determinant + all.iter().map(|all| (all.ee * self.diffuse.1 * self.diffuse.1).ln()).sum::<f64>();
         let mut held = [false; 3];
         loop {
             let (mut total, mut side) = (precision, precision * mean);
@@ -189,10 +195,12 @@ impl LobeFamily {
         // Per width: logarithm of the evidence, mean and square of F0.
         let mut log_at = [0.0f64; LOBE_WIDTHS];
         let mut specular = [[[0.0f64; 2]; 3]; LOBE_WIDTHS];
+        let precisions: Vec<_> = self.kinds.iter().map(LobeKind::precision).collect();
         let mut of_kinds = Vec::with_capacity(self.kinds.len());
         for node in first..=last {
             of_kinds.clear();
-            of_kinds.extend(self.kinds.iter().map(|kind| kind.at_width(&sums.0[node], around)));
+            let prepared = self.kinds.iter().zip(&precisions);
+            of_kinds.extend(prepared.map(|(kind, &precision)| kind.at_width(precision, &sums.0[node], around)));
             log_at[node] = log_sum(of_kinds.iter().map(|kind| kind.0));
             for (log_kind, of_channels) in &of_kinds {
                 let weight = (log_kind - log_at[node]).exp();

@@ -40,11 +40,16 @@ const ROUNDS: usize = 6;
 #[derive(Clone, Copy, Debug)]
 struct Sample {
     specular: [f64; 3],
+    root_specular: [f64; 3],
     log_width: f64,
     diffuse: [f64; 3],
 }
 
 impl Sample {
+    fn new(specular: [f64; 3], log_width: f64, diffuse: [f64; 3]) -> Self {
+        Sample { specular, root_specular: specular.map(|value| value.max(0.0).sqrt()), log_width, diffuse }
+    }
+
     /// Of a texel whose lobe is known well.
     fn of(texel: &Texel<f32>, variance: &Texel<f32>) -> Option<Sample> {
         let is_known = variance[7] > 0.0
@@ -52,12 +57,12 @@ impl Sample {
             && variance[6].sqrt() <= KNOWN_LOG_WIDTH
             && (3..6).all(|k| variance[k].sqrt() <= KNOWN_SPECULAR.0 * texel[k] + KNOWN_SPECULAR.1);
         let colour = |first: usize| [0, 1, 2].map(|c| f64::from(texel[first + c]));
-        is_known.then(|| Sample { specular: colour(3), log_width: f64::from(texel[6]), diffuse: colour(0) })
+        is_known.then(|| Sample::new(colour(3), f64::from(texel[6]), colour(0)))
     }
 
     /// Squared distance in units of a cluster's size.
     fn distance_squared(&self, other: &Sample) -> f64 {
-        let root = |c: usize| (self.specular[c].max(0.0).sqrt() - other.specular[c].max(0.0).sqrt()) / SIZE.0;
+        let root = |c: usize| (self.root_specular[c] - other.root_specular[c]) / SIZE.0;
         (0..3).map(|c| root(c).powi(2)).sum::<f64>() + ((self.log_width - other.log_width) / SIZE.1).powi(2)
     }
 }
@@ -87,11 +92,8 @@ impl Sums {
     }
 
     fn middle(&self) -> Sample {
-        Sample {
-            specular: self.specular.map(|sum| sum / self.count),
-            log_width: self.log_width[0] / self.count,
-            diffuse: self.diffuse.map(|sum| sum / self.count),
-        }
+        let mean = |sums: &[f64; 3]| sums.map(|sum| sum / self.count);
+        Sample::new(mean(&self.specular), self.log_width[0] / self.count, mean(&self.diffuse))
     }
 
     fn family(&self, share: f64) -> LobeFamily {

@@ -42,50 +42,33 @@ struct Node {
     log_evidence: f64,
 }
 
-/// The beliefs of all texels of a tile of `side` texels (a power of two).
+/// The beliefs of all texels of a tile of `side` texels (a power of two), and what would be believed of one lobe that all
+/// of them share, whatever the evidence for it.
 pub fn beliefs(
     texels: &[TreeTexel],
     sums: &[LobeSumsOfGroup],
     side: usize,
     log_widths: &[f64; LOBE_WIDTHS],
     prior: &LobePrior,
-) -> Vec<LobeBelief> {
-    let around = mean_colour(texels);
+) -> (Vec<LobeBelief>, LobeBelief) {
+    let mut around = [0.0f64; 3];
+    for texel in texels {
+        for (sum, value) in around.iter_mut().zip(texel.colour) {
+            *sum += f64::from(value) / texels.len() as f64;
+        }
+    }
     let alone = sums.iter().map(|sums| shared_lobe(sums, around, log_widths, prior)).collect();
     let tree = Tree { texels, sums, alone, around, log_widths, prior };
     let root = tree.grow((0..texels.len() as u32).collect(), (0, 0), side, true);
     let mut made = vec![LobeBelief::default(); texels.len()];
     tree.spread(&root, 1.0, &mut made);
-    for belief in &mut made {
+    let mut one = root.leaf;
+    for belief in made.iter_mut().chain([&mut one]) {
         for k in 0..4 {
             belief.square[k] = (belief.square[k] - belief.mean[k] * belief.mean[k]).max(0.0);
         }
     }
-    made
-}
-
-/// What is believed of a lobe that all texels of a tile share, whatever the evidence for it.
-pub fn one_lobe(
-    texels: &[TreeTexel],
-    sums: &[LobeSumsOfGroup],
-    log_widths: &[f64; LOBE_WIDTHS],
-    prior: &LobePrior,
-) -> LobeBelief {
-    let mut all = LobeSumsOfGroup::default();
-    sums.iter().for_each(|sums| all.add(sums));
-    let mut belief = shared_lobe(&all, mean_colour(texels), log_widths, prior).1;
-    belief.square = std::array::from_fn(|k| (belief.square[k] - belief.mean[k] * belief.mean[k]).max(0.0));
-    belief
-}
-
-fn mean_colour(texels: &[TreeTexel]) -> [f64; 3] {
-    let mut mean = [0.0f64; 3];
-    for texel in texels {
-        for (sum, value) in mean.iter_mut().zip(texel.colour) {
-            *sum += f64::from(value) / texels.len() as f64;
-        }
-    }
-    mean
+    (made, one)
 }
 
 struct Tree<'a> {
@@ -242,7 +225,7 @@ mod tests {
                 all.push(sums(specular, log_width, precision));
             }
         }
-        beliefs(&texels, &all, 8, &weighed_log_widths(), &LobePrior::default())
+        beliefs(&texels, &all, 8, &weighed_log_widths(), &LobePrior::default()).0
     }
 
     #[test]
@@ -284,7 +267,7 @@ mod tests {
             let family = LobeFamily { kinds: vec![kind], ..families[0] };
             let prior = LobePrior { families: vec![family], keep };
             let sums = vec![LobeSumsOfGroup(grey); texels.len()];
-            for belief in beliefs(&texels, &sums, 8, &weighed_log_widths(), &prior) {
+            for belief in beliefs(&texels, &sums, 8, &weighed_log_widths(), &prior).0 {
                 assert!(belief.mean[0] < 0.105, "{kind:?}: {belief:?}");
             }
         }

@@ -6,7 +6,7 @@
 use super::block::PixelTerms;
 use super::cell_sums::System;
 use super::lobe_evidence::{LobeBelief, LobePrior, LobeSumsOfGroup};
-use super::lobe_tree::{TreeTexel, beliefs, one_lobe};
+use super::lobe_tree::{TreeTexel, beliefs};
 use super::lobe_widths::{LOBE_WIDTHS, WidthStencil, weighed_log_widths, weighed_stencils};
 use super::round::{BlockWork, Round, log_widths};
 use std::time::Instant;
@@ -324,8 +324,7 @@ impl Tile {
             .collect();
         self.seconds[0] += began.elapsed().as_secs_f64();
         let began = Instant::now();
-        self.one_lobe = one_lobe(&texels, &sums, &widths, prior);
-        self.lobes = beliefs(&texels, &sums, TILE, &widths, prior);
+        (self.lobes, self.one_lobe) = beliefs(&texels, &sums, TILE, &widths, prior);
         self.seconds[1] += began.elapsed().as_secs_f64();
         for (LobeBelief { mean, square, .. }, rho) in self.lobes.iter_mut().zip(&self.rho) {
             for c in 0..3 {

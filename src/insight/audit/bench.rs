@@ -6,6 +6,7 @@ use crate::fit::loss::ViewLoss;
 use crate::fit::targets::Target;
 use crate::light::EnvironmentSampler;
 use crate::material::texels::{PyramidWeights, TexelPyramid};
+use crate::math::evenly_spread;
 use crate::math::real::Real;
 use crate::render::accumulate::{PassKey, PixelLoss, accumulate, sum_pixel, trace_pixel};
 use crate::render::first_hits::{CameraRays, PixelFilter};
@@ -68,8 +69,7 @@ impl<'a> Bench<'a> {
             return Err(Error::new(ErrorKind::InvalidScene, "there is no view to audit")
                 .remedy("hold out fewer views: --hold-out-every 0 keeps them all"));
         }
-        let count = settings.views.clamp(1, training.len());
-        let chosen: Vec<usize> = (0..count).map(|place| training[place * training.len() / count]).collect();
+        let chosen = evenly_spread(&training, settings.views.max(1));
         let with_background = |background| Scene {
             name: scene.name.clone(),
             folder: None,
@@ -81,7 +81,7 @@ impl<'a> Bench<'a> {
             findings: Vec::new(),
         };
         let scenes = [with_background(scene.background), with_background(Background::Black)];
-        let views = (0..count)
+        let views = (0..chosen.len())
             .map(|view| {
                 let target = Target::new(&scenes[0], view, 0);
                 // An odd stride does not keep to the same columns of every row.

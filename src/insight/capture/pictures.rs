@@ -4,8 +4,8 @@ use crate::fit::settings::BackgroundEvidence;
 use crate::fit::targets::Target;
 use crate::fit::{Fitter, ViewUse};
 use crate::image::{GreyImage, Image, RgbImage};
-use crate::math::luminance;
 use crate::math::statistics::quantile;
+use crate::math::{evenly_spread, luminance};
 use crate::render::picture::{Picture, PictureSettings, render};
 use crate::render::{Parameters, Surface};
 use crate::scene::{Background, Camera, PixelState, Scene};
@@ -127,8 +127,7 @@ pub fn compare(fitter: &Fitter, stop: &AtomicBool) -> Option<Comparison> {
 /// Indices of at most [`MOST_VIEWS`] views, evenly spread over those that were fitted to.
 fn spread(uses: &[ViewUse]) -> Vec<usize> {
     let used: Vec<usize> = (0..uses.len()).filter(|&view| uses[view] == ViewUse::Training).collect();
-    let count = used.len().min(MOST_VIEWS);
-    (0..count).map(|index| used[index * used.len() / count]).collect()
+    evenly_spread(&used, MOST_VIEWS)
 }
 
 fn compared(

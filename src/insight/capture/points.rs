@@ -3,7 +3,6 @@
 use super::pictures::{Compared, Comparison, NO_SURFACE};
 use crate::image::Image;
 use crate::render::Surface;
-use crate::trace::Ray;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -60,14 +59,12 @@ pub fn points_of(comparison: &Comparison, surface: &Surface, unlike: &[Image<boo
             let sights = sights
                 .filter_map(|(other, unlike)| {
                     let eye = other.camera.position_in_world();
-                    let to_eye = eye - point.position;
-                    let direction = to_eye.try_normalize()?;
+                    let direction = (eye - point.position).try_normalize()?;
                     if direction.dot(point.geometric_normal) < LEAST_COSINE {
                         return None;
                     }
                     let (row, column) = pixel_of(other, point.position)?;
-                    let origin = surface.bvh().offset_origin(point.position, point.geometric_normal, to_eye);
-                    let is_hidden = surface.bvh().is_occluded(&Ray { origin, direction: eye - origin, t_max: 1.0 });
+                    let is_hidden = surface.bvh().is_hidden_from(point.position, point.geometric_normal, eye);
                     (!is_hidden).then(|| (direction, unlike[(row, column)]))
                 })
                 .collect();
@@ -83,9 +80,5 @@ fn centre(row: usize, column: usize) -> Vec2 {
 
 /// Row and column of the pixel that shows a place; `None` outside the picture.
 pub fn pixel_of(own: &Compared, place: Vec3) -> Option<(usize, usize)> {
-    let (on_picture, _) = own.camera.project(place)?;
-    let (width, height) = own.size();
-    let is_inside =
-        on_picture.x >= 0.0 && on_picture.y >= 0.0 && on_picture.x < width as f32 && on_picture.y < height as f32;
-    is_inside.then_some((on_picture.y as usize, on_picture.x as usize))
+    own.camera.place_in_picture(place).map(|on_picture| (on_picture.y as usize, on_picture.x as usize))
 }

@@ -4,7 +4,6 @@ use super::pictures::{Compared, Comparison};
 use super::points::pixel_of;
 use crate::math::random::SequentialRandom;
 use crate::render::Surface;
-use crate::trace::Ray;
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -73,12 +72,9 @@ fn points_by_area(surface: &Surface) -> Vec<(Vec3, Vec3)> {
 
 fn sees(own: &Compared, surface: &Surface, position: Vec3, normal: Vec3) -> bool {
     let eye = own.camera.position_in_world();
-    let to_eye = eye - position;
-    if to_eye.dot(normal) <= 0.0 || pixel_of(own, position).is_none() {
-        return false;
-    }
-    let origin = surface.bvh().offset_origin(position, normal, to_eye);
-    !surface.bvh().is_occluded(&Ray { origin, direction: eye - origin, t_max: 1.0 })
+    (eye - position).dot(normal) > 0.0
+        && pixel_of(own, position).is_some()
+        && !surface.bvh().is_hidden_from(position, normal, eye)
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use crate::job::against_truth::resampled;
 use crate::job::pictures::parameters;
 use crate::light::Environment;
 use crate::material::MaterialMaps;
+use crate::math::evenly_spread;
 use crate::render::picture::{PictureSettings, render};
 use crate::render::{Parameters, Surface};
 use crate::scene::{Background, Scene};
@@ -75,10 +76,7 @@ impl Judge {
             return Err(Error::new(ErrorKind::InvalidScene, "the scene has no truth to judge by")
                 .remedy("give an exchange folder with its truth"));
         };
-        let some = |all: Vec<usize>| -> Vec<usize> {
-            let count = all.len().min(most_views.max(1));
-            (0..count).map(|place| all[place * all.len() / count]).collect()
-        };
+        let some = |all: Vec<usize>| evenly_spread(&all, most_views.max(1));
         let scene_views = &scene.views;
         let of_kind =
             |held_out: bool| (0..scene_views.len()).filter(move |&view| scene_views[view].held_out == held_out);

@@ -51,6 +51,15 @@ pub struct LobeSums {
     pub d_hidden: [f32; 2],
 }
 
+impl LobeSums {
+    /// What a lobe of this F0 sends, in radiance per channel, where `around` is the radiance of what hides the light.
+    #[inline]
+    pub fn radiance(&self, specular: [f32; 3], around: [f32; 3]) -> [f32; 3] {
+        let LobeSums { base, grazing, hidden, .. } = self;
+        [0, 1, 2].map(|c| specular[c] * (base[c] + hidden[0] * around[c]) + grazing[c] + hidden[1] * around[c])
+    }
+}
+
 /// The sums of a lobe at several widths, without derivatives. `sums` is as long as `widths`.
 pub fn lobe_sums(basis: &LightBasis, place: &LobePlace, light: &[Vec<f32>; 3], widths: &[f32], sums: &mut [LobeSums]) {
     let narrow = widths.partition_point(|&width| width < wide_from(basis));

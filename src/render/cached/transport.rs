@@ -262,11 +262,8 @@ impl CachedTransport {
         let mut sums = [LobeSums::default()];
         lobe_sums(&self.basis, &self.lobe_place(point), light, &[material[6].exp()], &mut sums);
         let around = self.lobe_surroundings(at, point);
-        let [LobeSums { base, grazing, hidden, .. }] = sums;
-        [0, 1, 2].map(|c| {
-            let lobe = material[3 + c] * (base[c] + hidden[0] * around[c]) + grazing[c] + hidden[1] * around[c];
-            diffuse[c] + strength * lobe
-        })
+        let lobe = sums[0].radiance([material[3], material[4], material[5]], around);
+        [0, 1, 2].map(|c| diffuse[c] + strength * lobe[c])
     }
 
     /// Mean over a shading point's texels.

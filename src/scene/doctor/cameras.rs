@@ -159,9 +159,7 @@ fn share_in_sight(scene: &Scene, change: impl Fn(&Camera) -> Camera) -> f64 {
         let (mut inside, mut count) = (0usize, 0usize);
         for point in scene.mesh.positions.iter().step_by(step) {
             count += 1;
-            inside += usize::from(camera.project(*point).is_some_and(|(place, _)| {
-                place.x >= 0.0 && place.y >= 0.0 && place.x < camera.width as f32 && place.y < camera.height as f32
-            }));
+            inside += usize::from(camera.place_in_picture(*point).is_some());
         }
         shares += inside as f64 / count.max(1) as f64;
     }

@@ -8,7 +8,7 @@ use super::probe::{Probe, surface_at};
 use crate::error::{Finding, Place, Severity};
 use crate::math::{luminance, statistics::quantile};
 use crate::scene::{PixelState, Scene};
-use crate::trace::{Bvh, Ray};
+use crate::trace::Bvh;
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -106,23 +106,18 @@ fn pairs_of(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], a: usize) -> Vec<Pa
         let ratios: Vec<f64> = points
             .iter()
             .filter_map(|(point, normal, value)| {
-                let (place, _) = other.camera.project(*point)?;
-                let inside = place.x >= 0.0
-                    && place.y >= 0.0
-                    && place.x < other.camera.width as f32
-                    && place.y < other.camera.height as f32;
+                let place = other.camera.place_in_picture(*point)?;
                 let to_eye = eye - *point;
                 // Grazing sights blur over many points of the surface.
-                if !inside || to_eye.dot(*normal) < 0.2 * to_eye.length() {
+                if to_eye.dot(*normal) < 0.2 * to_eye.length() {
                     return None;
                 }
                 let (row, column) = (place.y as usize, place.x as usize);
                 if !evident(other.states[(row, column)]) {
                     return None;
                 }
-                let origin = bvh.offset_origin(*point, *normal, to_eye);
                 let seen = f64::from(luminance(other.photo.radiance(row, column)));
-                let visible = seen > 1e-4 && !bvh.is_occluded(&Ray { origin, direction: eye - origin, t_max: 1.0 });
+                let visible = seen > 1e-4 && !bvh.is_hidden_from(*point, *normal, eye);
                 visible.then(|| (seen / value).ln())
             })
             .collect();

@@ -10,6 +10,7 @@ use super::Report;
 use super::edge_profile::Profiles;
 use super::probe::{centre_of, has_mask, hit_at};
 use crate::error::{Finding, Severity};
+use crate::math::evenly_spread;
 use crate::math::statistics::Moments;
 use crate::scene::settings::PixelCentre;
 use crate::scene::{PixelState, Scene, View};
@@ -102,8 +103,7 @@ pub fn measure(scene: &Scene, bvh: &Bvh) -> Option<CentreMeasurement> {
 }
 
 fn spread<'a>(views: &[&'a View]) -> Vec<&'a View> {
-    let count = views.len().min(MEASURED_VIEWS);
-    (0..count).map(|index| views[index * views.len() / count]).collect()
+    evenly_spread(views, MEASURED_VIEWS)
 }
 
 /// Mean and standard error over the views. A single view gets an error that decides nothing.

@@ -193,9 +193,8 @@ impl SolverScene {
                 sums[1] = sums[0];
             }
             [0, 1].map(|which| {
-                let LobeSums { base, grazing, hidden, .. } = sums[which ^ swap];
-                let lobe = lobes[which];
-                [0, 1, 2].map(|c| lobe[c] * (base[c] + hidden[0] * around[c]) + grazing[c] + hidden[1] * around[c])
+                let [red, green, blue, _] = lobes[which];
+                sums[which ^ swap].radiance([red, green, blue], around)
             })
         };
         let arriving = |values: &[[f32; 3]]| CachedTransport::interpolate(values, footprints, point);
