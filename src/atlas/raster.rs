@@ -191,9 +191,17 @@ pub fn dilate<T: Clone>(map: &Image<T>, nearest: &Image<u32>) -> Image<T> {
 pub(crate) fn narrowest_gutter(texels: &Image<u32>) -> Option<usize> {
     let (width, height) = (texels.width() as i64, texels.height() as i64);
     let mut label = texels.pixels().to_vec();
-    let mut front: Vec<u32> = (0..label.len() as u32).filter(|&texel| label[texel as usize] != 0).collect();
-    let mut distance = vec![u32::MAX; label.len()];
-    front.iter().for_each(|&texel| distance[texel as usize] = 0);
+    // Only texels at the rim of a chart have anything to do.
+    let is_inside = |texel: usize| {
+        let (row, column) = (texel as i64 / width, texel as i64 % width);
+        let same = |first: usize| label[first..first + 3].iter().all(|&other| other == label[texel]);
+        (1..height - 1).contains(&row)
+            && (1..width - 1).contains(&column)
+            && [texel - width as usize, texel, texel + width as usize].into_iter().all(|middle| same(middle - 1))
+    };
+    let is_at_rim = |&texel: &u32| label[texel as usize] != 0 && !is_inside(texel as usize);
+    let mut front: Vec<u32> = (0..label.len() as u32).into_par_iter().filter(is_at_rim).collect();
+    let mut distance: Vec<u32> = label.iter().map(|&chart| if chart == 0 { u32::MAX } else { 0 }).collect();
     let mut narrowest: Option<u32> = None;
     let mut steps = 0;
     // Every chart grows by a texel a round; where two meet, the rounds so far are the gutter between them.

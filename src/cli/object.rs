@@ -192,6 +192,9 @@ pub struct StudyIbrdfOptions {
     /// Weights of the neural model; those that come with the program for studies of materials left out when not given.
     #[arg(long)]
     pub weights: Option<PathBuf>,
+    /// Further weights for figure 2, each fitted to the materials it was trained without.
+    #[arg(long, value_delimiter = ',')]
+    pub leave_out_weights: Vec<PathBuf>,
     /// Models of the reflectance; the neural one and Cook-Torrance when not given.
     #[arg(long, value_enum, value_delimiter = ',')]
     pub models: Vec<ModelKind>,
@@ -231,6 +234,7 @@ pub fn study(options: &StudyIbrdfOptions, json: bool) -> Result<()> {
         envmaps: options.envmaps.clone(),
         mesh: options.mesh.clone(),
         weights: options.weights.clone(),
+        leave_out_weights: options.leave_out_weights.clone(),
         models,
         quick: options.quick,
         materials: options.materials.map(usize::from),

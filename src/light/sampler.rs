@@ -53,7 +53,13 @@ impl EnvironmentSampler {
     /// The density per steradian with which [`EnvironmentSampler::sample`] draws a direction; 0 when the environment
     /// is black.
     pub fn pdf(&self, direction: Vec3) -> f32 {
-        self.tables.as_ref().map_or(0.0, |tables| tables.pdf(direction))
+        let (phi, theta) = sphere::angles_of_direction(direction);
+        self.pdf_at_angles(phi, theta)
+    }
+
+    /// [`EnvironmentSampler::pdf`] of a direction by its angles, see [`sphere::angles_of_direction`].
+    pub fn pdf_at_angles(&self, phi: f32, theta: f32) -> f32 {
+        self.tables.as_ref().map_or(0.0, |tables| tables.pdf(phi, theta))
     }
 
     /// Whether there is no light at all.
@@ -122,9 +128,8 @@ impl Tables {
         (Vec3::new(sine * sin_phi, cosine as f32, -sine * cos_phi), lerp(left, right, across))
     }
 
-    fn pdf(&self, direction: Vec3) -> f32 {
+    fn pdf(&self, phi: f32, theta: f32) -> f32 {
         let (width, height) = (self.density.width(), self.density.height() - 1);
-        let (phi, theta) = sphere::angles_of_direction(direction);
         let x = f64::from(phi) / TAU * width as f64;
         let y = f64::from(theta) / PI * height as f64;
         let (column, row) = ((x as usize).min(width - 1), (y as usize).min(height - 1));

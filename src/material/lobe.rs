@@ -168,36 +168,47 @@ impl Material<f32> {
         }
     }
 
-    /// Probability of sampling the specular lobe, by the luminance of both parts, kept off 0 and 1.
-    fn specular_share(&self, cos_out: f32, lobe_strength: f32) -> f32 {
+    /// What sampling towards one viewer shares, whose direction has the cosine `cos_out` to the normal.
+    #[inline]
+    pub fn sampler(&self, cos_out: f32, lobe_strength: f32) -> LobeSampler {
         if lobe_strength == 0.0 {
-            return 0.0;
+            return LobeSampler { specular_share: 0.0, log_width: self.log_width, inverse_width_squared: 0.0 };
         }
+        // By the luminance of both parts, kept off 0 and 1.
         let grazing = (1.0 - cos_out).clamp(0.0, 1.0).powi(5);
         let fresnel = Vec3::from_array(self.specular) * (1.0 - grazing) + Vec3::splat(grazing);
         let specular = luminance(fresnel) * lobe_strength;
         let diffuse = luminance(Vec3::from_array(self.diffuse));
-        (specular / (specular + diffuse).max(1e-6)).clamp(0.1, 0.9)
+        LobeSampler {
+            specular_share: (specular / (specular + diffuse).max(1e-6)).clamp(0.1, 0.9),
+            log_width: self.log_width,
+            inverse_width_squared: (-2.0 * self.log_width).exp(),
+        }
     }
+}
 
-    /// A direction towards the light for a unit direction towards the viewer; `None` when it falls below the horizon.
-    /// Its density is [`Material::density`].
-    pub fn sample(
-        &self,
-        frame: &Frame,
-        towards_viewer: Vec3,
-        lobe_strength: f32,
-        choice: f32,
-        u: [f32; 2],
-    ) -> Option<Vec3> {
-        let viewer = frame.local_from_outer(towards_viewer);
-        let light = if choice < self.specular_share(viewer.z, lobe_strength) {
+/// Draws directions towards the light in proportion to what a material sends to one viewer, nearly.
+#[derive(Clone, Copy, Debug)]
+pub struct LobeSampler {
+    /// Probability of sampling the specular lobe.
+    specular_share: f32,
+    log_width: f32,
+    /// `1 / a^2`.
+    inverse_width_squared: f32,
+}
+
+impl LobeSampler {
+    /// A direction towards the light for the unit direction towards the viewer; `None` when it falls below the horizon.
+    /// Its density is [`LobeSampler::density`].
+    pub fn sample(&self, frame: &Frame, towards_viewer: Vec3, choice: f32, u: [f32; 2]) -> Option<Vec3> {
+        let light = if choice < self.specular_share {
             // Half vectors with density (e+2)/(2 pi) cos^(e+1): ln cos = a^2/2 ln u.
             let width = self.log_width.exp();
             let ln_cos = 0.5 * width * width * (1.0 - u[0]).max(1e-30).ln();
             let (sin_phi, cos_phi) = (std::f32::consts::TAU * u[1]).sin_cos();
             let sin = (-(2.0 * ln_cos).exp_m1()).max(0.0).sqrt();
             let half = Vec3::new(sin * cos_phi, sin * sin_phi, ln_cos.exp());
+            let viewer = frame.local_from_outer(towards_viewer);
             half * (2.0 * viewer.dot(half)) - viewer
         } else {
             sample_cosine_hemisphere(u)
@@ -205,18 +216,17 @@ impl Material<f32> {
         (light.z > 0.0).then(|| frame.outer_from_local(light))
     }
 
-    /// Density of [`Material::sample`] per steradian.
-    pub fn density(&self, geometry: &LobeGeometry, lobe_strength: f32) -> f32 {
-        let share = self.specular_share(geometry.cos_out, lobe_strength);
+    /// Density of [`LobeSampler::sample`] per steradian, for a geometry with the same viewer.
+    #[inline]
+    pub fn density(&self, geometry: &LobeGeometry) -> f32 {
         let diffuse = geometry.cos_in * (1.0 / PI);
-        if share == 0.0 {
+        if self.specular_share == 0.0 {
             return diffuse;
         }
-        let inverse_width_squared = (-2.0 * self.log_width).exp();
         // p(h) = D(h) (n.h), p(i) = p(h) / (4 h.o).
-        let half =
-            inverse_width_squared * (1.0 / PI) * ((2.0 * inverse_width_squared - 1.0) * geometry.ln_cos_half).exp();
-        share * half / (4.0 * geometry.half_dot_out) + (1.0 - share) * diffuse
+        let exponent = 2.0 * self.inverse_width_squared - 1.0;
+        let half = self.inverse_width_squared * (1.0 / PI) * (exponent * geometry.ln_cos_half).exp();
+        self.specular_share * half / (4.0 * geometry.half_dot_out) + (1.0 - self.specular_share) * diffuse
     }
 }
 

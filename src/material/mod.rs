@@ -8,6 +8,6 @@ pub mod lobe;
 pub mod maps;
 pub mod texels;
 
-pub use lobe::{LobeGeometry, Material};
+pub use lobe::{LobeGeometry, LobeSampler, Material};
 pub use maps::MaterialMaps;
 pub use texels::{TexelPyramid, TextureTap};

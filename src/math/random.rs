@@ -58,17 +58,16 @@ fn unit_float(bits: u32) -> f32 {
 }
 
 /// Second dimension of the Sobol sequence with its bits reversed; the first is the bit reversal of the index.
-fn sobol_second_reversed(mut index: u32) -> u32 {
-    let mut direction = 1u32;
-    let mut result = 0;
-    while index != 0 {
-        if index & 1 == 1 {
-            result ^= direction;
-        }
-        index >>= 1;
-        direction ^= direction << 1;
-    }
-    result
+///
+/// Column `k` of its matrix is row `k` of Pascal's triangle modulo 2, where the bit `j` is set if all bits of `j` are
+/// among those of `k` (Lucas 1878). So bit `j` of the result is the parity of the index's bits at all places that contain
+/// `j`, which five butterflies add up.
+fn sobol_second_reversed(mut bits: u32) -> u32 {
+    bits ^= bits >> 1 & 0x5555_5555;
+    bits ^= bits >> 2 & 0x3333_3333;
+    bits ^= bits >> 4 & 0x0f0f_0f0f;
+    bits ^= bits >> 8 & 0x00ff_00ff;
+    bits ^ bits >> 16
 }
 
 /// A hash in which each bit depends on the bits below it only: between two bit reversals it is an Owen scrambling
@@ -144,6 +143,19 @@ mod tests {
                 cells[(x * 4.0) as usize * 4 + (y * 4.0) as usize] += 1;
             }
             assert_eq!((rows, columns, cells), ([1; 16], [1; 16], [1; 16]));
+        }
+    }
+
+    #[test]
+    fn butterflies_give_the_second_dimension_by_its_direction_numbers() {
+        let mut random = SequentialRandom::new(1);
+        for index in [0, 1, u32::MAX].into_iter().chain((0..1000).map(|_| random.next_bits() as u32)) {
+            let (mut direction, mut expected) = (1u32, 0);
+            for bit in 0..32 {
+                expected ^= direction * (index >> bit & 1);
+                direction ^= direction << 1;
+            }
+            assert_eq!(sobol_second_reversed(index), expected, "{index:#x}");
         }
     }
 

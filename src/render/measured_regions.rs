@@ -14,7 +14,7 @@ use super::sums::Parameters;
 use super::surface::{Surface, SurfacePoint};
 use crate::image::Image;
 use crate::light::EnvironmentSampler;
-use crate::material::{LobeGeometry, Material};
+use crate::material::{LobeGeometry, LobeSampler, Material};
 use crate::math::frame::Frame;
 use crate::math::random::SampleStream;
 use crate::math::sphere::tap_of_direction;
@@ -27,7 +27,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// What reflects at a vertex.
 enum Reflector<'a> {
     /// The lobe of the maps.
-    Maps(Material<f32>),
+    Maps(Material<f32>, LobeSampler),
     /// A measured material.
     Measured(&'a MeasuredMaterial),
 }
@@ -49,8 +49,8 @@ impl Vertex<'_> {
         }
         let geometry = LobeGeometry::new(self.point.shading_normal, direction, self.towards_viewer)?;
         Some(match &self.reflector {
-            Reflector::Maps(material) => {
-                (Vec3::from(material.reflect(&geometry, self.strength)), material.density(&geometry, self.strength))
+            Reflector::Maps(material, sampler) => {
+                (Vec3::from(material.reflect(&geometry, self.strength)), sampler.density(&geometry))
             }
             Reflector::Measured(material) => (
                 Vec3::from(material.reflect(&self.frame, direction, self.towards_viewer)),
@@ -61,9 +61,7 @@ impl Vertex<'_> {
 
     fn sample(&self, choice: f32, numbers: [f32; 2]) -> Option<Vec3> {
         match &self.reflector {
-            Reflector::Maps(material) => {
-                material.sample(&self.frame, self.towards_viewer, self.strength, choice, numbers)
-            }
+            Reflector::Maps(_, sampler) => sampler.sample(&self.frame, self.towards_viewer, choice, numbers),
             Reflector::Measured(material) => {
                 material.sample(&self.frame, self.towards_viewer, [choice, numbers[0], numbers[1]])
             }
@@ -99,7 +97,9 @@ impl RegionTracer<'_> {
             Some(measured) => Reflector::Measured(measured),
             None => {
                 let texels = &self.parameters.texels;
-                Reflector::Maps(texels.fetch(&texels.tap(point.uv, 0)))
+                let material = texels.fetch(&texels.tap(point.uv, 0));
+                let cos_out = point.shading_normal.dot(towards_viewer);
+                Reflector::Maps(material, material.sampler(cos_out, self.settings.lobe_strength))
             }
         };
         let frame = Frame::around(point.shading_normal);

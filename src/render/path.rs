@@ -15,7 +15,7 @@ use crate::light::EnvironmentSampler;
 use crate::material::{LobeGeometry, TexelPyramid, TextureTap};
 use crate::math::frame::Frame;
 use crate::math::random::SampleStream;
-use crate::math::sphere::{BilinearTap, tap_of_direction};
+use crate::math::sphere::{BilinearTap, angles_of_direction, tap_of_angles, tap_of_direction};
 use crate::trace::{Hit, Ray};
 use glam::Vec3;
 
@@ -153,7 +153,7 @@ impl PathTracer<'_> {
             }
             let texture = self.proposal.tap(point.uv, self.mip_level(bounce_index, &point, &ray, hit.t));
             let material = self.proposal.fetch(&texture);
-            let strength = self.settings.lobe_strength;
+            let sampler = material.sampler(point.shading_normal.dot(towards_viewer), self.settings.lobe_strength);
 
             // Draw a direction from the light and keep it if nothing is in the way.
             let light_numbers = stream.next_pair();
@@ -162,7 +162,7 @@ impl PathTracer<'_> {
                 if self.surface.is_shadowed(&point, direction) {
                     return None;
                 }
-                let other = material.density(&geometry, strength);
+                let other = sampler.density(&geometry);
                 let weight = power_heuristic(density, other) / density;
                 Some(Connection { geometry, light: self.light_tap(direction), weight })
             });
@@ -171,14 +171,14 @@ impl PathTracer<'_> {
             let choice = stream.next_number();
             let lobe_numbers = stream.next_pair();
             let frame = Frame::around(point.shading_normal);
-            let sampled = material
-                .sample(&frame, towards_viewer, strength, choice, lobe_numbers)
+            let sampled = sampler
+                .sample(&frame, towards_viewer, choice, lobe_numbers)
                 .and_then(|direction| Some((direction, self.geometry_above(&point, direction, towards_viewer)?)));
             let Some((direction, geometry)) = sampled else {
                 arena.vertices.push(PathVertex { texture, connection, bounce: None });
                 return;
             };
-            let density = material.density(&geometry, strength);
+            let density = sampler.density(&geometry);
             if !(density > 1e-9) {
                 arena.vertices.push(PathVertex { texture, connection, bounce: None });
                 return;
@@ -186,8 +186,10 @@ impl PathTracer<'_> {
             let next_ray = self.surface.ray_from(&point, direction);
             let next_hit = self.surface.closest(&next_ray);
             let escape = next_hit.is_none().then(|| {
-                let other = self.light.pdf(direction);
-                (self.light_tap(direction), power_heuristic(density, other))
+                let (phi, theta) = angles_of_direction(direction);
+                let (width, height) = self.environment_size;
+                let other = self.light.pdf_at_angles(phi, theta);
+                (tap_of_angles(phi, theta, width, height), power_heuristic(density, other))
             });
             let bounce = Bounce { geometry, inverse_density: 1.0 / density, escape };
             arena.vertices.push(PathVertex { texture, connection, bounce: Some(bounce) });

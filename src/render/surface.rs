@@ -9,8 +9,25 @@ use glam::{Vec2, Vec3};
 pub struct Surface {
     mesh: Mesh,
     bvh: Bvh,
-    /// Per triangle: length in texture space per length in the world (geometric mean over directions).
-    uv_per_length: Vec<f32>,
+    corners: Vec<Corner>,
+    facets: Vec<Facet>,
+}
+
+/// A vertex of the mesh, its numbers side by side: a hit reads three of these and not nine lists.
+#[derive(Clone, Copy)]
+struct Corner {
+    position: Vec3,
+    normal: Vec3,
+    uv: Vec2,
+}
+
+/// A triangle of the mesh.
+#[derive(Clone, Copy)]
+struct Facet {
+    vertices: [u32; 3],
+    geometric_normal: Vec3,
+    /// Length in texture space per length in the world (geometric mean over directions).
+    uv_per_length: f32,
 }
 
 /// A point of the surface as seen along a ray.
@@ -43,15 +60,24 @@ impl Surface {
             return Err(Error::new(ErrorKind::NonFinite, message).remedy("build an atlas anew: --uv rebuild"));
         }
         let bvh = Bvh::build(&mesh.positions, &mesh.triangles)?;
-        let uv_per_length = (0..mesh.triangles.len())
-            .map(|triangle| {
-                let [a, b, c] = mesh.triangles[triangle].map(|vertex| mesh.uvs[vertex as usize]);
-                let area_uv = (b - a).perp_dot(c - a).abs();
-                let area_world = mesh.area_vector(triangle).length();
-                if area_world > 0.0 { (area_uv / area_world).sqrt() } else { 0.0 }
+        let facet = |triangle: usize| {
+            let vertices = mesh.triangles[triangle];
+            let [a, b, c] = vertices.map(|vertex| mesh.uvs[vertex as usize]);
+            let area_uv = (b - a).perp_dot(c - a).abs();
+            let area_vector = mesh.area_vector(triangle);
+            let area_world = area_vector.length();
+            let uv_per_length = if area_world > 0.0 { (area_uv / area_world).sqrt() } else { 0.0 };
+            Facet { vertices, geometric_normal: area_vector.normalize_or_zero(), uv_per_length }
+        };
+        let facets = (0..mesh.triangles.len()).map(facet).collect();
+        let corners = (0..mesh.positions.len())
+            .map(|vertex| Corner {
+                position: mesh.positions[vertex],
+                normal: mesh.normals[vertex],
+                uv: mesh.uvs[vertex],
             })
             .collect();
-        Ok(Surface { mesh, bvh, uv_per_length })
+        Ok(Surface { mesh, bvh, corners, facets })
     }
 
     /// The mesh.
@@ -71,21 +97,16 @@ impl Surface {
 
     /// The surface at a hit.
     pub fn point(&self, hit: &Hit) -> SurfacePoint {
-        let triangle = self.mesh.triangles[hit.triangle as usize].map(|vertex| vertex as usize);
-        let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
-        let blend = |values: &[Vec3]| {
-            values[triangle[0]] * weights[0] + values[triangle[1]] * weights[1] + values[triangle[2]] * weights[2]
-        };
-        let uv = self.mesh.uvs[triangle[0]] * weights[0]
-            + self.mesh.uvs[triangle[1]] * weights[1]
-            + self.mesh.uvs[triangle[2]] * weights[2];
-        let geometric_normal = self.mesh.area_vector(hit.triangle as usize).normalize_or_zero();
+        let Facet { vertices, geometric_normal, uv_per_length } = self.facets[hit.triangle as usize];
+        let [a, b, c] = vertices.map(|vertex| self.corners[vertex as usize]);
+        let (u, v) = (hit.u, hit.v);
+        let w = 1.0 - u - v;
         SurfacePoint {
-            position: blend(&self.mesh.positions),
+            position: a.position * w + b.position * u + c.position * v,
             geometric_normal,
-            shading_normal: blend(&self.mesh.normals).try_normalize().unwrap_or(geometric_normal),
-            uv,
-            uv_per_length: self.uv_per_length[hit.triangle as usize],
+            shading_normal: (a.normal * w + b.normal * u + c.normal * v).try_normalize().unwrap_or(geometric_normal),
+            uv: a.uv * w + b.uv * u + c.uv * v,
+            uv_per_length,
             triangle: hit.triangle,
         }
     }

@@ -35,14 +35,15 @@ fn reciprocal_and_positive() {
 /// Directional albedo by importance sampling in f64 sums.
 fn albedo(material: &Material<f32>, viewer: Vec3, count: usize) -> f64 {
     let frame = Frame::around(Vec3::Z);
+    let sampler = material.sampler(viewer.z, 1.0);
     let mut random = SequentialRandom::new(9);
     let mut sum = 0.0;
     for _ in 0..count {
         let (choice, u) = (random.next_number(), [random.next_number(), random.next_number()]);
-        if let Some(light) = material.sample(&frame, viewer, 1.0, choice, u)
+        if let Some(light) = sampler.sample(&frame, viewer, choice, u)
             && let Some(geometry) = LobeGeometry::new(Vec3::Z, light, viewer)
         {
-            sum += f64::from(material.reflect(&geometry, 1.0)[1] / material.density(&geometry, 1.0));
+            sum += f64::from(material.reflect(&geometry, 1.0)[1] / sampler.density(&geometry));
         }
     }
     sum / count as f64
@@ -104,7 +105,7 @@ fn every_derivative_matches_central_differences_in_f64() {
         } else {
             let frame = Frame::around(Vec3::Z);
             let u = [random.next_number(), random.next_number()];
-            match base.sample(&frame, viewer, 1.0, 0.0, u) {
+            match base.sampler(viewer.z, 1.0).sample(&frame, viewer, 0.0, u) {
                 Some(light) => light,
                 None => continue,
             }
@@ -143,11 +144,12 @@ fn samples_follow_their_density() {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let viewer = Vec3::new(sin, 0.0, cos);
         let frame = Frame::around(Vec3::Z);
+        let sampler = material.sampler(viewer.z, 1.0);
         let mut random = SequentialRandom::new(77);
         let mut observed = vec![0.0f64; rows * columns];
         for _ in 0..count {
             let (choice, u) = (random.next_number(), [random.next_number(), random.next_number()]);
-            if let Some(light) = material.sample(&frame, viewer, 1.0, choice, u) {
+            if let Some(light) = sampler.sample(&frame, viewer, choice, u) {
                 let phi = light.y.atan2(light.x).rem_euclid(std::f32::consts::TAU);
                 let row = ((light.z * rows as f32) as usize).min(rows - 1);
                 let column = ((phi / std::f32::consts::TAU * columns as f32) as usize).min(columns - 1);
@@ -165,7 +167,7 @@ fn samples_follow_their_density() {
                 let radius = (1.0 - z * z).sqrt();
                 let light = Vec3::new(radius * phi.cos(), radius * phi.sin(), z);
                 if let Some(geometry) = LobeGeometry::new(Vec3::Z, light, viewer) {
-                    *value += f64::from(material.density(&geometry, 1.0));
+                    *value += f64::from(sampler.density(&geometry));
                 }
             }
             let area = std::f64::consts::TAU / (rows * columns) as f64;
@@ -202,7 +204,7 @@ fn nothing_is_ever_not_finite() {
         if let Some(geometry) = LobeGeometry::new(Vec3::Z, light, viewer) {
             let value = material.reflect(&geometry, 1.0);
             let d = material.reflect_backward(&geometry, 1.0, [1.0; 3]);
-            let density = material.density(&geometry, 1.0);
+            let density = material.sampler(geometry.cos_out, 1.0).density(&geometry);
             assert!(value.iter().all(|v| v.is_finite() && *v >= 0.0), "{geometry:?} {material:?} {value:?}");
             assert!(d.log_width.is_finite() && d.specular.iter().all(|v| v.is_finite()), "{geometry:?}");
             assert!(density.is_finite() && density >= 0.0);

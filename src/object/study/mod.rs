@@ -50,6 +50,8 @@ pub struct StudyOptions {
     /// Weights of the neural model; those that ship for materials left out ([`crate::neural::shipped_leave_out`]) when
     /// not given.
     pub weights: Option<PathBuf>,
+    /// Further weights for figure 2, each fitted to the materials it was trained without.
+    pub leave_out_weights: Vec<PathBuf>,
     /// Models of the reflectance.
     pub models: Vec<ModelKind>,
     /// A few small cases.

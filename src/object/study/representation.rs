@@ -45,6 +45,13 @@ const SEEN: &str = "iBRDF";
 /// Name of the neural model on materials it has not seen.
 const LEFT_OUT: &str = "iBRDF, left out";
 
+/// Name of further weights on materials they have not seen: their size and what they were trained on.
+fn name_of_left_out(trained: &Trained) -> String {
+    let account = &trained.account;
+    let (size, materials) = (&account.architecture.name, account.materials.len());
+    format!("{LEFT_OUT}, {size}, {materials} materials, {} steps", account.step)
+}
+
 /// One fit.
 #[derive(Clone, Debug, PartialEq)]
 struct Row {
@@ -87,7 +94,7 @@ impl Row {
 #[derive(Clone)]
 enum Contender {
     /// Codes and colours, the weights held.
-    Flow(&'static str, Arc<Trained>),
+    Flow(String, Arc<Trained>),
     /// All weights.
     OwnNet(Arc<Trained>),
     Rival(Rival),
@@ -153,8 +160,13 @@ pub fn run(options: &StudyOptions, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Re
         .collect();
 
     let shipped = Arc::new(crate::neural::shipped()?);
-    let (seen, own) = (Contender::Flow(SEEN, Arc::clone(&shipped)), Contender::OwnNet(shipped));
-    let unseen = Contender::Flow(LEFT_OUT, left_out_model);
+    let (seen, own) = (Contender::Flow(SEEN.into(), Arc::clone(&shipped)), Contender::OwnNet(shipped));
+    let mut unseen = vec![(Contender::Flow(LEFT_OUT.into(), left_out_model), left_out.clone())];
+    for path in &options.leave_out_weights {
+        let trained = Trained::read(path)?;
+        let left_out = trained.account.left_out.clone();
+        unseen.push((Contender::Flow(name_of_left_out(&trained), Arc::new(trained)), left_out));
+    }
     let path = options.output.join("fig2.csv");
     let mut rows = read_rows(&path)?;
     let mut fit = |contender: &Contender, material: &str, table: &mut Option<MeasuredBrdf>| -> Result<()> {
@@ -187,8 +199,10 @@ pub fn run(options: &StudyOptions, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Re
         let mut table = None;
         fit(&own, material, &mut table)?;
         fit(&seen, material, &mut table)?;
-        if left_out.iter().any(|name| name == material) {
-            fit(&unseen, material, &mut table)?;
+        for (contender, left_out) in &unseen {
+            if left_out.iter().any(|name| name == material) {
+                fit(contender, material, &mut table)?;
+            }
         }
         for rival in Rival::ALL.into_iter().filter(|rival| *rival != Rival::Dsbrdf) {
             fit(&Contender::Rival(rival), material, &mut table)?;

@@ -4,6 +4,7 @@ use crate::error::Result;
 use crate::image::{RgbImage, resize};
 use crate::job::pictures::{light_of, matched};
 use crate::light::Environment;
+use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -56,14 +57,20 @@ pub struct ShelfLight {
     pub environment: Arc<Environment>,
     /// A small picture of it.
     pub small: Arc<RgbImage>,
+    /// Mean radiance over the sphere.
+    pub mean_radiance: Vec3,
+    /// Largest number of any texel.
+    pub brightest: f32,
 }
 
 impl ShelfLight {
-    /// A light with its small picture.
+    /// A light with its small picture and what is said of it: a window asks for them in every frame.
     pub fn new(name: LightName, environment: Arc<Environment>) -> Self {
         let factor = (environment.width() / SMALL_WIDTH).max(1);
         let small = resize::shrink(&environment.radiance, factor);
-        ShelfLight { name, environment, small: Arc::new(small) }
+        let brightest = environment.radiance.pixels().iter().map(|texel| texel.max_element()).fold(0.0, f32::max);
+        let mean_radiance = environment.mean_radiance();
+        ShelfLight { name, environment, small: Arc::new(small), mean_radiance, brightest }
     }
 }
 

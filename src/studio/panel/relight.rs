@@ -5,7 +5,7 @@ use crate::image::display::DisplaySettings;
 use crate::image::{Image, RgbImage};
 use crate::studio::act::Act;
 use crate::studio::model::Model;
-use crate::studio::model::lights::LightName;
+use crate::studio::model::lights::{LightName, ShelfLight};
 use crate::studio::stage::Layer;
 use crate::studio::theme::{self, SHELF_PICTURE};
 use egui::{
@@ -111,7 +111,7 @@ fn shelf(ui: &mut Ui, model: &mut Model, memory: &mut RelightMemory) {
                         model.edits.relight.first = light.name.clone();
                         model.edits.layer = Layer::Lit;
                     }
-                    let response = response.on_hover_text(about(&light.name, &light.environment));
+                    let response = response.on_hover_text(about(light));
                     if matches!(light.name, LightName::File(_)) {
                         response.context_menu(|ui| {
                             if ui.button("Take off the shelf").clicked() {
@@ -179,10 +179,9 @@ fn strip(ui: &mut Ui, model: &mut Model, memory: &mut RelightMemory) {
     });
 }
 
-fn about(name: &LightName, light: &crate::light::Environment) -> String {
-    let mean = light.mean_radiance();
-    let brightest = light.radiance.pixels().iter().map(|pixel| pixel.max_element()).fold(0.0f32, f32::max);
-    let place = match name {
+fn about(light: &ShelfLight) -> String {
+    let (mean, brightest) = (light.mean_radiance, light.brightest);
+    let place = match &light.name {
         LightName::File(path) => format!("{}\nRight click takes it off the shelf", path.display()),
         LightName::Fitted => "The light that was fitted to the photos".into(),
         LightName::Truth => "The light the photos were made in".into(),
@@ -191,8 +190,8 @@ fn about(name: &LightName, light: &crate::light::Environment) -> String {
     };
     format!(
         "{place}\n{} x {} texels, mean radiance {:.3} {:.3} {:.3}, brightest {brightest:.1}",
-        light.width(),
-        light.height(),
+        light.environment.width(),
+        light.environment.height(),
         mean.x,
         mean.y,
         mean.z

@@ -122,14 +122,15 @@ fn reflectance(cos_out: f32, width: f32) -> Vec3 {
     let frame = Frame::around(Vec3::Z);
     // Channel 0 reflects nothing at normal incidence, channel 1 everything: their difference is the part by F0.
     let material = Material { diffuse: [0.0; 3], specular: [0.0, 1.0, 1.0], log_width: width.ln() };
+    let sampler = material.sampler(cos_out, 1.0);
     let mut sum = Vec3::ZERO;
     for sample in 0..SAMPLES {
         let even = (sample as f32 + 0.5) / SAMPLES as f32;
         let [choice, u] = [3, 2].map(|base| radical_inverse(sample + 1, base));
-        let Some(light) = material.sample(&frame, towards_viewer, 1.0, choice, [even, u]) else { continue };
+        let Some(light) = sampler.sample(&frame, towards_viewer, choice, [even, u]) else { continue };
         let Some(geometry) = LobeGeometry::new(Vec3::Z, light, towards_viewer) else { continue };
         let [low, high, _] = material.reflect(&geometry, 1.0);
-        let density = material.density(&geometry, 1.0);
+        let density = sampler.density(&geometry);
         if density > 0.0 {
             sum += Vec3::new(high - low, low, 0.0) / density;
         }
