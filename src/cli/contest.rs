@@ -134,6 +134,9 @@ pub struct TracerArguments {
     /// The folder of `time_exchange.py`.
     #[arg(long, default_value = "tests/mitsuba")]
     pub scripts: PathBuf,
+    /// `tests/embree/time_rays.c`, compiled; without it, Embree is not asked for single rays.
+    #[arg(long)]
+    pub embree: Option<PathBuf>,
     /// Folder of the table.
     #[arg(short, long, default_value = "patina-bench")]
     pub output: PathBuf,
@@ -152,6 +155,7 @@ pub fn tracer(options: &TracerArguments, json: bool, threads: Option<usize>) -> 
         threads,
         python: options.python.clone(),
         scripts: options.scripts.clone(),
+        embree: options.embree.clone(),
         output: options.output.clone(),
     };
     let table = tracer_speed::run(&tracer, &teller("tracer", json))?;

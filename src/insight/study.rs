@@ -61,13 +61,19 @@ impl StudyTable {
     /// Adds the values of one seed to a row, one a column; the row is made when it is new. Missing values become NaN,
     /// surplus ones are dropped.
     pub fn add(&mut self, row: &str, values: &[f64]) {
+        let value = |column: usize| Some(values.get(column).copied().unwrap_or(f64::NAN));
+        self.add_some(row, &(0..self.columns.len()).map(value).collect::<Vec<_>>());
+    }
+
+    /// Adds values to a row that has no such thing in some columns: those are `None` or missing, and are no failures.
+    pub fn add_some(&mut self, row: &str, values: &[Option<f64>]) {
         let columns = self.columns.len();
         let index = self.rows.iter().position(|(name, _)| name == row).unwrap_or_else(|| {
             self.rows.push((row.into(), vec![Vec::new(); columns]));
             self.rows.len() - 1
         });
-        for (column, cell) in self.rows[index].1.iter_mut().enumerate() {
-            cell.push(values.get(column).copied().unwrap_or(f64::NAN));
+        for (cell, value) in self.rows[index].1.iter_mut().zip(values) {
+            cell.extend(*value);
         }
     }
 
@@ -249,6 +255,9 @@ mod tests {
         let markdown = table.to_markdown();
         assert!(markdown.contains("| none | 0.3 (0.2 – 0.4) | 12 (11 – 13) |"), "{markdown}");
         assert!(markdown.contains("20 (20 – 20), 1 failed"), "{markdown}");
+        let mut partial = table.clone();
+        partial.add_some("rays alone", &[Some(7.0)]);
+        assert!(partial.to_markdown().contains("| rays alone | 7 | – |"), "{}", partial.to_markdown());
         let csv = table.to_csv();
         assert!(csv.contains("\"exact, twice\",time,s,4,1,20,20,20\n"), "{csv}");
         assert_eq!(table.samples_csv().lines().count(), 1 + 2 * 2 * 5);
