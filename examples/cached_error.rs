@@ -1,10 +1,10 @@
 //! Error of cached transport against the path tracer, over its settings.
 //!
-//! `cargo run --release --no-default-features --example cached_error -- [FOLDER|demo] [samples] [grids] [PICTURES]`
+//! `cargo run --release --no-default-features --example cached_error -- [FOLDER|demo] [samples] [grids] [side] [PICTURES]`
 //!
 //! The squared error is the product of the differences to two independent pictures of the path tracer, so that their
-//! noise does not count. Prints the error relative to the root mean square of the picture, and what the cache took. With
-//! a fourth argument the pictures go to that folder: the cache's, the path tracer's, the difference and its square.
+//! noise does not count. Prints the error relative to the root mean square of the picture, and what the cache took. `side`
+//! is the root of the number of samples of a pixel at first. With a fifth argument the pictures go to that folder: the cache's, the path tracer's, the difference and its square.
 
 use glam::Vec3;
 use patina::Result;
@@ -24,7 +24,11 @@ fn main() -> Result<()> {
     let samples: usize = arguments.get(1).and_then(|value| value.parse().ok()).unwrap_or(128);
     let grids: Vec<usize> =
         arguments.get(2).map_or("128,256", String::as_str).split(',').filter_map(|value| value.parse().ok()).collect();
-    let pictures = arguments.get(3).map(PathBuf::from);
+    let coarse_side = arguments
+        .get(3)
+        .and_then(|value| value.parse().ok())
+        .unwrap_or_else(|| FootprintSettings::default().coarse_side);
+    let pictures = arguments.get(4).map(PathBuf::from);
     let scene = if source == "demo" {
         demo::build(&demo::DemoSettings::default())?.scene
     } else {
@@ -82,7 +86,12 @@ fn main() -> Result<()> {
                         &transport.grid,
                         &scene.views[view].camera,
                         view as u32,
-                        &FootprintSettings { map_size, lobe_rays: max_bounces > 1, ..FootprintSettings::default() },
+                        &FootprintSettings {
+                            map_size,
+                            coarse_side,
+                            lobe_rays: max_bounces > 1,
+                            ..FootprintSettings::default()
+                        },
                     );
                     hits += began.elapsed().as_secs_f64();
                     let began = Instant::now();

@@ -6,6 +6,7 @@
 //! What is not here: linear algebra (that is glam's and faer's).
 
 pub mod arc;
+pub mod clusters;
 pub mod distribution;
 pub mod frame;
 pub mod random;

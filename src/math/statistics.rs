@@ -46,6 +46,12 @@ pub fn quantile(values: &[f64], fraction: f64) -> f64 {
     sorted[low] + (sorted[high] - sorted[low]) * (place - low as f64)
 }
 
+/// Standard deviation of each of three normal numbers, from root mean squares of such triples, of which most may be
+/// believed: their median length is 1.538 standard deviations. NaN when empty.
+pub fn deviation_of_triples(root_mean_squares: &[f64]) -> f64 {
+    quantile(root_mean_squares, 0.5) * 3f64.sqrt() / 1.538
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -58,5 +64,20 @@ mod tests {
         assert_eq!(quantile(&values, 0.5), 3.0);
         assert_eq!(quantile(&values, 0.875), 7.0);
         assert!(quantile(&[], 0.5).is_nan());
+    }
+
+    #[test]
+    fn the_deviation_of_triples_is_found_beside_outliers() {
+        let mut random = crate::math::random::SequentialRandom::new(4);
+        let mut normal = || {
+            let (u, v) = (f64::from(random.next_number()), f64::from(random.next_number()));
+            (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+        };
+        let triple = |_| ((0..3).map(|_| (0.2 * normal()).powi(2)).sum::<f64>() / 3.0).sqrt();
+        let mut sizes: Vec<f64> = (0..20_000).map(triple).collect();
+        assert!((deviation_of_triples(&sizes) / 0.2 - 1.0).abs() < 0.02, "{}", deviation_of_triples(&sizes));
+        sizes.iter_mut().take(500).for_each(|size| *size *= 1e6);
+        assert!((deviation_of_triples(&sizes) / 0.2 - 1.0).abs() < 0.05);
+        assert!(deviation_of_triples(&[]).is_nan());
     }
 }

@@ -1,41 +1,18 @@
 //! Connected patches of pixels: what a defect leaves, and noise does not.
 
 use crate::image::Image;
+use crate::math::clusters::clusters;
 
 /// The pixels of patches of at least `fewest` pixels that hold together along edges and are three pixels thick somewhere.
 pub fn patches(flagged: &Image<bool>, fewest: usize) -> Image<bool> {
     let (width, height) = (flagged.width(), flagged.height());
     let mut kept = Image::filled(width, height, false);
-    let mut seen = vec![false; width * height];
     let is_thick = |pixel: usize| {
         let (row, column) = (pixel / width, pixel % width);
         let inside = row > 0 && column > 0 && row + 1 < height && column + 1 < width;
         inside && [pixel - 1, pixel + 1, pixel - width, pixel + width].iter().all(|&other| flagged.pixels()[other])
     };
-    for start in 0..width * height {
-        if seen[start] || !flagged.pixels()[start] {
-            continue;
-        }
-        let mut patch = vec![start];
-        seen[start] = true;
-        let mut next = 0;
-        while next < patch.len() {
-            let pixel = patch[next];
-            next += 1;
-            let (row, column) = (pixel / width, pixel % width);
-            let around = [
-                (column > 0, pixel.wrapping_sub(1)),
-                (column + 1 < width, pixel + 1),
-                (row > 0, pixel.wrapping_sub(width)),
-                (row + 1 < height, pixel + width),
-            ];
-            for (exists, other) in around {
-                if exists && !seen[other] && flagged.pixels()[other] {
-                    seen[other] = true;
-                    patch.push(other);
-                }
-            }
-        }
+    for patch in clusters(flagged.pixels(), [width, height, 1]) {
         if patch.len() >= fewest && patch.iter().any(|&pixel| is_thick(pixel)) {
             patch.iter().for_each(|&pixel| kept.pixels_mut()[pixel] = true);
         }

@@ -8,6 +8,7 @@
 use super::pictures::{Comparison, NO_SURFACE};
 use super::points::{Point, pixel_of};
 use crate::image::Image;
+use crate::math::clusters::clusters;
 use crate::math::statistics::quantile;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -54,7 +55,8 @@ pub fn missing_part(comparison: &Comparison, points: &[Point], unlike: &[Image<b
         .into_par_iter()
         .map(|cell| is_unlike_from_everywhere(comparison, unlike, place(cell), cell_length))
         .collect();
-    let cells = largest_cluster(&is_missing, [nx, ny, nz]);
+    // Of clusters of one size the first.
+    let cells = clusters(&is_missing, [nx, ny, nz]).into_iter().rev().max_by_key(Vec::len)?;
     if cells.len() < FEWEST_CELLS {
         return None;
     }
@@ -102,59 +104,4 @@ fn is_unlike_from_everywhere(comparison: &Comparison, unlike: &[Image<bool>], pl
         }
     }
     seen >= FEWEST_VIEWS && unlike_in as f64 >= MOST_OF_THEM * seen as f64
-}
-
-/// The cells of the largest cluster that holds together over faces.
-fn largest_cluster(is_set: &[bool], [nx, ny, nz]: [usize; 3]) -> Vec<usize> {
-    let mut largest = Vec::new();
-    let mut seen = vec![false; is_set.len()];
-    for start in 0..is_set.len() {
-        if seen[start] || !is_set[start] {
-            continue;
-        }
-        let mut cluster = vec![start];
-        seen[start] = true;
-        let mut next = 0;
-        while next < cluster.len() {
-            let cell = cluster[next];
-            next += 1;
-            let (x, y, z) = (cell % nx, cell / nx % ny, cell / (nx * ny));
-            let around = [
-                (x > 0, cell.wrapping_sub(1)),
-                (x + 1 < nx, cell + 1),
-                (y > 0, cell.wrapping_sub(nx)),
-                (y + 1 < ny, cell + nx),
-                (z > 0, cell.wrapping_sub(nx * ny)),
-                (z + 1 < nz, cell + nx * ny),
-            ];
-            for (exists, other) in around {
-                if exists && is_set[other] && !seen[other] {
-                    seen[other] = true;
-                    cluster.push(other);
-                }
-            }
-        }
-        if cluster.len() > largest.len() {
-            largest = cluster;
-        }
-    }
-    largest
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_largest_cluster_holds_together_over_faces() {
-        let size = [4, 3, 2];
-        let mut is_set = vec![false; 24];
-        for cell in [0, 1, 5, 17, 11, 22] {
-            is_set[cell] = true;
-        }
-        let mut cluster = largest_cluster(&is_set, size);
-        cluster.sort_unstable();
-        assert_eq!(cluster, [0, 1, 5, 17]);
-        assert!(largest_cluster(&[false; 24], size).is_empty());
-    }
 }

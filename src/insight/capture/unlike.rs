@@ -3,7 +3,7 @@
 use super::patches::patches;
 use super::smooth::smoothed;
 use crate::image::{Image, RgbImage};
-use crate::math::statistics::quantile;
+use crate::math::statistics::deviation_of_triples;
 use glam::Vec3;
 
 /// Smoothing in pixels.
@@ -35,8 +35,7 @@ pub fn unlike_patches(
     let usual = [true, false].map(|surface| {
         let own = (0..width * height).filter(|&pixel| judged.pixels()[pixel] && is_surface.pixels()[pixel] == surface);
         let sizes: Vec<f64> = own.map(|pixel| f64::from(rest.pixels()[pixel])).collect();
-        // The median length of three normal numbers is 1.538 standard deviations.
-        if sizes.is_empty() { 0.0 } else { (quantile(&sizes, 0.5) * 3f64.sqrt() / 1.538) as f32 }
+        if sizes.is_empty() { 0.0 } else { deviation_of_triples(&sizes) as f32 }
     });
     let flagged = Image::from_fn(width, height, |row, column| {
         if !judged[(row, column)] {
