@@ -11,20 +11,18 @@
 //! together, which is harder.
 
 use super::StudyOptions;
+use super::contender::{Contender, LEFT_OUT, LOBES, SEEN, name_of_left_out};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::image::file;
 use crate::insight::bar_picture::{self, PictureBar};
 use crate::insight::report::number::{escaped, fixed};
 use crate::measured::category::Category;
-use crate::measured::fit_model::ModelFitSettings;
 use crate::measured::fits::NeuralFits;
 use crate::measured::metrics::TableError;
-use crate::measured::model::ReflectanceModel;
 use crate::measured::rivals::{ModelSummary, Rival, RivalRow, summarise};
 use crate::measured::table::MeasuredBrdf;
-use crate::neural::fit::{FlowFitSettings, fit_table};
-use crate::neural::own_net::{self, OwnNetSettings, fit_own_net};
-use crate::neural::{FlowModel, Trained};
+use crate::neural::Trained;
+use crate::neural::own_net;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -34,24 +32,10 @@ use std::time::Instant;
 pub const TITLE: &str = "Figure 2: how closely models represent measured materials";
 /// First line of `fig2.csv`.
 const HEADER: &str = "material,category,model,parameters,log_rmse,log10_rmse,cosine_rmse,cosine_mean,cells,seconds";
-/// Lobes of the neural model.
-const LOBES: usize = 3;
 /// Every so many materials are fitted by a quick study.
 const QUICK_STRIDE: usize = 22;
 /// Materials left out of the training that a quick study adds.
 const QUICK_LEFT_OUT: usize = 1;
-/// Name of the neural model that was trained on all materials.
-const SEEN: &str = "iBRDF";
-/// Name of the neural model on materials it has not seen.
-const LEFT_OUT: &str = "iBRDF, left out";
-
-/// Name of further weights on materials they have not seen: their size and what they were trained on.
-fn name_of_left_out(trained: &Trained) -> String {
-    let account = &trained.account;
-    let (size, materials) = (&account.architecture.name, account.materials.len());
-    format!("{LEFT_OUT}, {size}, {materials} materials, {} steps", account.step)
-}
-
 /// One fit.
 #[derive(Clone, Debug, PartialEq)]
 struct Row {
@@ -87,53 +71,6 @@ impl Row {
         let (category, model) = (Category::of(&material), model.to_string());
         let parameters = parameters as usize;
         Some(Row { row: RivalRow { material, category, model, parameters, error, sphere: None }, seconds })
-    }
-}
-
-/// What is fitted.
-#[derive(Clone)]
-enum Contender {
-    /// Codes and colours, the weights held.
-    Flow(String, Arc<Trained>),
-    /// All weights.
-    OwnNet(Arc<Trained>),
-    Rival(Rival),
-}
-
-impl Contender {
-    fn name(&self) -> &str {
-        match self {
-            Contender::Flow(name, _) => name,
-            Contender::OwnNet(_) => own_net::NAME,
-            Contender::Rival(rival) => rival.name(),
-        }
-    }
-
-    /// Parameters and error. A quick study fits the neural model by fewer points and steps.
-    fn fit(&self, table: &MeasuredBrdf, quick: bool) -> Result<(usize, TableError)> {
-        match self {
-            Contender::Flow(_, trained) => {
-                let model = FlowModel::new(Arc::clone(trained), LOBES);
-                let settings = match quick {
-                    true => FlowFitSettings { columns: 120, steps: 120, ..FlowFitSettings::default() },
-                    false => FlowFitSettings::default(),
-                };
-                let found = fit_table(&model, table, &settings)?;
-                Ok((model.parameter_count(), found.error))
-            }
-            Contender::OwnNet(trained) => {
-                let settings = match quick {
-                    true => OwnNetSettings { steps: 300, rounds: 1, ..OwnNetSettings::default() },
-                    false => OwnNetSettings::default(),
-                };
-                let found = fit_own_net(trained, table, &settings)?;
-                Ok((found.parameter_count(), found.error))
-            }
-            Contender::Rival(rival) => {
-                let found = rival.fit(table, &ModelFitSettings::default())?;
-                Ok((found.model.parameter_count(), found.error))
-            }
-        }
     }
 }
 
