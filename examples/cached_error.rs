@@ -4,7 +4,8 @@
 //!
 //! The squared error is the product of the differences to two independent pictures of the path tracer, so that their
 //! noise does not count. Prints the error relative to the root mean square of the picture, and what the cache took. `side`
-//! is the root of the number of samples of a pixel at first. With a fifth argument the pictures go to that folder: the cache's, the path tracer's, the difference and its square.
+//! is the root of the number of samples of a pixel at first. With a fifth argument the pictures go to that folder: the
+//! cache's, the path tracer's, the difference and its square.
 
 use glam::Vec3;
 use patina::Result;

@@ -5,7 +5,7 @@ use crate::atlas::{AtlasSettings, KeepUv};
 use crate::error::{Error, ErrorKind, Result};
 use crate::fit::FitSettings;
 use crate::insight::report::data::StageTime;
-use crate::math::random::{SampleStream, StreamKey};
+use crate::math::random::{SampleStream, StreamKey, normal_number};
 use crate::render::Surface;
 use crate::render::picture::{PictureSettings, render};
 use crate::scene::demo::{self, DemoSettings};
@@ -105,9 +105,7 @@ pub fn with_noise(picture: &mut crate::image::RgbImage, share: f32, floor: f32, 
     for (index, pixel) in picture.pixels_mut().iter_mut().enumerate() {
         for channel in 0..3 {
             let mut stream = SampleStream::new(StreamKey::new(seed, 0, channel, index as u32), 0);
-            let [u, v] = stream.next_pair();
-            // Box and Muller 1958.
-            let normal = (-2.0 * (1.0 - u).ln()).sqrt() * (std::f32::consts::TAU * v).cos();
+            let normal = normal_number(stream.next_pair());
             let value = pixel[channel as usize];
             pixel[channel as usize] = (value + normal * (share * value + floor)).max(0.0);
         }

@@ -52,6 +52,11 @@ impl SampleStream {
     }
 }
 
+/// A number with the standard normal distribution from two uniform in [0, 1) (Box and Muller 1958).
+pub fn normal_number([u, v]: [f32; 2]) -> f32 {
+    (-2.0 * (1.0 - u).ln()).sqrt() * (std::f32::consts::TAU * v).cos()
+}
+
 /// A number in [0, 1) from the upper 24 bits.
 fn unit_float(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
@@ -107,6 +112,11 @@ impl SequentialRandom {
     /// The next number, uniform in [0, 1).
     pub fn next_number(&mut self) -> f32 {
         unit_float((self.next_bits() >> 32) as u32)
+    }
+
+    /// A number with the standard normal distribution, from the next two.
+    pub fn next_normal(&mut self) -> f32 {
+        normal_number([self.next_number(), self.next_number()])
     }
 
     /// The next whole number in `0..bound`; `bound` must not be 0.

@@ -79,7 +79,7 @@ impl Training {
         let length = flow.architecture().code;
         let densities = library.targets.len() * 3;
         let mut random = SequentialRandom::new(mix(settings.seed ^ 0xc0de));
-        let codes = (0..densities * length).map(|_| 0.01 * normal(&mut random)).collect();
+        let codes = (0..densities * length).map(|_| 0.01 * random.next_normal()).collect();
         let of_weights = Adam::new(flow.weights.len());
         Ok(Training { flow, codes, of_weights, of_codes: vec![Adam::new(length); densities], step: 0, settings })
     }
@@ -143,12 +143,6 @@ pub fn project_to_ball(code: &mut [f32]) {
     } else if length > 1.0 {
         code.iter_mut().for_each(|x| *x = (f64::from(*x) / length) as f32);
     }
-}
-
-/// A standard normal number (Box and Muller 1958).
-fn normal(random: &mut SequentialRandom) -> f32 {
-    let (u, v) = (1.0 - random.next_number(), random.next_number());
-    (-2.0 * u.ln()).sqrt() * (std::f32::consts::TAU * v).cos()
 }
 
 #[cfg(test)]

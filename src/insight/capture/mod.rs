@@ -159,7 +159,7 @@ fn look_at(comparison: &Comparison, own: &Compared, name: &str) -> ViewSays {
     // A turned camera is told as that, not as patches along its edges.
     let moved = halves.each_ref().map(|half| shift.map_or_else(|| half.clone(), |shift| shift.moved(half)));
     let unlike = unlike::unlike_patches(&photo, [&moved[0], &moved[1]], &comparable, &is_surface);
-    let model = Image::from_fn(width, height, |row, column| 0.5 * (moved[0][(row, column)] + moved[1][(row, column)]));
+    let model = pictures::mean_of(&moved);
     let doubt = masks::doubt(own, &photo, &model, &unlike);
     let judged = patches::count(&comparable).max(1) as f64;
 

@@ -54,10 +54,7 @@ impl Compared {
 
     /// The model's picture.
     pub fn model(&self) -> RgbImage {
-        let [first, second] = &self.halves;
-        Image::from_fn(first.width(), first.height(), |row, column| {
-            0.5 * (first[(row, column)] + second[(row, column)])
-        })
+        mean_of(&self.halves)
     }
 
     /// Whether a pixel and its eight neighbours are all surface, or all background.
@@ -122,6 +119,11 @@ pub fn compare(fitter: &Fitter, stop: &AtomicBool) -> Option<Comparison> {
     };
     let level = level_of(&views);
     Some(Comparison { views, level, background_known })
+}
+
+/// The mean of two pictures of one size.
+pub fn mean_of([first, second]: &[RgbImage; 2]) -> RgbImage {
+    Image::from_fn(first.width(), first.height(), |row, column| 0.5 * (first[(row, column)] + second[(row, column)]))
 }
 
 /// Indices of at most [`MOST_VIEWS`] views, evenly spread over those that were fitted to.

@@ -1,6 +1,7 @@
 //! Patches of a photo that the model's picture does not explain.
 
 use super::patches::patches;
+use super::pictures::mean_of;
 use super::smooth::smoothed;
 use crate::image::{Image, RgbImage};
 use crate::math::statistics::deviation_of_triples;
@@ -28,10 +29,10 @@ pub fn unlike_patches(
 ) -> Image<bool> {
     let (width, height) = (photo.width(), photo.height());
     let photo = smoothed(photo, judged, SIGMA);
-    let [first, second] = halves.map(|half| smoothed(half, judged, SIGMA));
+    let halves = halves.map(|half| smoothed(half, judged, SIGMA));
+    let model = mean_of(&halves);
     let size = |value: Vec3| value.length() / 3f32.sqrt();
-    let model = |row: usize, column: usize| 0.5 * (first[(row, column)] + second[(row, column)]);
-    let rest = Image::from_fn(width, height, |row, column| size(photo[(row, column)] - model(row, column)));
+    let rest = Image::from_fn(width, height, |row, column| size(photo[(row, column)] - model[(row, column)]));
     let usual = [true, false].map(|surface| {
         let own = (0..width * height).filter(|&pixel| judged.pixels()[pixel] && is_surface.pixels()[pixel] == surface);
         let sizes: Vec<f64> = own.map(|pixel| f64::from(rest.pixels()[pixel])).collect();
@@ -43,9 +44,9 @@ pub fn unlike_patches(
         }
         let (left, right) = (column.saturating_sub(1), (column + 1).min(width - 1));
         let (above, below) = (row.saturating_sub(1), (row + 1).min(height - 1));
-        let across = size(model(row, right) - model(row, left)) / (right - left).max(1) as f32;
-        let down = size(model(below, column) - model(above, column)) / (below - above).max(1) as f32;
-        let noise = 0.5 * size(first[(row, column)] - second[(row, column)]);
+        let across = size(model[(row, right)] - model[(row, left)]) / (right - left).max(1) as f32;
+        let down = size(model[(below, column)] - model[(above, column)]) / (below - above).max(1) as f32;
+        let noise = 0.5 * size(halves[0][(row, column)] - halves[1][(row, column)]);
         let usual = if is_surface[(row, column)] { usual[0] } else { usual[1] };
         let edge = EDGE_PIXELS * across.hypot(down);
         let rest = rest[(row, column)];

@@ -71,7 +71,8 @@ pub struct TracerOptions {
 /// Times every scene; `tell` hears of each.
 ///
 /// # Errors
-/// A scene that cannot be read. Where Python or Mitsuba is absent, a note of the table says so.
+/// A scene that cannot be read, rays that cannot be written. Where Python, Mitsuba or Embree is absent, a note of the
+/// table says so.
 pub fn run(options: &TracerOptions, tell: &dyn Fn(&str)) -> Result<StudyTable> {
     let threads = rayon::current_num_threads();
     let mut table =
@@ -158,11 +159,12 @@ fn time(scene: &Scene, name: &str, options: &TracerOptions, table: &mut StudyTab
                 table.add_some(&format!("{name}, {}", row.name), &row.rates.map(Some));
             }
             for row in rows.iter().filter(|row| row.met != met) {
-                table.notes.push(format!(
-                    "{name}: of camera, bounce and shadow rays {:?} met something by {}, {met:?} by \
-                                          patina.",
-                    row.met, row.name
-                ));
+                let (theirs, rival) = (row.met, &row.name);
+                let note = format!("{name}: {theirs:?} rays met something by {rival}, {met:?} by patina.");
+                // All repetitions meet the same.
+                if !table.notes.contains(&note) {
+                    table.notes.push(note);
+                }
             }
         }
         Err(why) => table.notes.push(format!("{name}: Embree was left out: {why}.")),

@@ -30,7 +30,7 @@ pub struct Workload<'a> {
     pub lit: &'a Parameters<f32>,
     /// Indices of the views.
     pub views: &'a [usize],
-    /// Directions a path takes after the camera's, at most.
+    /// Number of surface hits on the longest path.
     pub bounces: usize,
     /// Paths a pixel.
     pub samples: usize,

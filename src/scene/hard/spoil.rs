@@ -49,7 +49,7 @@ impl HardScene {
             HardCase::Decimated => self.decimate(&mut scene.mesh),
             HardCase::NoisyNormals => {
                 for normal in &mut scene.mesh.normals {
-                    let mut draw = || NORMAL_NOISE * normal_number(&mut random);
+                    let mut draw = || NORMAL_NOISE * random.next_normal();
                     let (right, up) = normal.any_orthonormal_pair();
                     *normal = (*normal + draw() * right + draw() * up).try_normalize().unwrap_or(*normal);
                 }
@@ -155,12 +155,6 @@ fn eight_bit(view: &mut View) {
         false => PixelState::Surface,
     });
     view.photo = Photo::Srgb8(bytes);
-}
-
-/// A number with the standard normal distribution (Box and Muller 1958).
-fn normal_number(random: &mut SequentialRandom) -> f32 {
-    let (u, v) = (random.next_number(), random.next_number());
-    (-2.0 * (1.0 - u).ln()).sqrt() * (std::f32::consts::TAU * v).cos()
 }
 
 #[cfg(test)]

@@ -77,11 +77,6 @@ mod tests {
     use super::*;
     use crate::math::random::SequentialRandom;
 
-    fn normal(random: &mut SequentialRandom) -> f64 {
-        let (u, v) = (f64::from(random.next_number()), f64::from(random.next_number()));
-        (-2.0 * (1.0 - u).ln()).sqrt() * (2.0 * std::f64::consts::PI * v).cos()
-    }
-
     /// Share of trials in which the true mean lies within a standard error, by views and by pixels alone.
     fn coverage(views: usize, trials: usize) -> (f64, f64) {
         let mut random = SequentialRandom::new(31 + views as u64);
@@ -90,8 +85,8 @@ mod tests {
             let (mut by_views, mut by_pixels) = (ClusteredMean::default(), ClusteredMean::default());
             for _ in 0..views {
                 let pixels = 20 + (30.0 * random.next_number()) as usize;
-                let shared = 0.3 + 0.5 * normal(&mut random);
-                let drawn: Vec<f64> = (0..pixels).map(|_| shared + normal(&mut random)).collect();
+                let shared = 0.3 + 0.5 * f64::from(random.next_normal());
+                let drawn: Vec<f64> = (0..pixels).map(|_| shared + f64::from(random.next_normal())).collect();
                 by_views.add_view(drawn.iter().sum(), pixels as f64);
                 drawn.iter().for_each(|&value| by_pixels.add_view(value, 1.0));
             }

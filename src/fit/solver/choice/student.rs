@@ -81,11 +81,6 @@ mod tests {
     use super::*;
     use crate::math::random::SequentialRandom;
 
-    fn normal(random: &mut SequentialRandom) -> f64 {
-        let (u, v) = (f64::from(random.next_number()), f64::from(random.next_number()));
-        (-2.0 * (1.0 - u).ln()).sqrt() * (2.0 * PI * v).cos()
-    }
-
     #[test]
     fn the_density_integrates_to_one() {
         for freedom in FREEDOMS {
@@ -106,7 +101,7 @@ mod tests {
     fn scale_and_tails_are_found_and_outliers_do_not_move_them_far() {
         let mut random = SequentialRandom::new(5);
         let draw = |random: &mut SequentialRandom, sigma: f64| -> f64 {
-            (0..3).map(|_| (sigma * normal(random)).powi(2)).sum()
+            (0..3).map(|_| (sigma * f64::from(random.next_normal())).powi(2)).sum()
         };
         let plain: Vec<f64> = (0..2000).map(|_| draw(&mut random, 0.1)).collect();
         let noise = StudentNoise::fit(&plain, 1e-9, 1.0);

@@ -53,10 +53,7 @@ fn photograph(held_out: usize, noise: f32, lobe_of: impl Fn(usize) -> Option<[f3
     let planes = cache.transport.basis.planes(&estimate.light);
     let at = cache.point_light(&estimate, &planes);
     let mut random = SequentialRandom::new(9);
-    let mut normal = move || {
-        let (u, v) = (random.next_number(), random.next_number());
-        (-2.0 * (1.0 - u).ln()).sqrt() * (std::f32::consts::TAU * v).cos()
-    };
+    let mut normal = move || random.next_normal();
     let own = cache.targets.iter().map(|target| target.view).zip(&cache.footprints);
     let judging = cache.held_out.iter().map(|(target, footprints)| (target.view, footprints));
     for (view, footprints) in own.chain(judging) {
