@@ -484,6 +484,28 @@ fn a_stop_that_cannot_save_is_an_error_and_no_stop() {
 }
 
 #[test]
+fn a_stop_while_the_report_is_made_is_no_failure_and_the_maps_are_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let (gate, options) = Gate::new();
+    let job = job(new_fitter(&base()), folder.path(), options);
+    gate.until(12);
+    job.stop();
+    gate.one();
+    let events = until(&job, is_end);
+    assert!(events.iter().any(|event| matches!(event, Event::Finishing(_))), "the steps were done: {events:?}");
+    assert!(matches!(events.last(), Some(Event::Stopped { steps_done: 12 })), "{:?}", events.last());
+    assert!(events.iter().any(|event| is_finding(event, "report-not-made")));
+    job.join();
+    assert!(folder.path().join("diffuse.exr").is_file() && !folder.path().join("report.html").exists());
+    // What is left is the report: taken up, it is made.
+    let taken = taken_up(folder.path());
+    assert_eq!(taken.state().step, 12);
+    let job = common::job(taken, folder.path(), JobOptions::default());
+    report(&until(&job, is_end));
+    assert!(folder.path().join("report.html").is_file());
+}
+
+#[test]
 fn a_worker_that_panics_says_so_and_its_checkpoint_is_whole() {
     let folder = tempfile::tempdir().unwrap();
     let (gate, JobOptions { before_step, .. }) = Gate::new();

@@ -51,7 +51,9 @@ wait_for_title() { # pattern of grep -E, seconds
     if title | grep -qE -- "$1"; then return 0; fi
     sleep 0.5
   done
-  echo "the title never held '$1': $(title)"; exit 1
+  echo "the title never held '$1': $(title)"
+  act 'Panel: messages'; picture why_not
+  cat "$work/log"; exit 1
 }
 
 # Without a window manager nobody gives the window the keys.

@@ -105,7 +105,7 @@ pub enum Event {
     Finishing(String),
     /// Everything is written.
     Finished(Box<crate::insight::report::ReportData>),
-    /// The job ended early as asked; the checkpoint holds its state.
+    /// The job ended early as asked, in its steps or while its report was made; the checkpoint holds its state.
     Stopped {
         /// Steps done.
         steps_done: usize,

@@ -5,10 +5,10 @@ use super::against_truth::truth_errors;
 use super::facts::describe;
 use super::pictures::parameters;
 use super::prepare::{Prepared, RunSettings, covered, timed};
-use super::shown::{exposure_of, relit_strips, score_views};
+use super::shown::{exposure_of, go_on, relit_strips, score_views};
 use super::solver_told::SolverTold;
 use crate::atlas::{dilate, nearest_covered};
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::Result;
 use crate::export::{LossRow, RunFolder, RunResult};
 use crate::fit::state::FitState;
 use crate::fit::views::views_of;
@@ -20,7 +20,7 @@ use crate::insight::report::{ReportImages, write_report};
 use crate::insight::scores::aggregate;
 use crate::insight::{capture, coverage, memory};
 use crate::material::MaterialMaps;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 /// The loss history as the run folder keeps it.
 pub fn loss_rows(state: &FitState) -> Vec<LossRow> {
@@ -80,10 +80,7 @@ pub fn write(
     finishing("relit pictures");
     let (relit, relit_errors) =
         timed(&mut timings, "relight", || relit_strips(fitter, surface, &own, &result, settings, stop))?;
-    if stop.load(Ordering::Relaxed) {
-        return Err(Error::new(ErrorKind::Stopped, "stopped while the report was made")
-            .remedy("the maps are written; `patina resume` makes the report"));
-    }
+    go_on(stop)?;
 
     let mut data = describe(fitter, &prepared, settings, &result, &covered);
     let transport = timed(&mut timings, "check of transport", || fitter.transport_error(stop));

@@ -2,7 +2,7 @@
 
 use super::pictures::{light_of, matched, relit};
 use super::prepare::RunSettings;
-use crate::error::Result;
+use crate::error::{Error, ErrorKind, Result};
 use crate::export::RunResult;
 use crate::fit::targets::Target;
 use crate::fit::views::views_of;
@@ -13,7 +13,7 @@ use crate::insight::scores::{ViewScores, mean_of, score_halves};
 use crate::render::picture::{Picture, PictureSettings, render};
 use crate::render::{Parameters, Surface};
 use crate::scene::{Background, PixelState, Scene};
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Pixels of a held-out view in the report, at most; larger photos are halved first.
 const HELD_OUT_PIXELS: usize = 400_000;
@@ -86,6 +86,7 @@ pub(super) fn score_views(
             half.radiance.pixels_mut().iter_mut().for_each(|pixel| *pixel *= gain);
             half
         });
+        go_on(stop)?;
         let pictures = halves.each_ref().map(|half| &half.radiance);
         let (width, height) = (target.camera.width, target.camera.height);
         let pixel = |row: usize, column: usize| target.at(scene, row * width + column);
@@ -100,6 +101,15 @@ pub(super) fn score_views(
         scored.push(ScoredView { index, kind, scores, pictures });
     }
     Ok(scored)
+}
+
+/// An error of kind `Stopped` once the flag is raised: a picture that was begun is then not whole.
+pub(super) fn go_on(stop: &AtomicBool) -> Result<()> {
+    match stop.load(Ordering::Relaxed) {
+        false => Ok(()),
+        true => Err(Error::new(ErrorKind::Stopped, "stopped while the report was made")
+            .remedy("the maps are written; going on from the checkpoint makes the report: `patina resume`")),
+    }
 }
 
 /// Stops that bring photographs without an exposure of their own to a visible range: 0 for 8-bit photographs.
@@ -146,6 +156,7 @@ pub(super) fn relit_strips(
             let halves = in_halves(&own_settings, |settings| {
                 relit(surface, own, &truth.environment, camera, *view, settings, stop)
             });
+            go_on(stop)?;
             let pictures = halves.each_ref().map(|half| &half.radiance);
             let states = scene.views[*view].states.clone();
             let coverage = fully_covered(&halves);
@@ -181,6 +192,7 @@ pub(super) fn relit_strips(
             let level = scene.views[view].camera.level_within(RELIT_PIXELS);
             let camera = scene.views[view].camera.shrunk(1 << level);
             let picture = relit(surface, own, &light, &camera, view, &relight_settings, stop);
+            go_on(stop)?;
             let caption = scene.views[view].name.clone();
             strip.pictures.push(RelitPicture { caption, picture: picture.radiance, truth: None });
         }

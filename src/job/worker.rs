@@ -236,8 +236,16 @@ impl Worker {
         prepared.timings.push(StageTime { stage: "fit".into(), seconds: self.fitter.state().seconds });
         let folder = self.saver.folder();
         let tell = |event: Event| self.teller.send(event);
-        let data = outcome::write(&self.fitter, prepared, &self.settings, folder, self.began, &self.stop, &tell)?;
-        self.teller.send(Event::Finished(Box::new(data)));
+        match outcome::write(&self.fitter, prepared, &self.settings, folder, self.began, &self.stop, &tell) {
+            Ok(data) => self.teller.send(Event::Finished(Box::new(data))),
+            // All steps are done and saved: who stops now gives up the report, and nothing failed.
+            Err(error) if error.kind() == ErrorKind::Stopped => {
+                let finding = Finding::new(Severity::Note, "report-not-made", error.message());
+                self.teller.send(Event::Finding(finding.remedy(error.remedy_text())));
+                self.teller.send(Event::Stopped { steps_done: self.fitter.state().step });
+            }
+            Err(error) => return Err(error),
+        }
         Ok(())
     }
 

@@ -187,6 +187,8 @@ impl FitControl {
             }
             Event::Finding(finding) => log.add(Message::from(&finding)),
             Event::Checkpoint(_) => self.last_checkpoint = Some(Instant::now()),
+            // What was sent before the job heard of the stop changes nothing.
+            Event::Paused | Event::Resumed | Event::Finishing(_) if self.status == FitStatus::Stopping => {}
             Event::Paused => self.status = FitStatus::Paused,
             Event::Resumed => self.status = FitStatus::Running,
             Event::SettingsChanged(settings) => {
