@@ -1,0 +1,132 @@
+//! What can be typed to make pictures of runs and compare pictures. The text of each field is its help.
+
+use super::ReadOptions;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Options of `patina relight`.
+#[derive(Debug, Args)]
+pub struct RelightOptions {
+    /// The run folder.
+    pub run: PathBuf,
+    /// Lights: HDR or EXR files, or `noon`, `evening`, `overcast`.
+    #[arg(long, required = true, num_args = 1..)]
+    pub env: Vec<String>,
+    /// The scene whose cameras are used; the scene of the run when not given.
+    #[arg(long)]
+    pub cameras: Option<PathBuf>,
+    /// Names of the views; the first held-out ones when not given.
+    #[arg(long, num_args = 1..)]
+    pub views: Vec<String>,
+    /// Turn the light about the vertical, in degrees.
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub rotate: f32,
+    /// Keep the light as strong as its file says; otherwise its mean is matched to that of the fitted light.
+    #[arg(long)]
+    pub absolute: bool,
+    /// Paths a pixel.
+    #[arg(long, default_value_t = 64)]
+    pub samples: usize,
+    /// Surface hits on the longest path.
+    #[arg(long, default_value_t = 3)]
+    pub bounces: usize,
+    /// Shrink pictures by this whole factor.
+    #[arg(long, default_value_t = 1)]
+    pub shrink: usize,
+    /// Exposure of the PNG files, in stops.
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub exposure: f32,
+    /// Hide the light behind the surface.
+    #[arg(long)]
+    pub hide_background: bool,
+    /// Give parts of the surface a measured reflectance: a `.binary` file, the result folder of `patina object`, or the
+    /// name of a material of the neural model. One for each --region, or one for the whole surface.
+    #[arg(long)]
+    pub material: Vec<String>,
+    /// Take materials from this folder of neural fits of measurements, not from the neural model.
+    #[arg(long, requires = "material")]
+    pub library: Option<PathBuf>,
+    /// Masks over the texture maps, white where the material of the same place in the list holds.
+    #[arg(long, requires = "material")]
+    pub region: Vec<PathBuf>,
+    /// A turntable instead of single pictures.
+    #[command(flatten)]
+    pub turntable: crate::cli::turntable::TurntableOptions,
+    /// Folder of the pictures; `relight` in the run folder when not given.
+    #[arg(short, long)]
+    pub output: Option<PathBuf>,
+}
+
+/// A layer of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Layer {
+    /// The picture under the run's light.
+    Shaded,
+    /// Diffuse reflectance.
+    Diffuse,
+    /// Specular reflectance F0.
+    Specular,
+    /// Roughness r = a^2.
+    Roughness,
+    /// Shading normal in the world.
+    Normal,
+    /// Share of the pixel that the surface covers.
+    Coverage,
+    /// Variance of each shaded pixel's mean, from independent groups of samples.
+    Variance,
+}
+
+/// Options of `patina render`.
+#[derive(Debug, Args)]
+pub struct RenderOptions {
+    /// The run folder; or an exchange folder with its truth, to render that.
+    pub run: PathBuf,
+    /// The scene whose cameras are used; the scene of the run when not given.
+    #[arg(long)]
+    pub cameras: Option<PathBuf>,
+    /// Layers to write, one linear EXR per view and layer.
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "shaded")]
+    pub aov: Vec<Layer>,
+    /// Names of the views; all when not given.
+    #[arg(long, num_args = 1..)]
+    pub views: Vec<String>,
+    /// Another light than the run's own, as a file or a built-in sky.
+    #[arg(long)]
+    pub env: Option<String>,
+    /// Paths a pixel.
+    #[arg(long, default_value_t = 64)]
+    pub samples: usize,
+    /// Surface hits on the longest path.
+    #[arg(long, default_value_t = 3)]
+    pub bounces: usize,
+    /// Seed of the random numbers.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Hide the light behind the surface.
+    #[arg(long)]
+    pub hide_background: bool,
+    /// How the scene is read.
+    #[command(flatten)]
+    pub read: ReadOptions,
+    /// Folder of the pictures; `render` in the run folder when not given.
+    #[arg(short, long)]
+    pub output: Option<PathBuf>,
+}
+
+/// Options of `patina compare`.
+#[derive(Debug, Args)]
+pub struct CompareOptions {
+    /// The run folder.
+    pub run: PathBuf,
+    /// The scene with the photographs.
+    pub scene: PathBuf,
+    /// Paths a pixel.
+    #[arg(long, default_value_t = 32)]
+    pub samples: usize,
+    /// Surface hits on the longest path; that of the run when not given.
+    #[arg(long)]
+    pub bounces: Option<usize>,
+    /// How the scene is read.
+    #[command(flatten)]
+    pub read: ReadOptions,
+}
