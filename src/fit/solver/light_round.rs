@@ -5,7 +5,7 @@ use super::eliminate::BlockRows;
 use super::estimate::Estimate;
 use super::light_evidence::{LightKnown, Precisions, evidence_shares};
 use super::light_shape::{LightShape, bright_texels};
-use super::light_step::{Gauge, LightPrior, NormalEquations, solve_channel};
+use super::light_step::{Gauge, LightPrior, NormalEquations, narrow_scales, solve_channel};
 use super::plan;
 use super::report::{ErrorSums, StepReport, median};
 use super::round::{BlockWork, Round, open_prior};
@@ -178,13 +178,14 @@ impl SolverScene {
             // far away as a sky (`saharov_bmvs` without this: the light grew by a third a round).
             gauge_slack: if self.background.is_empty() { self.settings.gauge_slack } else { BACKGROUND_GAUGE_SLACK },
         };
+        let narrow = narrow_scales(shape, &estimate.light);
         let channels: Vec<(Vec<f32>, Precisions, f64)> = (0..3usize)
             .into_par_iter()
             .map(|c| {
                 let own: Vec<f32> = estimate.light.iter().map(|radiance| radiance[c]).collect();
                 let mut x = shape.coefficients_of(&own);
                 let gauge = Gauge { row: &self.gauge.0, mean: self.gauge.1[c] };
-                let known = solve_channel(&equations[c], shape, &prior, &gauge, &mut x);
+                let known = solve_channel(&equations[c], shape, &prior, &gauge, &narrow, &mut x);
                 let precisions = Precisions::new(&surface[c], &equations[c], known.belief, prior.independence);
                 (shape.expand(&x), precisions, known.scale_deviation)
             })
