@@ -126,7 +126,7 @@ impl Case {
     }
 }
 
-/// Materials of the studies that take some: from matt to mirror, by MERL's names.
+/// Materials of the studies that take some: from matt to mirror, by the names that MERL's neural fits have.
 const MATERIALS: [&str; 20] = [
     "gold-metallic-paint",
     "blue-rubber",
@@ -138,9 +138,6 @@ const MATERIALS: [&str; 20] = [
     "green-acrylic",
     "pink-felt",
     "aluminium",
-    "dark-specular-fabric",
-    "pearl-paint",
-    "chrome",
     "violet-acrylic",
     "black-oxidized-steel",
     "yellow-matte-plastic",
@@ -148,6 +145,9 @@ const MATERIALS: [&str; 20] = [
     "light-brown-fabric",
     "silver-metallic-paint",
     "pvc",
+    "tungsten-carbide",
+    "black-fabric",
+    "dark-blue-paint",
 ];
 
 /// All cases, grouped by what is photographed. Materials that the neural model has not seen come first: where a figure
@@ -231,4 +231,17 @@ pub fn plan(inputs: &Inputs, options: &StudyOptions) -> Vec<Case> {
     let first = |case: &Case| subjects.iter().position(|subject| *subject == case.subject());
     cases.sort_by_key(first);
     cases
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_library_has_every_material_of_the_studies() {
+        let trained = crate::neural::shipped().unwrap();
+        let unknown: Vec<&str> =
+            MATERIALS.into_iter().filter(|name| !trained.account.materials.iter().any(|own| own == name)).collect();
+        assert_eq!(unknown, [""; 0]);
+    }
 }
