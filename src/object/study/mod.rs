@@ -1,8 +1,9 @@
 //! The experiments of the paper: figure 2 without any photo, figures 3, 4 and 5 with one, and shadows.
 //!
-//! [`representation`] is figure 2: models against tables, which `contender` fits. For the others [`inputs`] photographs: the measured reflectance
-//! itself, asked at every part of a light that is finer than any that is fitted. [`case`] estimates and measures one case. [`mod@plan`] says which cases there are. Results go to
-//! `results.csv` (`fig2.csv`) line by line, and what stands there is not done again: a study that was stopped goes on.
+//! [`representation`] is figure 2: models against tables, which `contender` fits. For the others [`inputs`] photographs:
+//! the measured reflectance itself, asked at every part of a light that is finer than any that is fitted. [`case`]
+//! estimates and measures one case. [`mod@plan`] says which cases there are. Results go to `results.csv` (`fig2.csv`) line
+//! by line, and what stands there is not done again: a study that was stopped goes on.
 //!
 //! What this folder refuses to do: fit anything to the truth, or leave out a case that failed. A case that fails is a
 //! line of NaN.

@@ -36,6 +36,7 @@ const HEADER: &str = "material,category,model,parameters,log_rmse,log10_rmse,cos
 const QUICK_STRIDE: usize = 22;
 /// Materials left out of the training that a quick study adds.
 const QUICK_LEFT_OUT: usize = 1;
+
 /// One fit.
 #[derive(Clone, Debug, PartialEq)]
 struct Row {
