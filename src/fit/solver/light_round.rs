@@ -178,12 +178,12 @@ impl SolverScene {
             // far away as a sky (`saharov_bmvs` without this: the light grew by a third a round).
             gauge_slack: if self.background.is_empty() { self.settings.gauge_slack } else { BACKGROUND_GAUGE_SLACK },
         };
-        let narrow = narrow_scales(shape, &estimate.light);
+        let before = shape.coefficients_of_channels(&estimate.light);
+        let narrow = narrow_scales(shape, &estimate.light, &before);
         let channels: Vec<(Vec<f32>, Precisions, f64)> = (0..3usize)
             .into_par_iter()
             .map(|c| {
-                let own: Vec<f32> = estimate.light.iter().map(|radiance| radiance[c]).collect();
-                let mut x = shape.coefficients_of(&own);
+                let mut x = before[c].clone();
                 let gauge = Gauge { row: &self.gauge.0, mean: self.gauge.1[c] };
                 let known = solve_channel(&equations[c], shape, &prior, &gauge, &narrow, &mut x);
                 let precisions = Precisions::new(&surface[c], &equations[c], known.belief, prior.independence);

@@ -134,6 +134,11 @@ impl LightShape {
         coefficients
     }
 
+    /// [`LightShape::coefficients_of`] for each channel of a light.
+    pub fn coefficients_of_channels(&self, light: &[[f32; 3]]) -> [Vec<f32>; 3] {
+        [0, 1, 2].map(|c| self.coefficients_of(&light.iter().map(|radiance| radiance[c]).collect::<Vec<f32>>()))
+    }
+
     /// Neighbours among the wide hats: pairs with the second after the first, wrapping in phi.
     pub fn neighbours(&self) -> Vec<(usize, usize)> {
         let (width, height) = self.coarse;

@@ -159,15 +159,12 @@ pub struct ChannelKnown {
 }
 
 /// What narrow hats are believed to be (one standard deviation), over the usual radiance of their channel, by the light
-/// before the step. Where all channels are bright there is a sun, and it may be much brighter; elsewhere there is sky. One
+/// before the step, given with its coefficients. Where all channels are bright there is a sun, and it may be much brighter; elsewhere there is sky. One
 /// channel alone is no sun: solved by themselves, channels put blue or red suns where only held-out views look. On eight
 /// hard cases (geometric means) held-out errors are .063 so, .126 with a scale of each channel's own, errors of the light
 /// .48 and .60.
-pub fn narrow_scales(shape: &LightShape, light: &[[f32; 3]]) -> Vec<f64> {
-    let usual = [0, 1, 2].map(|c| {
-        let own: Vec<f32> = light.iter().map(|radiance| radiance[c]).collect();
-        usual_radiance(shape, &shape.coefficients_of(&own))
-    });
+pub fn narrow_scales(shape: &LightShape, light: &[[f32; 3]], coefficients: &[Vec<f32>; 3]) -> Vec<f64> {
+    let usual = coefficients.each_ref().map(|x| usual_radiance(shape, x));
     let least = |radiance: [f32; 3]| (0..3).map(|c| f64::from(radiance[c]) / usual[c]).fold(f64::INFINITY, f64::min);
     let scale = |&texel: &u32| 1.0 + NARROW_GROWTH * (least(light[texel as usize]) - 1.0).max(0.0);
     shape.fine.iter().map(scale).collect()
@@ -279,7 +276,8 @@ mod tests {
         let mut light = vec![[1.0f32, 1.0, 2.0]; 128];
         light[sun as usize] = [1000.0, 800.0, 500.0];
         light[blue as usize][2] = 100.0;
-        let scales = narrow_scales(&shape, &light);
+        let coefficients = shape.coefficients_of_channels(&light);
+        let scales = narrow_scales(&shape, &light, &coefficients);
         assert!(scales[0] > 100.0 && scales[1..] == [1.0, 1.0], "{scales:?}");
 
         // A doubtful row, 40 +- 20, moves a texel of the sky by little, and the sun stays.
@@ -293,8 +291,7 @@ mod tests {
         }
         let prior = LightPrior { variation: 0.7, independence: 1.0, gauge_slack: 1.0 };
         let row = vec![1.0 / 128.0; 128];
-        let first: Vec<f32> = light.iter().map(|radiance| radiance[0]).collect();
-        let mut x = shape.coefficients_of(&first);
+        let [mut x, _, _] = coefficients;
         solve_channel(&equations, &shape, &prior, &Gauge { row: &row, mean: 8.8 }, &scales, &mut x);
         let found = shape.expand(&x);
         assert!((found[sun as usize] - 1000.0).abs() < 20.0, "{}", found[sun as usize]);
