@@ -3,14 +3,14 @@
 //! Pixels are cut into chunks of a fixed size; each chunk is worked by one thread into a small table of its own, and
 //! tables are added to the gradient in the order of the chunks. The result does not depend on the number of threads.
 
+mod chunk_gradient;
+
+use self::chunk_gradient::ChunkGradient;
 use super::first_hits::CameraRays;
 use super::path::{PathArena, PathTracer};
-use super::sums::{GradientSink, Parameters, add_weighted, radiance, radiance_backward};
-use crate::material::texels::Texel;
-use crate::material::{Material, TextureTap};
+use super::sums::{Parameters, radiance, radiance_backward};
 use crate::math::random::{SampleStream, StreamKey};
 use crate::math::real::Real;
-use crate::math::sphere::BilinearTap;
 use glam::Vec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -258,101 +258,4 @@ pub fn sum_pixel<R: Real>(parameters: &Parameters<R>, arena: &PathArena, lobe_st
     let first = sums[0].map(|sum| sum * R::from_f32(1.0 / half as f32));
     let second = if samples > 1 { sums[1].map(|sum| sum * R::from_f32(1.0 / (samples - half) as f32)) } else { first };
     PixelEstimate { first, second, escaped: escaped as f32 / samples.max(1) as f32 }
-}
-
-/// Gradients of one chunk: an open-addressing table of texels and a dense light.
-struct ChunkGradient<R> {
-    /// `level << 28 | index`, or `EMPTY`.
-    keys: Vec<u32>,
-    texels: Vec<Texel<R>>,
-    used: usize,
-    light: Vec<[R; 3]>,
-}
-
-const EMPTY: u32 = u32::MAX;
-const LEVEL_SHIFT: u32 = 28;
-
-impl<R: Real> ChunkGradient<R> {
-    fn new(light_texels: usize) -> Self {
-        ChunkGradient {
-            keys: vec![EMPTY; 1 << 13],
-            texels: vec![[R::zero(); 8]; 1 << 13],
-            used: 0,
-            light: vec![[R::zero(); 3]; light_texels],
-        }
-    }
-
-    #[inline(always)]
-    fn texel(&mut self, key: u32) -> &mut Texel<R> {
-        let mask = self.keys.len() - 1;
-        let mut slot = (key.wrapping_mul(0x9e37_79b1) >> 7) as usize & mask;
-        loop {
-            if self.keys[slot] == key {
-                return &mut self.texels[slot];
-            }
-            if self.keys[slot] == EMPTY {
-                break;
-            }
-            slot = (slot + 1) & mask;
-        }
-        if self.used * 4 >= self.keys.len() * 3 {
-            self.grow();
-            return self.texel(key);
-        }
-        self.used += 1;
-        self.keys[slot] = key;
-        &mut self.texels[slot]
-    }
-
-    #[cold]
-    fn grow(&mut self) {
-        let keys = std::mem::take(&mut self.keys);
-        let texels = std::mem::take(&mut self.texels);
-        self.keys = vec![EMPTY; keys.len() * 2];
-        self.texels = vec![[R::zero(); 8]; keys.len() * 2];
-        self.used = 0;
-        for (key, texel) in keys.into_iter().zip(texels) {
-            if key != EMPTY {
-                *self.texel(key) = texel;
-            }
-        }
-    }
-
-    fn add_to(&self, gradient: &mut Parameters<R>) {
-        for (&key, texel) in self.keys.iter().zip(&self.texels) {
-            if key != EMPTY {
-                let level = &mut gradient.texels.levels[(key >> LEVEL_SHIFT) as usize];
-                let total = &mut level.texels[(key & ((1 << LEVEL_SHIFT) - 1)) as usize];
-                for (total, &value) in total.iter_mut().zip(texel) {
-                    *total += value;
-                }
-            }
-        }
-        for (total, light) in gradient.light.iter_mut().zip(&self.light) {
-            for channel in 0..3 {
-                total[channel] += light[channel];
-            }
-        }
-    }
-}
-
-impl<R: Real> GradientSink<R> for ChunkGradient<R> {
-    #[inline(always)]
-    fn add_material(&mut self, tap: &TextureTap, d_material: &Material<R>) {
-        let d = d_material.to_array();
-        for k in 0..4 {
-            add_weighted(self.texel(tap.level << LEVEL_SHIFT | tap.index[k]), &d, tap.weight[k]);
-        }
-    }
-
-    #[inline(always)]
-    fn add_light(&mut self, tap: &BilinearTap, d_radiance: [R; 3]) {
-        for k in 0..4 {
-            let weight = R::from_f32(tap.weight[k]);
-            let light = &mut self.light[tap.index[k] as usize];
-            for channel in 0..3 {
-                light[channel] += d_radiance[channel] * weight;
-            }
-        }
-    }
 }

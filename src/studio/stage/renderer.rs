@@ -3,6 +3,8 @@
 //! A frame that differs from the last only in exposure, curve, photo or wipe of the photo is not drawn again, only
 //! shown: that is one triangle over the rectangle.
 
+mod binding;
+
 use super::content::{StageFrame, StageLight};
 use super::light::{self, PreparedLight};
 use super::mesh::GpuMesh;
@@ -335,50 +337,5 @@ impl StageRenderer {
         });
         pass.set_bind_group(0, &view, &[]);
         self.overlay.draw(&mut pass, pipelines);
-    }
-
-    fn bind_maps(&self) -> wgpu::BindGroup {
-        use wgpu::BindingResource::{Sampler, TextureView};
-        let (diffuse, specular) =
-            self.maps.shown().map_or((&self.missing.diffuse, &self.missing.specular), |maps| (&maps.0, &maps.1));
-        let quantity = self.quantity.shown().unwrap_or(&self.missing.black);
-        let resources = [
-            Sampler(&self.pipelines.map_sampler),
-            TextureView(&diffuse.view),
-            TextureView(&specular.view),
-            TextureView(&quantity.view),
-        ];
-        bind(&self.maker.device, &self.pipelines.map_layout, &resources)
-    }
-
-    fn bind_lights(&self) -> wgpu::BindGroup {
-        use wgpu::BindingResource::{Sampler, TextureView};
-        let [light, other] = self.lights.each_ref().map(|slot| slot.shown().unwrap_or(&self.missing.light));
-        let resources = [
-            Sampler(&self.pipelines.light_sampler),
-            TextureView(&light.map.view),
-            TextureView(&light.layers.view),
-            TextureView(&other.map.view),
-            TextureView(&other.layers.view),
-            TextureView(&self.reflectance.view),
-        ];
-        bind(&self.maker.device, &self.pipelines.light_layout, &resources)
-    }
-
-    fn bind_screen(&self) -> Option<wgpu::BindGroup> {
-        use wgpu::BindingResource::{Sampler, TextureView};
-        let targets = self.targets.as_ref()?;
-        let or_black =
-            |slot: &'_ Slot<Arc<RgbImage>, GpuTexture>| slot.shown().unwrap_or(&self.missing.black).view.clone();
-        let (photo, traced) = (or_black(&self.photo), or_black(&self.traced));
-        let resources = [
-            self.screen_buffer.as_entire_binding(),
-            Sampler(&self.pipelines.map_sampler),
-            TextureView(&targets.radiance),
-            TextureView(&targets.overlay),
-            TextureView(&photo),
-            TextureView(&traced),
-        ];
-        Some(bind(&self.maker.device, &self.pipelines.screen_layout, &resources))
     }
 }

@@ -1,0 +1,32 @@
+//! What is typed, against presets and files.
+
+use clap::Parser;
+use patina::cli::arguments::{Arguments, Task};
+use patina::cli::fit::run_settings;
+use patina::fit::{FitSettings, Preset};
+
+#[test]
+fn what_is_typed_wins_over_a_preset_and_over_a_file() {
+    let of = |more: &[&str]| {
+        let words = ["patina", "fit", "scene", "-o", "run"].iter().chain(more);
+        let Some(Task::Fit(options)) = Arguments::try_parse_from(words).unwrap().task else { unreachable!() };
+        run_settings(&options).unwrap()
+    };
+    assert_eq!(of(&[]).fit, FitSettings::default());
+    assert_eq!(of(&["--preset", "careful"]).fit, FitSettings::preset(Preset::Careful));
+    let typed = of(&["--preset", "quick", "--map-size", "2048", "--exclude", "a", "--exclude", "b c"]).fit;
+    let exclude = vec!["a".to_string(), "b c".to_string()];
+    assert_eq!(typed, FitSettings { map_size: 2048, exclude, ..FitSettings::preset(Preset::Quick) });
+
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("settings.toml");
+    patina::files::write_bytes(&file, b"[read]\nshrink = 4\nmax_views = 9\n[fit]\nsamples = 16\nbounces = 5\n")
+        .unwrap();
+    let file = file.to_str().unwrap();
+    // 4 is the default: typed, it wins all the same.
+    let settings = of(&["--settings", file, "--samples", "4", "--shrink", "2"]);
+    assert_eq!((settings.fit.samples, settings.fit.bounces), (4, 5));
+    assert_eq!((settings.read.shrink, settings.read.max_views), (2, 9));
+    let both = ["patina", "fit", "s", "-o", "r", "--settings", file, "--preset", "quick"];
+    assert!(Arguments::try_parse_from(both).is_err());
+}
