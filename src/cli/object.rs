@@ -19,7 +19,7 @@ use std::sync::atomic::AtomicBool;
 
 /// Options of `patina object`.
 #[derive(Debug, Args)]
-#[command(group(clap::ArgGroup::new("shape").required(true).args(["mesh", "sphere"])))]
+#[command(group(clap::ArgGroup::new("shape").required(true).args(["mesh", "sphere", "normals"])))]
 pub struct ObjectOptions {
     /// One photo or several of the same object under the same light: EXR, HDR, PFM, PNG or JPEG.
     #[arg(required = true)]
@@ -30,6 +30,10 @@ pub struct ObjectOptions {
     /// The object is a sphere that fills the shorter side of the photo, seen from infinitely far along -z.
     #[arg(long)]
     pub sphere: bool,
+    /// Normals of the object in place of a mesh, one EXR or PFM a photo, of its size: unit vectors in the world (+y up,
+    /// +z towards the eye), zero beside the object; seen from infinitely far along -z.
+    #[arg(long, num_args = 1..)]
+    pub normals: Vec<PathBuf>,
     /// Cameras: a cameras.json that lists the photos, or one BlendedMVS camera file a photo.
     #[arg(long, num_args = 1..)]
     pub camera: Vec<PathBuf>,
@@ -46,8 +50,8 @@ pub struct ObjectOptions {
     #[arg(long)]
     pub weights: Option<PathBuf>,
     /// Lobes of the neural model.
-    #[arg(long, default_value_t = 2)]
-    pub lobes: usize,
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=3))]
+    pub lobes: u8,
     /// Prior of the light.
     #[arg(long, value_enum)]
     pub prior: Option<LightPriorKind>,
@@ -114,6 +118,7 @@ pub fn object(options: &ObjectOptions, json: bool) -> Result<()> {
         photos: options.photos.clone(),
         masks: options.mask.clone(),
         mesh: options.mesh.clone(),
+        normals: options.normals.clone(),
         cameras: options.camera.clone(),
         up: options.up.unwrap_or_default(),
         pixel_centre: options.pixel_centre.unwrap_or_default(),
@@ -131,7 +136,7 @@ pub fn object(options: &ObjectOptions, json: bool) -> Result<()> {
         findings.append(&mut noticed);
         relights.push((path.file_stem().unwrap_or_default().to_string_lossy().into_owned(), light));
     }
-    let model = StartedModel::of(options.model, options.weights.as_deref(), options.lobes, &settings)?;
+    let model = StartedModel::of(options.model, options.weights.as_deref(), usize::from(options.lobes), &settings)?;
     let watch = |event: ObjectEvent| match (event, json) {
         (ObjectEvent::Stage(stage), false) => eprintln!("{stage}"),
         (ObjectEvent::Stage(stage), true) => println!("{}", serde_json::json!({"event": "stage", "name": stage})),
@@ -154,7 +159,7 @@ pub fn object(options: &ObjectOptions, json: bool) -> Result<()> {
         files,
         light: options.env.clone(),
         model: options.model,
-        lobes: options.lobes,
+        lobes: usize::from(options.lobes),
         weights: options.weights.clone(),
     };
     result_folder::write(&options.output, &views, &model, &found, &settings, &inputs, &relights)?;

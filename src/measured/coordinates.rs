@@ -56,3 +56,46 @@ impl HalfDifference {
         (to_light, to_eye)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::SequentialRandom;
+
+    fn difference(a: HalfDifference, b: HalfDifference) -> f64 {
+        let turn = (a.phi_difference - b.phi_difference).abs();
+        // An azimuth of nearly pi is one of nearly 0, and it counts for less the smaller the circle is.
+        let turn = turn.min(PI - turn) * a.theta_difference.sin();
+        (a.theta_half - b.theta_half).abs().max((a.theta_difference - b.theta_difference).abs()).max(turn)
+    }
+
+    #[test]
+    fn angles_make_directions_with_these_angles_whichever_is_the_light_and_however_turned() {
+        let mut random = SequentialRandom::new(3);
+        let mut number = || f64::from(random.next_number());
+        for _ in 0..2000 {
+            let angles = HalfDifference {
+                theta_half: 0.01 + 1.5 * number(),
+                theta_difference: 0.01 + 1.5 * number(),
+                phi_difference: PI * number(),
+            };
+            let (to_light, to_eye) = angles.directions();
+            assert!((to_light.length() - 1.0).abs() < 1e-12 && (to_eye.length() - 1.0).abs() < 1e-12);
+            let (sin, cos) = (2.0 * PI * number()).sin_cos();
+            let turned = |v: DVec3| DVec3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z);
+            for (light, eye) in [(to_light, to_eye), (to_eye, to_light), (turned(to_light), turned(to_eye))] {
+                let again = HalfDifference::from_directions(light, eye);
+                assert!(difference(angles, again) < 1e-6, "{angles:?} came back as {again:?}");
+                assert!((0.0..PI).contains(&again.phi_difference));
+            }
+        }
+    }
+
+    #[test]
+    fn opposite_and_equal_directions_have_finite_angles() {
+        for (to_light, to_eye) in [(DVec3::X, -DVec3::X), (DVec3::Z, DVec3::Z), (DVec3::Y, DVec3::Y)] {
+            let at = HalfDifference::from_directions(to_light, to_eye);
+            assert!(at.theta_half.is_finite() && at.theta_difference.is_finite() && at.phi_difference.is_finite());
+        }
+    }
+}

@@ -63,7 +63,9 @@ impl Flow {
             features.clear();
             self.column_features(coupling, nest, at, &mut features);
             let (net, span) = self.conditioner(coupling);
-            net.forward(&self.weights[span], &features, codes, rows_per_group, &mut tape.nets[coupling]);
+            // Without codes all groups are one to the net.
+            let rows_of_code = if self.architecture().code == 0 { groups * rows_per_group } else { rows_per_group };
+            net.forward(&self.weights[span], &features, codes, rows_of_code, &mut tape.nets[coupling]);
             let (mut spline, _) = self.spline(coupling);
             // Points below one value of this level.
             let share = nest.points() / (rows_per_group * per_row).max(1);

@@ -191,4 +191,12 @@ mod tests {
         let u = (7.0f64 * 0.618).fract() - 0.5;
         assert!((places[7][0].abs() - 3.0 * 2f64.sqrt() * u.abs()).abs() < 0.1);
     }
+
+    #[test]
+    fn codes_that_ship_lie_with_their_kind_more_often_than_by_chance() {
+        let map = Embedding::of(&crate::neural::shipped().unwrap(), 5);
+        assert_eq!(map.points.len(), 3 * 88);
+        assert!(map.purity > 1.5 * map.chance && map.purity < 1.0, "{} by chance {}", map.purity, map.chance);
+        assert!(map.explained[0] >= map.explained[1] && map.explained[1] > 0.0, "{:?}", map.explained);
+    }
 }

@@ -116,9 +116,9 @@ impl Sample {
     }
 
     /// Error, logarithm of the best colour and row of each code of a library for one channel, the nearest first.
-    fn ranked(&self, densities: &[Vec<f32>], channel: usize) -> Vec<(f64, f64, usize)> {
+    fn ranked(&self, densities: &[Vec<f32>], channel: usize, reconstruction: Reconstruction) -> Vec<(f64, f64, usize)> {
         let of_row = |(row, density): (usize, &Vec<f32>)| {
-            let (error, colour) = self.best_colour(density, channel, Reconstruction::default());
+            let (error, colour) = self.best_colour(density, channel, reconstruction);
             (error, colour, row)
         };
         let mut ranked: Vec<(f64, f64, usize)> = densities.iter().enumerate().map(of_row).collect();
@@ -155,7 +155,7 @@ pub(super) fn nearest_codes(library: &Trained, table: &MeasuredBrdf, seed: u64) 
     let densities = log_densities(&library.flow, &library.codes, rows, &sample.columns);
     Ok([0, 1, 2].map(|channel| {
         // There is a first one: the library has rows.
-        let (_, colour, row) = sample.ranked(&densities, channel)[0];
+        let (_, colour, row) = sample.ranked(&densities, channel, Reconstruction::default())[0];
         (row, colour)
     }))
 }
@@ -172,7 +172,7 @@ fn start(model: &FlowModel, sample: &Sample) -> (Vec<f64>, [usize; 3]) {
     }
     let densities = log_densities(&trained.flow, &trained.codes, rows, &sample.columns);
     for channel in 0..3 {
-        let ranked = sample.ranked(&densities, channel);
+        let ranked = sample.ranked(&densities, channel, model.reconstruction());
         from[channel] = ranked[0].2;
         for lobe in 0..model.lobes() {
             // The best codes are often twins, channels of one material: go further down the list for later lobes.
@@ -209,7 +209,7 @@ fn descend(model: &FlowModel, sample: &Sample, start: Vec<f64>, settings: &FlowF
                 let parts: Vec<(f64, f64)> = (0..model.lobes())
                     .map(|lobe| {
                         let group = 3 * lobe + channel;
-                        Reconstruction::default().value(colours[group], f64::from(densities[group][index]))
+                        model.reconstruction().value(colours[group], f64::from(densities[group][index]))
                     })
                     .collect();
                 let stored: f64 = parts.iter().map(|part| part.0).sum();

@@ -63,6 +63,11 @@ impl FlowModel {
         self.lobes
     }
 
+    /// How its densities become reflectance.
+    pub fn reconstruction(&self) -> Reconstruction {
+        self.reconstruction
+    }
+
     /// The grid of nodes.
     pub fn grid(&self) -> GridShape {
         self.grid

@@ -274,4 +274,23 @@ mod tests {
         assert!(first.normal.y > 0.9 && first.row < 3);
         assert!(geometry.pixels.iter().all(|pixel| (pixel.normal.length() - 1.0).abs() < 1e-5));
     }
+
+    #[test]
+    fn normals_of_a_sphere_give_the_pixels_of_the_sphere_and_bad_ones_are_named() {
+        let sphere = ObjectGeometry::sphere(24, 20, 10.0);
+        let mut normals = Image::filled(24, 20, Vec3::ZERO);
+        for pixel in &sphere.pixels {
+            normals[(pixel.row as usize, pixel.column as usize)] = pixel.normal;
+        }
+        let given = ObjectGeometry::of_normals(&normals, Vec3::Z).unwrap();
+        assert_eq!((given.width, given.height, given.pixels.len()), (24, 20, sphere.pixels.len()));
+        for (own, other) in given.pixels.iter().zip(&sphere.pixels) {
+            assert_eq!((own.row, own.column, own.to_eye), (other.row, other.column, other.to_eye));
+            assert!(own.normal.distance(other.normal) < 1e-6);
+        }
+        normals[(3, 4)] = Vec3::NAN;
+        let error = ObjectGeometry::of_normals(&normals, Vec3::Z).err().unwrap();
+        assert_eq!(error.kind(), ErrorKind::NonFinite);
+        assert!(error.to_string().contains("row 3 column 4"), "{error}");
+    }
 }

@@ -28,12 +28,12 @@ impl ObjectView {
         let size = (photo.radiance.width(), photo.radiance.height());
         if size != (geometry.width, geometry.height) {
             let message = format!(
-                "the photo is {} x {} but the camera is for {} x {}",
+                "the photo is {} x {} but its camera or normals are for {} x {}",
                 size.0, size.1, geometry.width, geometry.height
             );
             return Err(Error::new(ErrorKind::InvalidScene, message)
                 .at(Place::View(photo.name.clone()))
-                .remedy("use the photo the camera was made for"));
+                .remedy("use the photo that they were made for"));
         }
         geometry.pixels.retain(|pixel| photo.is_object[(pixel.row as usize, pixel.column as usize)]);
         if geometry.pixels.is_empty() {

@@ -10,6 +10,7 @@ use crate::scene::read::world::{up_in_source, world_from_source};
 use crate::scene::read::{camera_file, mesh_file};
 use crate::scene::settings::{PixelCentre, Up};
 use crate::trace::Bvh;
+use glam::Vec3;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -23,6 +24,8 @@ pub struct ObjectFiles {
     pub masks: Vec<PathBuf>,
     /// The mesh; `None` for a sphere seen from infinitely far.
     pub mesh: Option<PathBuf>,
+    /// One picture of normals a photo, in place of a mesh; none at all otherwise.
+    pub normals: Vec<PathBuf>,
     /// `cameras.json`, or one BlendedMVS camera file a photo.
     pub cameras: Vec<PathBuf>,
     /// Which axis of mesh and cameras points up.
@@ -43,6 +46,10 @@ pub fn read_views(files: &ObjectFiles) -> Result<(Vec<ObjectView>, Vec<Finding>)
         let message = format!("{} masks for {} photos", files.masks.len(), files.photos.len());
         return Err(wrong("mask", message).remedy("give one mask a photo, in the same order, or none"));
     }
+    if !files.normals.is_empty() && files.normals.len() != files.photos.len() {
+        let message = format!("{} pictures of normals for {} photos", files.normals.len(), files.photos.len());
+        return Err(wrong("normals", message).remedy("give one a photo, in the same order"));
+    }
     let mut findings = Vec::new();
     let mut photos = Vec::new();
     for (index, path) in files.photos.iter().enumerate() {
@@ -54,6 +61,13 @@ pub fn read_views(files: &ObjectFiles) -> Result<(Vec<ObjectView>, Vec<Finding>)
         photos.push(photo);
     }
     let geometries = match &files.mesh {
+        None if !files.normals.is_empty() => {
+            let of = |path: &PathBuf| {
+                let normals = file::read_rgb(path)?;
+                ObjectGeometry::of_normals(&normals, Vec3::Z).map_err(|error| error.at(Place::File(path.clone())))
+            };
+            files.normals.iter().map(of).collect::<Result<Vec<_>>>()?
+        }
         None => photos
             .iter()
             .map(|photo| {

@@ -41,6 +41,7 @@ impl ObjectInputs {
             photos: all(&self.files.photos),
             masks: all(&self.files.masks),
             mesh: self.files.mesh.as_ref().map(whole),
+            normals: all(&self.files.normals),
             cameras: all(&self.files.cameras),
             ..self.files.clone()
         };

@@ -11,6 +11,7 @@ use crate::measured::fits::NeuralFit;
 use crate::measured::grid;
 use crate::measured::metrics::{log_raw, model_error};
 use crate::measured::model::ReflectanceModel;
+use crate::measured::sphere;
 use crate::measured::table::MeasuredBrdf;
 use crate::object::joint::{Estimate, Known, estimate};
 use crate::object::nodes::NodeGrid;
@@ -20,16 +21,17 @@ use crate::object::reflectance_step::ParameterPrior;
 use crate::object::settings::ObjectSettings;
 use crate::object::starts::{Start, StartedModel};
 use crate::object::transport::TexelDirections;
+use glam::{DVec3, Vec3};
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// First line of `results.csv`.
 pub const HEADER: &str = "figure,material,light,variant,reflectance_log_rmse,reflectance_aligned,light_log_rmse,\
-light_aligned,light_angle_degrees,rerender_log_rmse,rerender_aligned,relit_log_rmse,relit_aligned,seconds";
+light_aligned,light_angle_degrees,rerender_log_rmse,rerender_aligned,relit_log_rmse,relit_aligned,lamps_psnr_db,seconds";
 
 /// Names and units of the measures, in the order of a line.
-pub const MEASURES: [(&str, &str); 10] = [
+pub const MEASURES: [(&str, &str); 11] = [
     ("reflectance, raw", "ln"),
     ("reflectance, aligned", "ln"),
     ("light, raw", "ln"),
@@ -39,17 +41,21 @@ pub const MEASURES: [(&str, &str); 10] = [
     ("re-render, aligned", "ln"),
     ("relit, raw", "ln"),
     ("relit, aligned", "ln"),
+    ("under single lamps, PSNR", "dB"),
     ("time", "s"),
 ];
 
+/// Side of the pictures under single lamps, in pixels.
+const LAMP_PICTURE_SIZE: usize = 64;
+
 /// The measures of a case; NaN where there is nothing to measure.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CaseResult(pub [f64; 10]);
+pub struct CaseResult(pub [f64; 11]);
 
 impl CaseResult {
     /// A case that failed.
     pub fn failed() -> Self {
-        CaseResult([f64::NAN; 10])
+        CaseResult([f64::NAN; 11])
     }
 
     /// The columns behind the key.
@@ -172,8 +178,8 @@ fn measure(
     if case.model.is_some() {
         (result.0[7], result.0[8]) = log_errors(geometry, &relit, &relit_truth.truth, epsilon(&relit_truth.truth));
     }
-    result.0[9] = found.seconds;
-    let pictures = vec![
+    result.0[10] = found.seconds;
+    let mut pictures = vec![
         ("photo".to_string(), photographed.truth.clone()),
         ("re-render".to_string(), own),
         ("true light".to_string(), true_light.radiance),
@@ -181,8 +187,45 @@ fn measure(
         (format!("truth under {}", inputs.held_out.0), relit_truth.truth.clone()),
         (format!("found under {}", inputs.held_out.0), relit),
     ];
+    if let (Figure::Reflectance, true) = (case.figure, case.model.is_some()) {
+        let fit = inputs.fits.find(&case.material)?;
+        let truths = under_single_lamps(|at, values| fit.evaluate(at, values));
+        let estimates = under_single_lamps(|at, values| model.model.evaluate(&found.parameters, at, values));
+        result.0[9] = 0.0;
+        for (number, (truth, estimate)) in truths.iter().zip(&estimates).enumerate() {
+            result.0[9] += sphere::displayed_scores(estimate, truth)?.psnr / truths.len() as f64;
+            pictures.push((format!("truth under lamp {}", number + 1), truth.clone()));
+            pictures.push((format!("found under lamp {}", number + 1), estimate.clone()));
+        }
+    }
     let title = format!("{} · {} · {} · {}", case.figure.key(), case.material, case.light, case.variant());
     Ok((result, Some(CasePictures { title, pictures })))
+}
+
+/// A sphere under each of the lamps by itself that materials are shown under (figure 3 b of the paper). `evaluate` fills
+/// in reflectances at angles.
+fn under_single_lamps(evaluate: impl Fn(&[HalfDifference], &mut [[f64; 3]])) -> Vec<RgbImage> {
+    let normals = sphere::sphere_normals(LAMP_PICTURE_SIZE);
+    let of_lamp = |lamp: sphere::DistantLamp| {
+        let (mut pixels, mut at, mut cosines) = (Vec::new(), Vec::new(), Vec::new());
+        for (pixel, normal) in normals.pixels().iter().enumerate() {
+            let Some(normal) = normal else { continue };
+            let cosine = normal.dot(lamp.to_light);
+            if cosine > 0.0 {
+                pixels.push(pixel);
+                cosines.push(cosine);
+                at.push(sphere::angles_about(*normal, lamp.to_light, DVec3::Z));
+            }
+        }
+        let mut values = vec![[0.0; 3]; at.len()];
+        evaluate(&at, &mut values);
+        let mut picture = RgbImage::filled(LAMP_PICTURE_SIZE, LAMP_PICTURE_SIZE, Vec3::ZERO);
+        for ((pixel, cosine), value) in pixels.into_iter().zip(cosines).zip(values) {
+            picture.pixels_mut()[pixel] = (DVec3::from_array(value) * lamp.irradiance * cosine).as_vec3();
+        }
+        picture
+    };
+    sphere::showing_lamps().into_iter().map(of_lamp).collect()
 }
 
 fn mean(picture: &RgbImage, pixels: usize) -> f32 {

@@ -37,31 +37,43 @@ pub fn write(
     let mut sections = first;
     sections.push(("What was done with photos", what_was_done(options, inputs)));
     for (figure, key, title) in Figure::NAMED {
-        let mut done: Vec<(String, Vec<f64>)> = Vec::new();
+        let mut done: Vec<(&Case, Vec<f64>)> = Vec::new();
         for case in cases.iter().filter(|case| case.figure == figure) {
             let Some(fields) = lines.iter().find_map(|line| fields_of(line, case)) else { continue };
-            done.push((case.variant(), fields.iter().map(|field| field.parse().unwrap_or(f64::NAN)).collect()));
+            done.push((case, fields.iter().map(|field| field.parse().unwrap_or(f64::NAN)).collect()));
+        }
+        if done.is_empty() {
+            continue;
         }
         // What a figure does not measure has no column: a case that failed is NaN in all that are left.
         let is_measured =
             |column: &usize| done.iter().any(|(_, values)| values.get(*column).is_some_and(|v| v.is_finite()));
         let columns: Vec<usize> = (0..MEASURES.len()).filter(is_measured).collect();
         let measures: Vec<(&str, &str)> = columns.iter().map(|&column| MEASURES[column]).collect();
-        let mut table = StudyTable::new(title, "variant", &measures);
-        for (variant, values) in &done {
-            let kept: Vec<f64> = columns.iter().map(|&c| values.get(c).copied().unwrap_or(f64::NAN)).collect();
-            table.add(variant, &kept);
-        }
-        if table.row_names().next().is_none() {
-            continue;
-        }
-        table.notes.push(format!("Seed {}; a sample is one material under one light.", options.seed));
+        let table_of = |title: &str, rows: &str, name: &dyn Fn(&Case) -> String| {
+            let mut table = StudyTable::new(title, rows, &measures);
+            for (case, values) in &done {
+                let kept: Vec<f64> = columns.iter().map(|&c| values.get(c).copied().unwrap_or(f64::NAN)).collect();
+                table.add(&name(case), &kept);
+            }
+            table.notes.push(format!("Seed {}; a sample is one material under one light.", options.seed));
+            table
+        };
+        let table = table_of(title, "variant", &|case| case.variant());
         table.write(&options.output, key)?;
         text += &table.to_markdown();
         text.push('\n');
+        let by_light = table_of(&format!("{title}, light by light"), "light, variant", &|case| {
+            format!("{}, {}", case.light, case.variant())
+        });
+        by_light.write(&options.output, &format!("{key}_by_light"))?;
         let places = [1, 3, 6, 8].iter().filter_map(|own| columns.iter().position(|column| column == own));
         let bars: String = places.filter_map(|place| table.bar_svg(place)).collect();
-        sections.push((title, format!("<pre>{}</pre>{bars}", escaped(&table.to_markdown()))));
+        let (all, lights) = (escaped(&table.to_markdown()), escaped(&by_light.to_markdown()));
+        sections.push((
+            title,
+            format!("<pre>{all}</pre>{bars}<details><summary>Light by light</summary><pre>{lights}</pre></details>"),
+        ));
     }
     let mut shown = String::new();
     for case in pictures.iter().take(MOST_SHOWN) {
@@ -90,7 +102,7 @@ fn what_was_done(options: &StudyOptions, inputs: &Inputs) -> String {
     let fine = &inputs.held_out.1;
     let text = format!(
         "Photos show the measured reflectance itself (MERL via neural fits), asked at every part of a light of {} x {} \
-         texels; what is fitted is a light of {width} x {height} texels and a model at {} nodes, by {} pixels. Errors of \
+         texels and summed without noise, which is what the path tracer comes to as well; what is fitted is a light of {width} x {height} texels and a model at {} nodes, by {} pixels. Errors of \
          light are over the sphere by solid angle, those of reflectance over all cells of the table, those of pictures \
          over the object; all are root mean squares of natural logarithms. Aligned: after the best factor per channel. \
          The material that is estimated is never among the starts. The neural model was trained on {} materials; rows of \
