@@ -122,9 +122,11 @@ fn masks_say_where_materials_hold_and_the_last_one_wins() {
     // The other way round.
     let (regions, _) = regions_of([path("upper.png"), path("left.png")]);
     assert!(is_about(albedo_at(&regions, [0.1, 0.9]), 0.2) && is_about(albedo_at(&regions, [0.9, 0.9]), 0.6));
-    // A mask that covers nothing leaves the maps where they are.
+    // A mask that covers nothing leaves the maps where they are, and is told.
     write_mask(&path("black.png"), 4, 2, |_, _| false);
-    let (regions, _) = regions_of([path("black.png"), path("upper.png")]);
+    let (regions, findings) = regions_of([path("black.png"), path("upper.png")]);
+    assert_eq!(findings.len(), 1, "{findings:?}");
+    assert!(findings[0].code == "region-empty" && findings[0].place.contains("black.png"), "{findings:?}");
     assert_eq!(albedo_at(&regions, [0.1, 0.1]), None);
     assert!(is_about(albedo_at(&regions, [0.1, 0.9]), 0.2));
 }

@@ -70,6 +70,9 @@ pub struct ObjectOptions {
     /// Pixels that are used.
     #[arg(long)]
     pub pixels: Option<usize>,
+    /// Added to radiance before the logarithm, over the exposure of the photos: dark pixels say less the larger it is.
+    #[arg(long)]
+    pub epsilon_share: Option<f64>,
     /// Leave shadows out.
     #[arg(long)]
     pub no_shadows: bool,
@@ -103,6 +106,7 @@ impl ObjectOptions {
         settings.method = self.method.unwrap_or(settings.method);
         settings.light_height = self.light_height.unwrap_or(settings.light_height);
         settings.pixels = self.pixels.unwrap_or(settings.pixels);
+        settings.epsilon_share = self.epsilon_share.unwrap_or(settings.epsilon_share);
         settings
     }
 }

@@ -3,7 +3,7 @@
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::file;
 use crate::neural::source;
-use crate::render::regions::{MeasuredMaterial, Regions};
+use crate::render::regions::{COVERED, MeasuredMaterial, Regions};
 use std::path::{Path, PathBuf};
 
 /// The regions of materials and masks in the order they were given, and what was noticed; `None` when no material was.
@@ -44,8 +44,21 @@ pub fn read(
     let regions = match covers_all {
         true => Regions::everywhere(read.swap_remove(0)),
         false => {
-            let masks = masks.iter().map(|path| file::read_grey(path)).collect::<Result<Vec<_>>>()?;
-            Regions::of_masks(read.into_iter().zip(masks).collect())?
+            let pictures = masks.iter().map(|path| file::read_grey(path)).collect::<Result<Vec<_>>>()?;
+            for (path, picture) in masks.iter().zip(&pictures) {
+                if picture.pixels().iter().all(|&value| value.is_nan() || value <= COVERED) {
+                    findings.push(
+                        Finding::new(
+                            Severity::Warning,
+                            "region-empty",
+                            "the mask covers nothing: its material is not seen",
+                        )
+                        .at(Place::File(path.clone()))
+                        .remedy("paint the region white, on the texture coordinates of the run's mesh"),
+                    );
+                }
+            }
+            Regions::of_masks(read.into_iter().zip(pictures).collect())?
         }
     };
     Ok(Some((regions, findings)))

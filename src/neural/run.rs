@@ -46,7 +46,8 @@ pub fn curve_path(output: &Path) -> PathBuf {
 
 /// Trains until the last step, the time or `stop`; returns the account. `tell` hears of the progress.
 ///
-/// Whenever a sitting ends, weights and checkpoint are written; `resume` goes on from there with the same bits.
+/// Whenever a sitting ends, weights and checkpoint are written; `resume` goes on from there with the same bits. Only in the
+/// curve, the row that was interrupted is the mean of the steps after it.
 ///
 /// Errors: a checkpoint that is not there, of another architecture or of other materials; a file that cannot be
 /// written.

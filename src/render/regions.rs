@@ -9,6 +9,9 @@ use crate::measured::table::MeasuredBrdf;
 use crate::neural::sampler::HalfVectorSampler;
 use glam::{Vec2, Vec3};
 
+/// A mask covers what is brighter than this.
+pub const COVERED: f32 = 0.5;
+
 /// Most materials of one surface.
 const MOST_MATERIALS: usize = 255;
 
@@ -114,7 +117,7 @@ impl Regions {
         let mut materials = Vec::with_capacity(parts.len());
         for (index, (material, mask)) in parts.into_iter().enumerate() {
             for (label, value) in labels.pixels_mut().iter_mut().zip(mask.pixels()) {
-                if *value > 0.5 {
+                if *value > COVERED {
                     *label = index as u8 + 1;
                 }
             }
