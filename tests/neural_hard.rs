@@ -39,6 +39,7 @@ fn retroreflective_cloth(at: HalfDifference) -> [f64; 3] {
 }
 
 #[test]
+#[ignore = "slow: cargo test -- --ignored"]
 fn chrome_velvet_and_retroreflective_cloth_are_fitted_finitely_and_better_than_they_began() {
     let model = FlowModel::new(Arc::new(shipped().unwrap()), 2);
     let fitted = |table: &MeasuredBrdf, steps: usize| {
@@ -62,6 +63,7 @@ fn chrome_velvet_and_retroreflective_cloth_are_fitted_finitely_and_better_than_t
 }
 
 #[test]
+#[ignore = "slow: cargo test -- --ignored"]
 fn no_number_of_the_papers_own_architecture_is_lost_whatever_its_weights() {
     let mut random = SequentialRandom::new(21);
     let points: Vec<[f64; 3]> = (0..2000).map(|_| [0; 3].map(|_| f64::from(random.next_number()))).collect();
