@@ -2,95 +2,31 @@
 
 #![allow(clippy::unwrap_used)]
 
+#[path = "common/object_scene.rs"]
+mod object_scene;
+
 use glam::Vec3;
-use patina::image::{Image, RgbImage};
-use patina::insight::truth::environment_errors;
-use patina::light::Environment;
-use patina::measured::analytic::{LambertLobes, LobeKind};
-use patina::measured::coordinates::HalfDifference;
-use patina::measured::model::ReflectanceModel;
+use object_scene::*;
+use patina::measured::analytic::LobeKind;
 use patina::object::joint::{Estimate, Known, estimate};
 use patina::object::observations::ObjectView;
-use patina::object::picture::{log_errors, render_exact};
+use patina::object::picture::log_errors;
 use patina::object::prior::LightPriorKind;
-use patina::object::reflectance_step::ParameterPrior;
 use patina::object::settings::ObjectSettings;
-use patina::object::starts::{Start, StartedModel};
-use patina::object::transport::TexelDirections;
+use patina::object::starts::StartedModel;
 use patina::object::{ObjectGeometry, ObjectPhoto};
-use patina::scene::{Camera, Mesh};
+use patina::scene::Camera;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-
-fn small() -> ObjectSettings {
-    ObjectSettings {
-        light_height: 16,
-        pixels: 400,
-        nodes: [20, 10, 6],
-        outer_loops: 4,
-        grey_loops: 1,
-        net_channels: 8,
-        net_steps: 10,
-        followed: 2,
-        ..ObjectSettings::default()
-    }
-}
-
-/// A sky with a sun over a floor.
-fn sky() -> Environment {
-    let radiance = Image::from_fn(64, 32, |row, column| {
-        let sun = (-((row as f32 - 9.0).powi(2) + (column as f32 - 40.0).powi(2)) / 6.0).exp();
-        let base = if row < 16 { Vec3::new(0.5, 0.7, 1.0) } else { Vec3::new(0.25, 0.2, 0.15) };
-        base + sun * Vec3::new(30.0, 27.0, 22.0)
-    });
-    Environment { radiance }
-}
-
-/// A plastic by formula: not the flow's, and none of the library.
-fn plastic() -> (LambertLobes, Vec<f64>) {
-    let parameters =
-        [0.3f64, 0.12, 0.06].iter().map(|v| v.ln()).chain([0.5f64.ln(); 3]).chain([0.11f64.ln(), -2.6]).collect();
-    (LambertLobes::new(LobeKind::Ggx, 1), parameters)
-}
-
-fn photograph(
-    geometry: &ObjectGeometry,
-    light: &Environment,
-    model: &dyn ReflectanceModel,
-    parameters: &[f64],
-) -> RgbImage {
-    let directions = TexelDirections::of_any_size(light.width(), light.height());
-    let visibility = geometry.visibility(&geometry.pixels, light.width(), light.height());
-    let evaluate = |at: &[HalfDifference], values: &mut [[f64; 3]]| model.evaluate(parameters, at, values);
-    render_exact(geometry, visibility.as_ref(), &directions, &evaluate, &[light]).swap_remove(0)
-}
-
-fn view_of(geometry: &ObjectGeometry, picture: RgbImage) -> ObjectView {
-    let photo = ObjectPhoto::new("photo", picture, f32::INFINITY, 0.0).unwrap().0;
-    ObjectView::new(photo, geometry.clone()).unwrap()
-}
 
 fn found(views: &[ObjectView], model: &StartedModel, known: &Known, settings: &ObjectSettings) -> Estimate {
     estimate(views, model, known, settings, &AtomicBool::new(false), &|_| {}).unwrap()
 }
 
-fn known_plastic() -> (StartedModel, Known) {
-    let (model, parameters) = plastic();
-    let prior = ParameterPrior::none(parameters.len());
-    let starts = vec![Start { name: "truth".into(), parameters: parameters.clone() }];
-    (StartedModel { model: Box::new(model), starts, prior }, Known { reflectance: Some(parameters), light: None })
-}
-
-fn light_error(estimate: &Estimate) -> f64 {
-    let light = estimate.light.environment();
-    environment_errors(&light, &sky().resampled(light.width(), light.height())).unwrap().log_rmse.raw
-}
-
 #[test]
 fn the_neural_model_explains_a_plastic_that_it_never_saw() {
     let geometry = ObjectGeometry::sphere(40, 40, 20.0);
-    let (truth, parameters) = plastic();
-    let view = view_of(&geometry, photograph(&geometry, &sky(), &truth, &parameters));
+    let view = view_of(&geometry, photograph(&geometry, &sky()));
     let trained = Arc::new(patina::neural::shipped().unwrap());
     let settings = small();
     let mut model = StartedModel::neural(trained, 2, settings.code_weight, &[]);
@@ -111,9 +47,9 @@ fn the_neural_model_explains_a_plastic_that_it_never_saw() {
 
     // Under a light that it was not fitted to, it is nearer to the truth than what it began from.
     let turned = sky().rotated_about_up(std::f32::consts::FRAC_PI_2);
-    let wanted = photograph(&geometry, &turned, &truth, &parameters);
+    let wanted = photograph(&geometry, &turned);
     let error =
-        |own: &[f64]| log_errors(&geometry, &photograph(&geometry, &turned, &*model.model, own), &wanted, 1e-3).0;
+        |own: &[f64]| log_errors(&geometry, &photograph_of(&geometry, &turned, &*model.model, own), &wanted, 1e-3).0;
     let begun = model.starts.iter().find(|start| start.name == estimate.start).unwrap();
     let (before, after) = (error(&begun.parameters), error(&estimate.parameters));
     println!("picture {}, relit {after}, at its start {before}", estimate.picture_log_rmse);
@@ -124,8 +60,7 @@ fn the_neural_model_explains_a_plastic_that_it_never_saw() {
 #[test]
 fn the_schedule_that_was_released_descends() {
     let geometry = ObjectGeometry::sphere(32, 32, 16.0);
-    let (truth, parameters) = plastic();
-    let view = view_of(&geometry, photograph(&geometry, &sky(), &truth, &parameters));
+    let view = view_of(&geometry, photograph(&geometry, &sky()));
     let settings = ObjectSettings {
         outer_loops: 2,
         grey_loops: 2,
@@ -149,32 +84,17 @@ fn the_schedule_that_was_released_descends() {
 
 #[test]
 fn two_photos_know_the_light_no_worse_than_one() {
-    // A floor before a wall, which the second camera sees from the other end.
-    let positions = [
-        (-3.0, 0.0, -3.0),
-        (3.0, 0.0, -3.0),
-        (3.0, 0.0, 3.0),
-        (-3.0, 0.0, 3.0),
-        (0.5, 0.0, -3.0),
-        (0.5, 0.0, 3.0),
-        (0.5, 2.5, -3.0),
-        (0.5, 2.5, 3.0),
-    ];
-    let mesh = Mesh {
-        positions: positions.iter().map(|&(x, y, z)| Vec3::new(x, y, z)).collect(),
-        triangles: vec![[0, 2, 1], [0, 3, 2], [4, 5, 7], [4, 7, 6]],
-        ..Mesh::default()
-    };
-    let (truth, parameters) = plastic();
+    // The second camera sees it from the other end.
+    let mesh = floor_and_wall();
     let views: Vec<ObjectView> = [3.0, -5.0]
         .into_iter()
         .map(|z| {
             let camera = Camera::looking_at(Vec3::new(-6.0, 7.0, z), Vec3::new(-0.7, 0.3, 0.0), 40, 40, 0.6);
             let geometry = ObjectGeometry::of_mesh(&mesh, &camera).unwrap();
-            view_of(&geometry, photograph(&geometry, &sky(), &truth, &parameters))
+            view_of(&geometry, photograph(&geometry, &sky()))
         })
         .collect();
-    let (model, known) = known_plastic();
+    let (model, known) = known_truth();
     let settings = ObjectSettings { prior: LightPriorKind::Gradient, pixels: 800, ..small() };
     let one = found(&views[..1], &model, &known, &settings);
     let two = found(&views, &model, &known, &settings);
@@ -188,13 +108,12 @@ fn two_photos_know_the_light_no_worse_than_one() {
 #[test]
 fn black_pixels_are_told_and_hardly_move_the_light() {
     let geometry = ObjectGeometry::sphere(40, 40, 20.0);
-    let (truth, parameters) = plastic();
-    let whole = photograph(&geometry, &sky(), &truth, &parameters);
+    let whole = photograph(&geometry, &sky());
     let mut spoilt = whole.clone();
     for pixel in geometry.pixels.iter().step_by(20) {
         spoilt[(pixel.row as usize, pixel.column as usize)] = Vec3::ZERO;
     }
-    let (model, known) = known_plastic();
+    let (model, known) = known_truth();
     let settings = ObjectSettings { prior: LightPriorKind::Gradient, pixels: 1000, ..small() };
     let sound = found(&[view_of(&geometry, whole.clone())], &model, &known, &settings);
     assert!(sound.findings.iter().all(|finding| finding.code != "photo-black"));
