@@ -128,12 +128,14 @@ fn levels_bring_maps_at_half_size_first_and_go_on_bit_for_bit() {
         ("wide light 1/2", 128, false),
         ("narrow light 1/2", 128, false),
         ("maps 1/2", 128, true),
+        ("narrow light 1/2", 128, true),
+        ("maps 1/2", 128, true),
         ("narrow light", 256, true),
         ("narrow light", 256, true),
         ("maps", 256, true),
     ];
     assert_eq!(sizes, expected.map(|(name, size, known)| (name.to_string(), size, known)));
-    assert_taken_up_alike(&settings, &[3, 4], &whole);
+    assert_taken_up_alike(&settings, &[3, 4, 6], &whole);
 }
 
 #[test]

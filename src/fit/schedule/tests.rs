@@ -1,0 +1,95 @@
+use super::*;
+
+#[test]
+fn two_steps_go_from_coarse_to_fine_and_keep_every_step() {
+    let settings = FitSettings { steps_diffuse: 10, steps_all: 7, levels: 3, map_size: 64, ..Default::default() };
+    let stages = stages(&settings);
+    assert_eq!(stages.iter().map(|stage| stage.steps).sum::<usize>(), 17);
+    assert_eq!(stages.iter().map(|stage| stage.map_size).collect::<Vec<_>>(), [16, 32, 64, 64, 64]);
+    assert_eq!(stages[3].kind, StageKind::All);
+    assert_eq!(stages[0].lobe_strength(3, 20), 0.0);
+    assert!(stages[3].lobe_strength(0, 20) > 0.0);
+    assert!((stages[0].rate(0, 0.1) - 1.0).abs() < 1e-6);
+    assert!(stages[2].rate(stages[2].steps, 0.1) < 0.11);
+}
+
+/// Walks a plan step by step: (stage, step in stage) before each step, and at the very end.
+fn walk(plan: &[Stage]) -> Vec<(usize, usize)> {
+    let places = plan.iter().enumerate().flat_map(|(stage, own)| (0..=own.steps).map(move |step| (stage, step)));
+    places.chain([(plan.len(), 0)]).collect()
+}
+
+#[test]
+fn the_same_settings_keep_the_plan_wherever_it_is() {
+    for (steps_diffuse, steps_all, levels) in [(10, 7, 3), (0, 11, 4), (2, 0, 3), (1, 1, 2), (10, 3, 4)] {
+        for steps in [Steps::TwoStep, Steps::OneStep] {
+            let settings = FitSettings { steps, steps_diffuse, steps_all, levels, map_size: 64, ..Default::default() };
+            let plan = stages(&settings);
+            for (stage, step) in walk(&plan) {
+                assert_eq!(revised(&settings, &plan, stage, step).unwrap(), plan, "{settings:?} at {stage}, {step}");
+            }
+        }
+    }
+}
+
+#[test]
+fn other_numbers_of_steps_keep_what_is_done_and_reach_the_finest_level() {
+    let of = |steps_diffuse, steps_all| FitSettings {
+        steps_diffuse,
+        steps_all,
+        levels: 3,
+        map_size: 64,
+        ..Default::default()
+    };
+    let before = of(10, 7);
+    let plan = stages(&before);
+    for (stage, step) in walk(&plan) {
+        for (steps_diffuse, steps_all) in [(10, 20), (40, 7), (5, 7), (10, 4), (12, 0), (0, 7), (4, 3)] {
+            let after = of(steps_diffuse, steps_all);
+            let done: usize = plan[..stage].iter().map(|stage| stage.steps).sum::<usize>() + step;
+            match revised(&after, &plan, stage, step) {
+                Ok(new) => {
+                    assert_eq!(new.iter().map(|stage| stage.steps).sum::<usize>(), steps_diffuse + steps_all);
+                    assert_eq!(new.last().unwrap().map_size, 64);
+                    let kept = stage.min(plan.len() - 1);
+                    let steps = |plan: &[Stage]| plan[..kept].iter().map(|stage| stage.steps).collect::<Vec<_>>();
+                    assert_eq!(steps(&new), steps(&plan));
+                    assert!(new.windows(2).all(|pair| pair[0].map_size <= pair[1].map_size));
+                    // Asking again changes nothing, a step later neither.
+                    assert_eq!(revised(&after, &new, stage, step).unwrap(), new);
+                    if new.get(stage).is_some_and(|stage| stage.steps > step) {
+                        assert_eq!(revised(&after, &new, stage, step + 1).unwrap(), new);
+                    }
+                }
+                Err(error) => {
+                    assert!(error.to_string().contains("--steps-"), "{error}");
+                    assert!(done >= steps_diffuse.min(10) || steps_diffuse == 0, "{error} after {done} steps");
+                }
+            }
+        }
+    }
+    assert!(revised(&of(9, 7), &plan, 3, 1).unwrap_err().to_string().contains("--steps-diffuse"));
+    assert!(revised(&of(10, 2), &plan, 4, 0).unwrap_err().to_string().contains("--steps-all"));
+    assert_eq!(revised(&of(10, 9), &plan, plan.len(), 0).unwrap().last().unwrap().steps, plan[4].steps + 2);
+}
+
+#[test]
+fn the_solver_visits_the_smallest_size_twice_and_keeps_its_plan_wherever_it_is() {
+    let settings = FitSettings { method: Method::Solver, map_size: 256, ..Default::default() };
+    let plan = stages(&settings);
+    let names: Vec<String> = plan.iter().map(Stage::name).collect();
+    let half = ["wide light 1/2", "narrow light 1/2", "maps 1/2", "narrow light 1/2", "maps 1/2"];
+    assert_eq!(names[..5], half);
+    assert_eq!(names[5..], ["narrow light", "maps"]);
+    for (stage, step) in walk(&plan) {
+        assert_eq!(revised(&settings, &plan, stage, step).unwrap(), plan, "{stage}, {step}");
+        let polished = FitSettings { solver_polish: 3, ..settings.clone() };
+        let revised = revised(&polished, &plan, stage, step).unwrap();
+        assert_eq!((&revised[..plan.len()], revised.last().unwrap().steps), (&plan[..], 3), "{stage}, {step}");
+    }
+    // A fit begun without the second visit goes on: with it before its turn, without it after.
+    let once: Vec<Stage> = [0, 1, 2, 5, 6].map(|number| plan[number]).to_vec();
+    assert_eq!(revised(&settings, &once, 1, 1).unwrap(), plan);
+    assert_eq!(revised(&settings, &once, 3, 1).unwrap(), once);
+    assert_eq!(revised(&settings, &once, once.len(), 0).unwrap(), once);
+}
