@@ -18,17 +18,14 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-/// Width and height of the grid on the coarsest level, at least.
-const LEAST_GRID: usize = 16;
-
 impl Fitter {
     /// Does one step of the solver. A step that is stopped changes nothing.
     pub(super) fn solver_step(&mut self, stage: &Stage, stop: &AtomicBool) -> Result<StepOutcome> {
         let began = Instant::now();
         let whole = SolverSettings::of(&self.settings);
-        let grid = (whole.grid >> stage.photo_level).max(LEAST_GRID);
         let check_choices = whole.check_choices && stage.photo_level == 0;
-        let settings = SolverSettings { map_size: stage.map_size, grid, check_choices, ..whole };
+        // The grid is not halved with the maps: light that reaches points too far apart bounds what small maps can show.
+        let settings = SolverSettings { map_size: stage.map_size, check_choices, ..whole };
         if self.solver.as_ref().is_some_and(|solver| solver.settings.map_size != settings.map_size) {
             self.solver = None;
         }
