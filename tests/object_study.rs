@@ -138,6 +138,7 @@ fn every_case_is_measured_and_a_second_sitting_adds_nothing() {
             "fig3,made-up-red,meadow,cook-torrance (clean)",
             "fig4,made-up-red,meadow,known + no prior (clean)",
             "fig4,made-up-red,meadow,known + gradient (clean)",
+            "fig4,made-up-red,meadow,known + entropy (clean)",
             "fig4,made-up-red,meadow,known + deep (clean)",
             "fig5,made-up-red,meadow,cook-torrance + deep (clean)",
             "fig5,made-up-red,meadow,cook-torrance + deep (noise)",

@@ -187,13 +187,10 @@ pub fn plan(inputs: &Inputs, options: &StudyOptions) -> Vec<Case> {
             }
         }
     }
-    let priors: &[LightPriorKind] = match quick {
-        true => &[LightPriorKind::None, LightPriorKind::Gradient, LightPriorKind::Deep],
-        false => &[LightPriorKind::None, LightPriorKind::Gradient, LightPriorKind::Entropy, LightPriorKind::Deep],
-    };
+    let priors = [LightPriorKind::None, LightPriorKind::Gradient, LightPriorKind::Entropy, LightPriorKind::Deep];
     for material in take(&some, materials(1, 5)) {
         for light in take(&lights, lit(2, 10)) {
-            for &prior in priors {
+            for prior in priors {
                 let (material, light) = (material.clone(), light.clone());
                 cases.push(Case { figure: Figure::Light, material, light, prior, ..base.clone() });
             }
