@@ -117,6 +117,11 @@ fn a_sphere_under_a_known_light_leaves_a_whole_result_behind() {
     for (own, known) in light.radiance.pixels().iter().zip(sky(28.0).radiance.pixels()) {
         assert!((*own - *known).abs().max_element() < 1e-3 * known.max_element(), "{own} {known}");
     }
+    // A sphere before a camera sees nearly all of the light; the known light says what each direction matters.
+    let seen = result.estimate.light_seen.as_ref().unwrap();
+    assert_eq!((seen.sensitivity.width(), seen.sensitivity.height()), (64, 32));
+    assert!(seen.sensitivity.pixels().iter().all(|texel| texel.is_finite() && texel.min_element() >= 0.0));
+    assert!((0.0..0.4).contains(&seen.unseen_share), "{}", seen.unseen_share);
     // The reflectance is the grey one, at angles that the photo shows.
     let table = MeasuredBrdf::read(&run.join("reflectance.binary")).unwrap();
     for (theta_half, theta_difference) in [(0.3, 0.6), (0.6, 0.4), (0.2, 0.9)] {

@@ -64,7 +64,7 @@ pub struct ObjectOptions {
     /// The schedule released with the paper, in place of the program's own.
     #[arg(long, conflicts_with = "quick")]
     pub released: bool,
-    /// Rows of the estimated light: 16, 32, 64 or 128.
+    /// Rows of the estimated light, 8 to 180; even with the deep prior.
     #[arg(long)]
     pub light_height: Option<usize>,
     /// Pixels that are used.

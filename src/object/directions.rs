@@ -139,7 +139,7 @@ impl TexelDirections {
             let message = format!("an environment of {width} x {height} texels cannot be fitted");
             return Err(Error::new(ErrorKind::InvalidSetting, message)
                 .at(Place::Setting("light-size".into()))
-                .remedy("ask for 16 to 128 rows, twice as many columns"));
+                .remedy("ask for 16 to 180 rows, twice as many columns"));
         }
         Ok(Self::of_any_size(width, height))
     }

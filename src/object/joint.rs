@@ -17,6 +17,7 @@ use super::problem::ObjectProblem;
 use super::progress::{ObjectEvent, ObjectiveRow, StepKind};
 use super::reflectance_step::{ReflectanceProblem, StepMemory};
 use super::screen::{Candidate, screen};
+use super::seen::LightSeen;
 use super::settings::{LightMethod, ObjectSettings};
 use super::starts::StartedModel;
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
@@ -58,6 +59,8 @@ pub struct Estimate {
     pub candidates: Vec<Candidate>,
     /// The objective after every step.
     pub rows: Vec<ObjectiveRow>,
+    /// What the photos see of the light; `None` for a result that does not say, or of an estimation that was ended early.
+    pub light_seen: Option<LightSeen>,
     /// Root mean square of the logarithm of picture over photo, over the pixels of the fit.
     pub picture_log_rmse: f64,
     /// What was noticed.
@@ -164,6 +167,7 @@ pub fn estimate(
         findings
             .push(Finding::new(Severity::Warning, "object-not-finite", message).remedy("try another start or model"));
     }
+    let light_seen = Some(LightSeen::of(&run.problem.transport, &table, &light));
     Ok(Estimate {
         parameters,
         table,
@@ -171,6 +175,7 @@ pub fn estimate(
         start,
         candidates,
         rows: run.rows,
+        light_seen,
         picture_log_rmse,
         findings,
         seconds: began.elapsed().as_secs_f64(),

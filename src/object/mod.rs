@@ -11,7 +11,7 @@
 //! | [`prior`] | what is known of light: the deep prior and its rivals |
 //! | [`light_step`], [`reflectance_step`] | one unknown while the other is held |
 //! | [`starts`], [`screen`], [`evidence`] | where to begin, tried at low resolution and ranked |
-//! | [`split`] | what the photo leaves open |
+//! | [`split`], [`seen`] | what the photo leaves open; which directions of the light it sees |
 //! | [`picture`] | re-renders and relit pictures |
 //! | [`settings`], [`progress`] | what is asked, what is told |
 //! | [`read`](mod@read), [`result_folder`], [`result_read`], [`page`] | files that are read, what is left on disk, that read again |
@@ -41,6 +41,7 @@ pub mod reflectance_step;
 pub mod result_folder;
 pub mod result_read;
 pub mod screen;
+pub mod seen;
 pub mod settings;
 pub mod split;
 pub mod starts;

@@ -115,7 +115,7 @@ pub fn curve(rows: &[ObjectiveRow]) -> String {
 /// What was found, in figures.
 pub fn facts(estimate: &Estimate, model: &str, gauge: &Gauge, spread: &SplitSpread) -> String {
     let three = |values: [f64; 3]| values.map(significant).join(" · ");
-    let rows = [
+    let mut rows = vec![
         ("model", model.to_string()),
         ("began as", estimate.start.clone()),
         ("log error of the picture (RMS, natural)", fixed(estimate.picture_log_rmse, 4)),
@@ -126,6 +126,9 @@ pub fn facts(estimate: &Estimate, model: &str, gauge: &Gauge, spread: &SplitSpre
         ("their spread in the light (RMS, natural)", fixed(spread.light, 3)),
         ("their spread in the reflectance (RMS, natural)", fixed(spread.reflectance, 3)),
     ];
+    if let Some(seen) = &estimate.light_seen {
+        rows.push(("directions the photos tell next to nothing of", format!("{:.0} %", 100.0 * seen.unseen_share)));
+    }
     let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_string(), value]).collect();
     table(&["", ""], &rows)
         + "<p class=note>No photo tells the level of the light: reflectance times a factor and light over it, channel by \

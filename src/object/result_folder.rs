@@ -6,6 +6,7 @@
 //! | `settings.toml` | the settings |
 //! | `reflectance.binary` | the reflectance as a table of MERL's format |
 //! | `env.exr` | the light |
+//! | `environment_seen.exr` | how much each direction matters to the photos, see [`LightSeen`](super::seen::LightSeen) |
 //! | `rerender_N.exr` `relit_N_LIGHT.exr` | the object under the fitted light, and under others |
 //! | `loss.csv` | the objective after every step |
 //! | `report.html` | all of it to look at |
@@ -30,6 +31,8 @@ use std::path::Path;
 
 /// Name of the file that marks a result of object mode.
 pub const MARK: &str = "object.json";
+/// Name of the file that says what the photos see of the light.
+pub const SEEN: &str = "environment_seen.exr";
 
 /// Makes the folder, or takes an empty one or one of an earlier estimation.
 ///
@@ -65,6 +68,11 @@ pub fn write(
     let directions = TexelDirections::new(width, height)?;
     let environment = estimate.light.environment();
     environment.write(&folder.join("env.exr"))?;
+    match &estimate.light_seen {
+        Some(seen) => file::write_exr_rgb(&folder.join(SEEN), &seen.sensitivity)?,
+        // What an earlier estimation left here is not true of this one; it need not be there.
+        None => drop(std::fs::remove_file(folder.join(SEEN))),
+    }
     MeasuredBrdf::from_model(model.model.as_ref(), &estimate.parameters).write(&folder.join("reflectance.binary"))?;
     write_rows(&folder.join("loss.csv"), &estimate.rows)?;
     let settings_text = toml::to_string_pretty(settings)
@@ -78,6 +86,7 @@ pub fn write(
         "model": model.model.name(),
         "parameters": estimate.parameters,
         "start": estimate.start,
+        "light_unseen_share": estimate.light_seen.as_ref().map(|seen| seen.unseen_share),
         "picture_log_rmse": estimate.picture_log_rmse,
         "seconds": estimate.seconds,
         "gauge": gauge,
@@ -114,8 +123,12 @@ pub fn write(
     }
     sections.push(("Photo and pictures", galleries));
     let stops = page::stops_of(&environment.radiance);
-    let light = Shown { caption: "estimated light".into(), picture: &environment.radiance, stops };
-    sections.push(("Light", page::gallery(&[light], 512)?));
+    let mut lights = vec![Shown { caption: "estimated light".into(), picture: &environment.radiance, stops }];
+    if let Some(seen) = &estimate.light_seen {
+        let caption = "how much each direction matters to the photos".into();
+        lights.push(Shown { caption, picture: &seen.sensitivity, stops: page::stops_of(&seen.sensitivity) });
+    }
+    sections.push(("Light", page::gallery(&lights, 512)?));
     sections.push(("Objective", page::curve(&estimate.rows)));
     let findings: String = estimate
         .findings

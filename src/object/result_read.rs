@@ -5,11 +5,13 @@ use super::nodes::NodeGrid;
 use super::prior::LogLight;
 use super::progress::read_rows;
 use super::read::ObjectFiles;
-use super::result_folder::MARK;
+use super::result_folder::{MARK, SEEN};
+use super::seen::LightSeen;
 use super::settings::ObjectSettings;
 use super::split::SplitSpread;
 use super::starts::{ModelKind, StartedModel};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::image::file;
 use crate::light::Environment;
 use std::path::{Path, PathBuf};
 
@@ -132,6 +134,8 @@ pub fn read(folder: &Path) -> Result<ObjectResult> {
     }
     let table = NodeGrid::new(settings.nodes).tabulate(model.model.as_ref(), &written.parameters);
     let (light, _) = Environment::read(&folder.join("env.exr"))?;
+    let seen = folder.join(SEEN);
+    let light_seen = if seen.is_file() { Some(LightSeen::new(file::read_rgb(&seen)?)) } else { None };
     let finding = |own: WrittenFinding| Finding::new(own.severity, "object-result", own.message).remedy(own.remedy);
     let estimate = Estimate {
         parameters: written.parameters,
@@ -140,6 +144,7 @@ pub fn read(folder: &Path) -> Result<ObjectResult> {
         start: written.start,
         candidates: Vec::new(),
         rows: read_rows(&folder.join("loss.csv"))?,
+        light_seen,
         picture_log_rmse: written.picture_log_rmse,
         findings: written.findings.into_iter().map(finding).collect(),
         seconds: written.seconds,

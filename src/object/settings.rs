@@ -3,6 +3,9 @@
 use super::prior::LightPriorKind;
 use crate::error::{Error, ErrorKind, Place, Result};
 
+/// Most rows of the light: texels are counted by 16 bits, and 360 x 180 is what the paper's own lights have.
+pub const MOST_ROWS: usize = 180;
+
 /// How the light is improved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
@@ -138,8 +141,8 @@ impl ObjectSettings {
         let wrong = |name: &str, message: &str| {
             Err(Error::new(ErrorKind::InvalidSetting, message).at(Place::Setting(name.into())))
         };
-        if !(8..=128).contains(&self.light_height) {
-            return wrong("light-height", "the light needs 8 to 128 rows");
+        if !(8..=MOST_ROWS).contains(&self.light_height) {
+            return wrong("light-height", "the light needs 8 to 180 rows");
         }
         if self.pixels == 0 {
             return wrong("pixels", "at least one pixel is needed");

@@ -53,6 +53,11 @@ impl MeasuredMaterial {
         MeasuredMaterial { name: name.into(), table, sampler }
     }
 
+    /// Its reflectance.
+    pub fn table(&self) -> &MeasuredBrdf {
+        &self.table
+    }
+
     /// `f(i, o) (n.i)` in 1/sr per channel, for unit directions in the outer space.
     pub fn reflect(&self, frame: &Frame, towards_light: Vec3, towards_viewer: Vec3) -> [f32; 3] {
         let [light, viewer] = [towards_light, towards_viewer].map(|outer| frame.local_from_outer(outer).as_dvec3());

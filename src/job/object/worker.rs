@@ -198,6 +198,7 @@ impl Worker {
             start: "not followed to the end".into(),
             candidates: Vec::new(),
             rows,
+            light_seen: None,
             picture_log_rmse: look.map_or(0.0, |(_, look)| look.log_rmse),
             findings: vec![
                 Finding::new(Severity::Warning, "object-ended-early", message)
