@@ -1,17 +1,20 @@
 //! The library of materials to look at: thumbnails, the map of codes, and any place on it; from the weights that come
-//! with the program, no data needed.
+//! with the program, no data needed. Beside it, measured tables that a user opens.
 
 use super::object::MaterialLook;
 use super::object::look::sphere_of;
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::{Error, ErrorKind, Place, Result};
 use crate::image::RgbImage;
 use crate::light::Environment;
+use crate::measured::coordinates::HalfDifference;
 use crate::neural::between::{MaterialMap, Part};
 use crate::neural::embedding::Embedding;
 use crate::neural::lobes::Reconstruction;
 use crate::neural::nodes::GridShape;
 use crate::neural::sampler::HalfVectorSampler;
-use crate::neural::{self, FlowModel, Trained};
+use crate::neural::{self, FlowModel, Trained, source};
+use crate::render::regions::MeasuredMaterial;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -92,9 +95,76 @@ impl Materials {
     }
 }
 
+/// A measured table that was opened.
+#[derive(Clone, Debug)]
+pub struct OpenedMaterial {
+    /// Where it was read from.
+    pub path: PathBuf,
+    material: MeasuredMaterial,
+}
+
+impl OpenedMaterial {
+    /// Reads a `.binary` file, or the table in a result folder of object mode.
+    ///
+    /// # Errors
+    /// Those of [`source::read`]; `Unsupported` for other files.
+    pub fn read(path: &Path) -> Result<Self> {
+        let is_table = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("binary"));
+        if !is_table && !path.is_dir() {
+            return Err(Error::new(ErrorKind::Unsupported, "a measured material is a .binary file in MERL's layout")
+                .at(Place::File(path.into()))
+                .remedy("`patina measured show` and `project` take other sources; or open a result of object mode"));
+        }
+        let found = source::read(&path.to_string_lossy(), None, None)?;
+        Ok(OpenedMaterial { path: path.into(), material: MeasuredMaterial::new(&found.name, found.table) })
+    }
+
+    /// Its name: that of the file without its ending, or of the folder.
+    pub fn name(&self) -> &str {
+        &self.material.name
+    }
+
+    /// A sphere of it under three lamps, exposed for a display at 0 stops.
+    pub fn thumbnail(&self, side: usize) -> RgbImage {
+        sphere_of(&|at| self.value(at), side, None)
+    }
+
+    /// The material with its sphere under a light or under three lamps.
+    pub fn shown(&self, light: Option<&Environment>) -> MaterialShown {
+        let parts = vec![Part { name: self.name().into(), share: 1.0 }];
+        let albedo = self.material.albedos().first().map_or([0.0; 3], |(_, albedo)| *albedo);
+        MaterialShown { parts, look: MaterialLook::of(&|at| self.value(at), light), albedo }
+    }
+
+    fn value(&self, at: HalfDifference) -> [f64; 3] {
+        self.material.table().lookup(at).unwrap_or_default()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_opened_table_is_what_it_was_written_from() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("copper.binary");
+        let materials = Materials::shipped().unwrap();
+        let name = materials.map.places[0].name.clone();
+        let parameters = materials.model.of_material(&name).unwrap();
+        materials.model.table(&parameters).write(&path).unwrap();
+        let opened = OpenedMaterial::read(&path).unwrap();
+        assert_eq!(opened.name(), "copper");
+        let own = opened.shown(None);
+        let library = materials.shown(&[Part { name, share: 1.0 }], None).unwrap();
+        for channel in 0..3 {
+            assert!((own.albedo[channel] / library.albedo[channel] - 1.0).abs() < 0.05, "{own:?} {library:?}");
+        }
+        assert_eq!(opened.thumbnail(9).width(), 9);
+        std::fs::write(&path, b"cut").unwrap();
+        assert_eq!(OpenedMaterial::read(&path).unwrap_err().kind(), ErrorKind::Malformed);
+        assert_eq!(OpenedMaterial::read(&folder.path().join("x.png")).unwrap_err().kind(), ErrorKind::Unsupported);
+    }
 
     #[test]
     fn the_library_is_drawn_and_a_place_between_is_between() {

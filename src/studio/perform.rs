@@ -89,6 +89,10 @@ fn perform_on_object(act: Act, model: &mut Model, context: &Context) {
                 context.open_url(egui::OpenUrl::new_tab(url));
             }
         }
+        Act::OpenMaterial => {
+            model.workspace = Workspace::Object;
+            model.dialog = Dialog::Path { purpose: PickFor::Material, text: String::new() };
+        }
         Act::NextMaterial => model.step_material(1),
         Act::PreviousMaterial => model.step_material(-1),
         _ => {}

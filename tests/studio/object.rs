@@ -87,7 +87,9 @@ fn a_photo_of_a_sphere_becomes_light_and_reflectance_on_the_screen_and_on_disk()
     assert!(outcome.parts.estimate.picture_log_rmse < 0.1, "{}", outcome.parts.estimate.picture_log_rmse);
     assert_eq!(outcome.rerenders[0].width(), 40, "at full size");
     let folder = result_folder(&mut studio);
-    for name in ["object.json", "env.exr", "reflectance.binary", "report.html", "relit_0_Noon_sky.exr"] {
+    for name in
+        ["object.json", "env.exr", "environment_seen.exr", "reflectance.binary", "report.html", "relit_0_Noon_sky.exr"]
+    {
         assert!(folder.join(name).is_file(), "{name}");
     }
     studio.wait("the relit pictures", |model| !model.object.relit.is_empty());
@@ -95,6 +97,10 @@ fn a_photo_of_a_sphere_becomes_light_and_reflectance_on_the_screen_and_on_disk()
     studio.control("object under Noon sky");
     studio.click("Spheres");
     studio.control("sphere under Noon sky");
+    studio.act(Act::PanelObjectLight);
+    studio.click("Seen by the photos");
+    studio.control("What the photos see of the light");
+    assert!(studio.says("The photos tell next to nothing of"));
     studio.act(Act::PanelStarts);
     assert!(studio.says("What the photo leaves open") && studio.says("Starts that were followed"));
     for (button, label) in [
@@ -294,6 +300,41 @@ fn the_library_is_shown_and_the_map_of_codes_can_be_clicked_through() {
     assert!(studio.says("Between: "));
     studio.press(Modifiers::COMMAND, Key::ArrowRight);
     studio.wait("the next", |model| model.materials.shown.as_ref().unwrap().parts.len() == 1);
+}
+
+#[test]
+fn a_measured_table_is_opened_and_shown_before_the_library() {
+    let mut studio = with_materials();
+    let path = studio.folder.path().join("own-lacquer.binary");
+    let library = patina::neural::source::read("brass", None, None).unwrap();
+    library.table.write(&path).unwrap();
+    studio.act(Act::OpenMaterial);
+    studio.frames(2);
+    studio.replace_text("Path", &path.display().to_string());
+    studio.click("Open this");
+    studio.wait("the table", |model| model.materials.shown.is_some());
+    assert!(studio.says("own-lacquer (measured)"));
+    studio.control("Sphere of the material");
+    let own = studio.model().materials.shown.clone().unwrap();
+    assert!(own.albedo[0] > own.albedo[2], "brass is yellow: {:?}", own.albedo);
+    // Another material, and back by its tile; a filter hides it with the rest.
+    studio.act(Act::NextMaterial);
+    studio.wait("the next", |model| model.materials.shown.as_ref().unwrap().parts[0].name != "own-lacquer");
+    studio.act(Act::PanelMaterials);
+    studio.click("own-lacquer");
+    studio.wait("the table again", |model| model.materials.shown.as_ref().unwrap().parts[0].name == "own-lacquer");
+    studio.replace_text("Find a material", "brass");
+    assert!(studio.controls("own-lacquer").is_empty());
+    // Dropped twice it is one; a damaged one is told of, and changes nothing.
+    studio.model().dropped(path.clone());
+    studio.wait("the table once more", |model| !model.tasks.is_busy());
+    assert_eq!(studio.model().materials.opened.len(), 1);
+    let damaged = studio.folder.path().join("cut.binary");
+    std::fs::write(&damaged, b"cut").unwrap();
+    studio.model().dropped(damaged);
+    studio.wait("the refusal", |model| !model.tasks.is_busy());
+    assert!(studio.log().contains("cut.binary"), "{}", studio.log());
+    assert_eq!(studio.model().materials.opened.len(), 1);
 }
 
 #[test]

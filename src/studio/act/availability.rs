@@ -31,6 +31,7 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
         | Act::FalseColour
         | Act::Stripes
         | Act::OpenPhoto
+        | Act::OpenMaterial
         | Act::PanelObject
         | Act::PanelObjectPicture
         | Act::PanelReflectance

@@ -26,6 +26,8 @@ pub enum PickFor {
     ObjectLight,
     /// A folder for the result of an estimation.
     ObjectResult,
+    /// A measured material to look at.
+    Material,
 }
 
 /// Endings of pictures that are read.
@@ -93,6 +95,7 @@ impl Model {
             PickFor::ObjectMesh => self.edits.object.mesh = path.display().to_string(),
             PickFor::ObjectLight => self.edits.object.light = path.display().to_string(),
             PickFor::ObjectResult => self.save_object(path),
+            PickFor::Material => self.open_material(path),
             PickFor::Save => {
                 if let Dialog::Save(request) = &mut self.dialog {
                     request.path = path.display().to_string();
@@ -127,6 +130,9 @@ impl Model {
                 PickFor::ObjectMesh => dialog.set_title("Mesh").add_filter("Meshes", &["obj", "ply"]).pick_file(),
                 PickFor::ObjectCamera => dialog.set_title("Camera").add_filter("Cameras", &["json", "txt"]).pick_file(),
                 PickFor::ObjectLight => dialog.set_title("Known light").add_filter("HDR maps", PHOTOS).pick_file(),
+                PickFor::Material => {
+                    dialog.set_title("Measured material").add_filter("MERL tables", &["binary"]).pick_file()
+                }
                 PickFor::ObjectResult => dialog.set_title("Folder for the result").pick_folder(),
             };
             Ok(Done::Picked(purpose, path))

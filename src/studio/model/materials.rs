@@ -3,8 +3,10 @@
 use super::lights::LightName;
 use super::{Done, Model};
 use crate::image::RgbImage;
-use crate::job::materials::{MaterialShown, Materials};
+use crate::job::materials::{MaterialShown, Materials, OpenedMaterial};
 use crate::neural::between::Part;
+use crate::studio::layout::Panel;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Title of the task that reads the library and draws its thumbnails.
@@ -14,13 +16,27 @@ pub const SHOWING_TITLE: &str = "Drawing the material";
 /// Side of a thumbnail in pixels.
 pub const THUMBNAIL_SIDE: usize = 72;
 
-/// A place on the map of codes.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Choice {
-    /// Along the two main directions.
-    pub at: [f64; 2],
-    /// Its materials with their shares, the largest first.
-    pub parts: Vec<Part>,
+/// What was chosen to look at.
+#[derive(Clone, Debug)]
+pub enum Choice {
+    /// A place on the map of codes.
+    Place {
+        /// Along the two main directions.
+        at: [f64; 2],
+        /// Its materials with their shares, the largest first.
+        parts: Vec<Part>,
+    },
+    /// A measured table that was opened.
+    Opened(Arc<OpenedMaterial>),
+}
+
+/// A measured table that was opened, with its sphere.
+#[derive(Clone, Debug)]
+pub struct OpenedTile {
+    /// The table.
+    pub material: Arc<OpenedMaterial>,
+    /// A sphere of it.
+    pub thumbnail: Arc<RgbImage>,
 }
 
 /// The library.
@@ -30,7 +46,9 @@ pub struct MaterialBrowser {
     pub library: Option<Arc<Materials>>,
     /// Its thumbnails, in the order of the map; empty until they are drawn.
     pub thumbnails: Vec<Arc<RgbImage>>,
-    /// Whether it was asked for.
+    /// Measured tables that were opened, the last one first.
+    pub opened: Vec<OpenedTile>,
+    /// Whether the library was asked for.
     pub was_asked: bool,
     /// What was chosen.
     pub choice: Option<Choice>,
@@ -67,7 +85,31 @@ impl Model {
     /// Chooses a place on the map and draws its material.
     pub fn choose_material(&mut self, at: [f64; 2]) {
         let Some(library) = &self.materials.library else { return };
-        self.materials.choice = Some(Choice { at, parts: library.map.parts_at(at) });
+        self.materials.choice = Some(Choice::Place { at, parts: library.map.parts_at(at) });
+        self.show_material();
+    }
+
+    /// Reads a measured table, a `.binary` file or a result of object mode, puts it before the library and chooses it.
+    pub fn open_material(&mut self, path: PathBuf) {
+        self.tasks.spawn(format!("Reading {}", path.display()), move |_| {
+            let material = Arc::new(OpenedMaterial::read(&path)?);
+            let thumbnail = Arc::new(material.thumbnail(THUMBNAIL_SIDE));
+            Ok(Done::MaterialOpened(OpenedTile { material, thumbnail }))
+        });
+    }
+
+    pub(super) fn material_was_opened(&mut self, tile: OpenedTile) {
+        self.log.note(format!("Opened the material {}", tile.material.path.display()));
+        let material = Arc::clone(&tile.material);
+        self.materials.opened.retain(|other| other.material.path != material.path);
+        self.materials.opened.insert(0, tile);
+        self.choose_opened(material);
+    }
+
+    /// Chooses a measured table that was opened.
+    pub fn choose_opened(&mut self, material: Arc<OpenedMaterial>) {
+        self.materials.choice = Some(Choice::Opened(material));
+        self.activate = Some(Panel::Material);
         self.show_material();
     }
 
@@ -75,7 +117,7 @@ impl Model {
     pub fn step_material(&mut self, places: isize) {
         let Some(library) = &self.materials.library else { return };
         let map = &library.map;
-        let now = self.materials.choice.as_ref().and_then(|choice| map.nearest(choice.at));
+        let now = self.materials.choice.as_ref().and_then(Choice::at).and_then(|at| map.nearest(at));
         let count = map.places.len() as isize;
         let next = now.map_or(0, |now| (now as isize + places).rem_euclid(count.max(1)));
         if let Some(place) = map.places.get(next as usize) {
@@ -85,23 +127,46 @@ impl Model {
 
     /// Draws the chosen material in the chosen light.
     pub fn show_material(&mut self) {
-        let (Some(library), Some(choice)) = (self.materials.library.clone(), self.materials.choice.clone()) else {
-            return;
-        };
+        let Some(choice) = self.materials.choice.clone() else { return };
+        let library = self.materials.library.clone();
         let light = self.materials.light.as_ref().and_then(|name| self.shelf.find(name));
         let light = light.map(|light| Arc::clone(&light.environment));
         self.tasks.stop(SHOWING_TITLE);
         self.tasks.spawn(SHOWING_TITLE, move |_| {
-            let shown = library.shown(&choice.parts, light.as_deref())?;
+            let shown = match (&choice, library) {
+                (Choice::Opened(material), _) => material.shown(light.as_deref()),
+                (Choice::Place { parts, .. }, Some(library)) => library.shown(parts, light.as_deref())?,
+                (Choice::Place { parts, .. }, None) => Materials::shipped()?.shown(parts, light.as_deref())?,
+            };
             Ok(Done::MaterialShown(Box::new(shown)))
         });
     }
 }
 
-impl MaterialBrowser {
-    /// The choice in words: a material, or shares of several.
-    pub fn words(parts: &[Part]) -> String {
-        match parts {
+impl Choice {
+    /// The place on the map of codes; a table has none.
+    pub fn at(&self) -> Option<[f64; 2]> {
+        match self {
+            Choice::Place { at, .. } => Some(*at),
+            Choice::Opened(_) => None,
+        }
+    }
+
+    /// The one material of the library that it is, if it is one.
+    pub fn material_of_library(&self) -> Option<&str> {
+        match self {
+            Choice::Place { parts, .. } if parts.len() == 1 => Some(&parts[0].name),
+            _ => None,
+        }
+    }
+
+    /// In words: a material, or shares of several.
+    pub fn words(&self) -> String {
+        let parts = match self {
+            Choice::Place { parts, .. } => parts,
+            Choice::Opened(material) => return format!("{} (measured)", material.name()),
+        };
+        match parts.as_slice() {
             [] => String::new(),
             [one] => one.name.clone(),
             many => {

@@ -84,6 +84,8 @@ pub enum Done {
     ObjectSaved(PathBuf),
     /// The library of materials with its thumbnails.
     MaterialsDrawn(Arc<crate::job::materials::Materials>, Vec<crate::image::RgbImage>),
+    /// A measured table was opened.
+    MaterialOpened(materials::OpenedTile),
     /// The chosen material.
     MaterialShown(Box<crate::job::materials::MaterialShown>),
 }
@@ -308,6 +310,7 @@ impl Model {
             Done::ObjectOpened(opened) => self.object_was_opened(*opened),
             Done::ObjectSaved(folder) => self.object_was_saved(folder),
             Done::MaterialsDrawn(library, pictures) => self.materials_were_drawn(library, pictures),
+            Done::MaterialOpened(tile) => self.material_was_opened(tile),
             Done::MaterialShown(shown) => self.materials.shown = Some(Arc::from(shown)),
         }
     }

@@ -52,8 +52,13 @@ pub struct RunRead {
 }
 
 impl Model {
-    /// Opens a scene or run folder; a picture is a photo for object mode, a result of object mode is shown there.
+    /// Opens a scene or run folder; a picture is a photo for object mode, a result of object mode is shown there, and so
+    /// is a measured table.
     pub fn open(&mut self, path: PathBuf) {
+        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("binary")) {
+            self.workspace = Workspace::Object;
+            return self.open_material(path);
+        }
         if super::object_form::is_photo(&path) && path.is_file() {
             self.workspace = Workspace::Object;
             return self.object_dropped(&path);

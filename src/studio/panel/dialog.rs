@@ -135,6 +135,9 @@ fn path(ui: &mut Ui, model: &mut Model, purpose: PickFor, text: &mut String) -> 
         PickFor::Light => ("Add an HDR map to the shelf", "/home/me/lights/garden.hdr"),
         PickFor::ObjectPhoto => ("Add a photo of an object", "/home/me/photos/ball.exr"),
         PickFor::ObjectResult => ("Save the result to a folder", "/home/me/results/ball"),
+        PickFor::Material => {
+            ("Open a measured material, or the result of an estimation", "/home/me/brdfs/gold-paint.binary")
+        }
         _ => ("Open a scene or a run", "/home/me/scenes/place"),
     };
     ui.heading(title);
@@ -150,7 +153,9 @@ fn path(ui: &mut Ui, model: &mut Model, purpose: PickFor, text: &mut String) -> 
         if ui.add_enabled(typed, Button::new("Open this")).clicked() || (enter && typed) {
             match purpose {
                 PickFor::Light => model.add_light(text.trim().into()),
-                PickFor::ObjectPhoto | PickFor::ObjectResult => model.picked(purpose, text.trim().into()),
+                PickFor::ObjectPhoto | PickFor::ObjectResult | PickFor::Material => {
+                    model.picked(purpose, text.trim().into());
+                }
                 _ => model.open(text.trim().into()),
             }
             done = true;

@@ -1,12 +1,14 @@
-//! The estimated light: as a map of all directions and in two balls.
+//! The estimated light: as a map of all directions and in two balls; and what the photos see of it.
 
+use crate::image::RgbImage;
 use crate::image::display::DisplaySettings;
 use crate::image::histogram::auto_exposure;
 use crate::light::Environment;
 use crate::studio::model::Model;
 use crate::studio::panel::empty;
 use crate::studio::panel::light::{self, LightMemory};
-use egui::{RichText, Ui};
+use crate::studio::picture::{self, Overlay, PictureView, Source};
+use egui::{RichText, Ui, vec2};
 use std::sync::Arc;
 
 /// What the panel keeps: the light that is shown, and the exposure that suits it.
@@ -14,6 +16,16 @@ use std::sync::Arc;
 pub struct ObjectLightMemory {
     light: LightMemory,
     exposed: Option<(Arc<Environment>, f32)>,
+    shows_seen: bool,
+    seen: Option<Seen>,
+    seen_view: PictureView,
+}
+
+/// What the photos see of a light, ready to be drawn.
+struct Seen {
+    light: Arc<Environment>,
+    picture: Arc<RgbImage>,
+    stops: f32,
 }
 
 /// Draws the panel.
@@ -21,6 +33,17 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ObjectLightMemory) {
     let Some(environment) = model.object.light() else {
         return empty(ui, "No light yet", "It appears after the first round");
     };
+    if model.object.outcome.as_ref().is_some_and(|outcome| outcome.parts.estimate.light_seen.is_some()) {
+        ui.horizontal(|ui| {
+            ui.selectable_value(&mut memory.shows_seen, false, "Radiance")
+                .on_hover_text("The light that was estimated");
+            ui.selectable_value(&mut memory.shows_seen, true, "Seen by the photos")
+                .on_hover_text("How much each direction matters to the photos: the rest is what the prior made of it");
+        });
+        if memory.shows_seen {
+            return seen(ui, model, memory, &environment);
+        }
+    }
     if memory.exposed.as_ref().is_none_or(|(own, _)| !Arc::ptr_eq(own, &environment)) {
         memory.exposed = Some((Arc::clone(&environment), auto_exposure(&environment.radiance)));
     }
@@ -30,4 +53,25 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ObjectLightMemory) {
     let own = model.edits.display;
     let display = DisplaySettings { exposure_stops: own.exposure_stops + stops, ..own };
     light::draw(ui, model, &mut memory.light, "Estimated environment", &environment, None, &display);
+}
+
+/// Draws how much each direction matters, exposed for itself.
+fn seen(ui: &mut Ui, model: &Model, memory: &mut ObjectLightMemory, environment: &Arc<Environment>) {
+    let outcome = model.object.outcome.as_ref();
+    let Some(found) = outcome.and_then(|outcome| outcome.parts.estimate.light_seen.as_ref()) else { return };
+    if memory.seen.as_ref().is_none_or(|own| !Arc::ptr_eq(&own.light, environment)) {
+        let stops = auto_exposure(&found.sensitivity);
+        let picture = Arc::new(found.sensitivity.clone());
+        memory.seen = Some(Seen { light: Arc::clone(environment), picture, stops });
+    }
+    let Some(Seen { picture, stops, .. }) = &memory.seen else { return };
+    let share = 100.0 * found.unseen_share;
+    ui.label(RichText::new(format!("The photos tell next to nothing of {share:.0} % of all directions")).weak());
+    let display = DisplaySettings { exposure_stops: *stops, ..DisplaySettings::default() };
+    let source = Source::from(Arc::clone(picture));
+    let overlay = Overlay { badge: "up", ..Overlay::default() };
+    let height = (ui.available_width() / 2.0).min(ui.available_height()).max(60.0);
+    ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
+        picture::show(ui, "What the photos see of the light", &source, &display, &mut memory.seen_view, &overlay);
+    });
 }

@@ -7,6 +7,7 @@ use crate::neural::between::{MaterialMap, MaterialPlace};
 use crate::studio::act::Act;
 use crate::studio::layout::Panel;
 use crate::studio::model::Model;
+use crate::studio::model::materials::Choice;
 use crate::studio::panel::act_button_named;
 use crate::studio::theme;
 use egui::{Align2, FontId, Pos2, Rect, RichText, Sense, Stroke, Ui, pos2, remap, vec2};
@@ -83,17 +84,17 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut MaterialsMemory) {
         }
     }
     let colours = theme::palette(ui.visuals());
-    if let Some(choice) = &model.materials.choice {
-        let at = screen.position(choice.at);
+    if let Some(Choice::Place { at, parts }) = &model.materials.choice {
+        let at = screen.position(*at);
         let painter = ui.painter_at(rect);
         painter.circle_stroke(at, 0.5 * SIDE + 2.0, Stroke::new(2.5, colours.accent));
-        for part in choice.parts.iter().filter(|_| choice.parts.len() > 1) {
+        for part in parts.iter().filter(|_| parts.len() > 1) {
             if let Some(other) = library.map.places.iter().find(|place| place.name == part.name) {
                 let width = 0.5 + 3.0 * part.share as f32;
                 painter.line_segment([at, screen.position(other.at)], Stroke::new(width, colours.accent));
             }
         }
-        if choice.parts.len() > 1 {
+        if parts.len() > 1 {
             painter.circle_filled(at, 5.0, colours.accent);
         }
     }

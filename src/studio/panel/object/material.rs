@@ -3,16 +3,19 @@
 use super::lobes::{self, LobesMemory};
 use crate::studio::model::Model;
 use crate::studio::model::estimating::is_free;
-use crate::studio::model::materials::MaterialBrowser;
 use crate::studio::panel::empty;
 use egui::{ComboBox, RichText, Ui};
 
 /// Draws the panel.
 pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut LobesMemory) {
     let Some(choice) = model.materials.choice.clone() else {
-        return empty(ui, "No material chosen", "Click one among the materials, or any place on the map of codes");
+        return empty(
+            ui,
+            "No material chosen",
+            "Click one among the materials, or any place on the map of codes; or open a .binary file",
+        );
     };
-    ui.add(egui::Label::new(RichText::new(MaterialBrowser::words(&choice.parts)).strong()).wrap());
+    ui.add(egui::Label::new(RichText::new(choice.words()).strong()).wrap());
     light(ui, model);
     let Some(shown) = model.materials.shown.clone() else {
         ui.label(RichText::new("Being drawn").weak());

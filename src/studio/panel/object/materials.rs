@@ -1,14 +1,18 @@
-//! The library: a sphere of every material, by kind and name.
+//! The library: a sphere of every material, by kind and name; before it, measured tables that were opened.
 
+use crate::image::RgbImage;
 use crate::image::display::DisplaySettings;
 use crate::measured::Category;
+use crate::studio::act::Act;
 use crate::studio::layout::Panel;
 use crate::studio::model::Model;
-use crate::studio::model::materials::DRAWING_TITLE;
-use crate::studio::panel::empty;
+use crate::studio::model::materials::{Choice, DRAWING_TITLE, OpenedTile};
+use crate::studio::panel::{act_button_named, empty};
 use crate::studio::picture::ThumbnailCache;
 use crate::studio::theme;
 use egui::{ComboBox, Rect, RichText, ScrollArea, Sense, Stroke, StrokeKind, TextEdit, Ui, pos2, vec2};
+use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Side of a sphere in points.
 const SIDE: f32 = 76.0;
@@ -19,6 +23,8 @@ pub struct MaterialsMemory {
     filter: String,
     kind: Option<Category>,
     pub(super) thumbnails: ThumbnailCache,
+    /// Thumbnails of opened tables that are in the cache, by their paths.
+    opened: HashMap<String, Arc<RgbImage>>,
     filled: bool,
     pub(super) without_pictures: bool,
 }
@@ -73,22 +79,37 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut MaterialsMemory) {
             }
         });
         list.response.accessible_name("Kind of material");
+        act_button_named(ui, model, Act::OpenMaterial, "Open…");
         ui.label(RichText::new(library.statement()).weak());
     });
     let wanted = memory.filter.trim().to_lowercase();
-    let chosen = model.materials.choice.as_ref().and_then(|choice| match choice.parts.as_slice() {
-        [one] => Some(one.name.clone()),
-        _ => None,
-    });
-    let mut clicked = None;
+    let choice = model.materials.choice.clone();
+    let chosen = choice.as_ref().and_then(Choice::material_of_library);
+    let (mut clicked, mut clicked_opened) = (None, None);
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing = vec2(8.0, 8.0);
+            for OpenedTile { material, thumbnail } in &model.materials.opened {
+                let name = material.name();
+                if memory.kind.is_some() || !name.to_lowercase().contains(&wanted) {
+                    continue;
+                }
+                let key = material.path.display().to_string();
+                // A file may be opened again with other contents.
+                if memory.opened.get(&key).is_none_or(|known| !Arc::ptr_eq(known, thumbnail)) {
+                    memory.opened.insert(key.clone(), Arc::clone(thumbnail));
+                    memory.thumbnails.insert(&key, (**thumbnail).clone());
+                }
+                let is_chosen = matches!(&choice, Some(Choice::Opened(own)) if Arc::ptr_eq(own, material));
+                if tile(ui, memory, (&key, name), None, is_chosen) {
+                    clicked_opened = Some(Arc::clone(material));
+                }
+            }
             for place in &library.map.places {
                 let is_kind = memory.kind.is_none_or(|kind| kind == place.category);
                 if is_kind && place.name.to_lowercase().contains(&wanted) {
-                    let is_chosen = chosen.as_ref() == Some(&place.name);
-                    if tile(ui, memory, &place.name, place.category, is_chosen) {
+                    let is_chosen = chosen == Some(place.name.as_str());
+                    if tile(ui, memory, (&place.name, &place.name), Some(place.category), is_chosen) {
                         clicked = Some(place.at);
                     }
                 }
@@ -99,9 +120,20 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut MaterialsMemory) {
         model.choose_material(at);
         model.activate = Some(Panel::Material);
     }
+    if let Some(material) = clicked_opened {
+        model.choose_opened(material);
+    }
 }
 
-fn tile(ui: &mut Ui, memory: &mut MaterialsMemory, name: &str, kind: Category, is_chosen: bool) -> bool {
+/// A sphere with its name, and with the colour of its kind where it is of the library; whether it was clicked. `key` is
+/// that of its thumbnail.
+fn tile(
+    ui: &mut Ui,
+    memory: &mut MaterialsMemory,
+    (key, name): (&str, &str),
+    kind: Option<Category>,
+    is_chosen: bool,
+) -> bool {
     let mut clicked = false;
     ui.allocate_ui(vec2(SIDE + 16.0, SIDE + 20.0), |ui| {
         ui.vertical(|ui| {
@@ -109,11 +141,13 @@ fn tile(ui: &mut Ui, memory: &mut MaterialsMemory, name: &str, kind: Category, i
             response.widget_info(|| egui::WidgetInfo::selected(egui::Role::RadioButton, true, is_chosen, name));
             if ui.is_rect_visible(rect) {
                 let place = Rect::from_center_size(rect.center(), vec2(SIDE, SIDE));
-                if let Some(texture) = memory.thumbnails.texture(ui.ctx(), name, &DisplaySettings::default()) {
+                if let Some(texture) = memory.thumbnails.texture(ui.ctx(), key, &DisplaySettings::default()) {
                     let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
                     ui.painter().image(texture.id(), place, whole, egui::Color32::WHITE);
                 }
-                ui.painter().circle_filled(rect.right_top() + vec2(-6.0, 6.0), 4.0, theme::kind_colour(kind));
+                if let Some(kind) = kind {
+                    ui.painter().circle_filled(rect.right_top() + vec2(-6.0, 6.0), 4.0, theme::kind_colour(kind));
+                }
                 let colours = theme::palette(ui.visuals());
                 let stroke = match (is_chosen, response.hovered()) {
                     (true, _) => Stroke::new(3.0, colours.accent),
@@ -122,7 +156,7 @@ fn tile(ui: &mut Ui, memory: &mut MaterialsMemory, name: &str, kind: Category, i
                 };
                 ui.painter().rect_stroke(rect, 3.0, stroke, StrokeKind::Outside);
             }
-            clicked = response.on_hover_text(format!("{name}\n{}", kind.label())).clicked();
+            clicked = response.on_hover_text(format!("{name}\n{}", kind.map_or(key, |kind| kind.label()))).clicked();
             ui.add(egui::Label::new(RichText::new(name).small()).truncate());
         });
     });

@@ -221,7 +221,7 @@ fn settings(ui: &mut Ui, model: &mut Model) {
         let rows = form.light_rows.unwrap_or(usual.light_height);
         let list =
             ComboBox::from_id_salt("light rows").selected_text(rows.to_string()).width(130.0).show_ui(ui, |ui| {
-                for rows in [16, 32, 64, 128] {
+                for rows in [16, 32, 64, 128, 180] {
                     let text = format!("{} x {rows}", 2 * rows);
                     ui.selectable_value(&mut form.light_rows, Some(rows), text);
                 }
