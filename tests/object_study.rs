@@ -119,7 +119,7 @@ fn is_measured(key: &str, column: usize) -> bool {
     match key.split(',').next() {
         Some("fig3") => !(2..=4).contains(&column),
         Some("fig4") => matches!(column, 2..=6 | 10),
-        Some("fig5") => column != 9,
+        Some("fig5" | "schedules") => column != 9,
         _ => false,
     }
 }
@@ -128,7 +128,7 @@ fn is_measured(key: &str, column: usize) -> bool {
 #[ignore = "slow: cargo test -- --ignored"]
 fn every_case_is_measured_and_a_second_sitting_adds_nothing() {
     let folder = inputs();
-    let options = options(folder.path(), "study", 1, &[Part::Fig3, Part::Fig4, Part::Fig5]);
+    let options = options(folder.path(), "study", 1, &[Part::Fig3, Part::Fig4, Part::Fig5, Part::Schedules]);
     let text = run_whole(&options);
     let found = rows(&options.output);
     let keys: Vec<&str> = found.iter().map(|(key, _)| key.as_str()).collect();
@@ -143,6 +143,10 @@ fn every_case_is_measured_and_a_second_sitting_adds_nothing() {
             "fig5,made-up-red,meadow,cook-torrance + deep (clean)",
             "fig5,made-up-red,meadow,cook-torrance + deep (noise)",
             "fig5,made-up-red,meadow,cook-torrance + deep (8bit)",
+            "schedules,made-up-red,meadow,cook-torrance + deep + own schedule (clean)",
+            "schedules,made-up-red,meadow,cook-torrance + deep + epsilon share 0.0001 (clean)",
+            "schedules,made-up-red,meadow,cook-torrance + deep + epsilon share 0.01 (clean)",
+            "schedules,made-up-red,meadow,cook-torrance + deep + released schedule (clean)",
         ]
     );
     for (key, values) in &found {
@@ -174,7 +178,7 @@ fn every_case_is_measured_and_a_second_sitting_adds_nothing() {
         .args(["study", "ibrdf"])
         .args([&options.library, &options.envmaps])
         .args(["--quick", "--models", "cook-torrance", "--materials", "1", "--lights", "1"])
-        .args(["--parts", "fig3,fig4,fig5", "-o"])
+        .args(["--parts", "fig3,fig4,fig5,schedules", "-o"])
         .arg(&options.output)
         .output()
         .unwrap();

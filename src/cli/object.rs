@@ -216,7 +216,7 @@ pub struct StudyIbrdfOptions {
     /// Lights of each figure at most, in place of one or two with --quick and the paper's number without.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     pub lights: Option<u16>,
-    /// Only these parts.
+    /// Only these parts; without it, all but `schedules`.
     #[arg(long, value_enum, value_delimiter = ',')]
     pub parts: Vec<study::Part>,
     /// Minutes after which figure 2 begins no further fit of DSBRDF; none are begun with --quick, and all without.

@@ -108,7 +108,7 @@ pub fn run(
     options: &StudyOptions,
     stop: &AtomicBool,
 ) -> Result<(CaseResult, Option<CasePictures>)> {
-    let settings = ObjectSettings { prior: case.prior, shadows: case.shadows, ..inputs.settings.clone() };
+    let settings = ObjectSettings { prior: case.prior, shadows: case.shadows, ..case.way.settings(&inputs.settings) };
     let geometry = inputs.geometry(case);
     let fit = inputs.fits.find(&case.material)?;
     let light = inputs.light(&case.light)?;

@@ -38,6 +38,8 @@ pub enum Part {
     Fig5,
     /// An object that shadows itself.
     Shadows,
+    /// The schedule released with the paper, and other epsilons, beside the program's own.
+    Schedules,
 }
 
 /// What is studied.
@@ -62,7 +64,7 @@ pub struct StudyOptions {
     pub materials: Option<usize>,
     /// Lights of each figure, at most; likewise.
     pub lights: Option<usize>,
-    /// Only these parts; all when empty.
+    /// Only these parts; all but the schedules when empty.
     pub parts: Vec<Part>,
     /// Minutes after which figure 2 begins no further fit of DSBRDF, which takes a hundred times as long as the others.
     pub dsbrdf_minutes: f64,
@@ -75,7 +77,8 @@ pub struct StudyOptions {
 impl StudyOptions {
     /// Whether a part was asked for.
     pub fn wants(&self, part: Part) -> bool {
-        self.parts.is_empty() || self.parts.contains(&part)
+        // Schedules are no figure of the paper, and the released one is slow: only who asks for them gets them.
+        self.parts.contains(&part) || self.parts.is_empty() && part != Part::Schedules
     }
 
     /// The neural model of the study.

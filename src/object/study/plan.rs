@@ -3,6 +3,7 @@
 use super::inputs::Inputs;
 use super::{Part, StudyOptions};
 use crate::object::prior::LightPriorKind;
+use crate::object::settings::ObjectSettings;
 use crate::object::starts::ModelKind;
 
 /// A figure of the paper.
@@ -16,15 +17,22 @@ pub enum Figure {
     Both,
     /// An object that shadows itself: both light and, with known light, nothing else.
     Shadows,
+    /// Both, by other schedules and with other epsilons.
+    Schedules,
 }
 
 impl Figure {
     /// All, with their keys and titles.
-    pub const NAMED: [(Figure, &str, &str); 4] = [
+    pub const NAMED: [(Figure, &str, &str); 5] = [
         (Figure::Reflectance, "fig3", "Figure 3: reflectance from one photo under a known light"),
         (Figure::Light, "fig4", "Figure 4: light from one photo with known reflectance"),
         (Figure::Both, "fig5", "Figure 5: light and reflectance from one photo"),
         (Figure::Shadows, "shadows", "An object that shadows itself: shadows traced or left out"),
+        (
+            Figure::Schedules,
+            "schedules",
+            "Light and reflectance by the schedule released with the paper, and with other epsilons",
+        ),
     ];
 
     /// The part of the study it belongs to.
@@ -34,12 +42,53 @@ impl Figure {
             Figure::Light => Part::Fig4,
             Figure::Both => Part::Fig5,
             Figure::Shadows => Part::Shadows,
+            Figure::Schedules => Part::Schedules,
         }
     }
 
     /// The key in `results.csv`.
     pub fn key(self) -> &'static str {
         Self::NAMED.iter().find(|(figure, _, _)| *figure == self).map_or("", |(_, key, _)| key)
+    }
+}
+
+/// How an estimation goes about it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Way {
+    /// As the program does.
+    Own,
+    /// The schedule that was released with the paper, on a light, pixels and a net of the same sizes.
+    Released,
+    /// The program's own with another [`ObjectSettings::epsilon_share`].
+    Epsilon(f64),
+}
+
+impl Way {
+    /// All that are compared.
+    const COMPARED: [Way; 4] = [Way::Own, Way::Epsilon(1e-4), Way::Epsilon(1e-2), Way::Released];
+
+    /// `own` changed to this way.
+    pub fn settings(self, own: &ObjectSettings) -> ObjectSettings {
+        match self {
+            Way::Own => own.clone(),
+            Way::Epsilon(epsilon_share) => ObjectSettings { epsilon_share, ..own.clone() },
+            Way::Released => ObjectSettings {
+                light_height: own.light_height,
+                pixels: own.pixels,
+                nodes: own.nodes,
+                net_channels: own.net_channels,
+                seed: own.seed,
+                ..ObjectSettings::released()
+            },
+        }
+    }
+
+    fn words(self) -> String {
+        match self {
+            Way::Own => "own schedule".into(),
+            Way::Released => "released schedule".into(),
+            Way::Epsilon(share) => format!("epsilon share {share}"),
+        }
     }
 }
 
@@ -81,6 +130,8 @@ pub struct Case {
     pub spoilt: Spoilt,
     /// Whether shadows are traced.
     pub shadows: bool,
+    /// How it is done.
+    pub way: Way,
     /// Whether the weights of the neural model were trained on the material. Said of rivals too, so that rows of a
     /// table speak of the same materials.
     pub seen: bool,
@@ -113,8 +164,9 @@ impl Case {
             (Figure::Shadows, false) => " without shadows",
             _ => "",
         };
+        let way = if self.figure == Figure::Schedules { format!(" + {}", self.way.words()) } else { String::new() };
         let seen = if self.seen && self.model.is_some() { " of seen materials" } else { "" };
-        format!("{model}{prior}{shadows} ({}){seen}", self.spoilt.key())
+        format!("{model}{prior}{shadows}{way} ({}){seen}", self.spoilt.key())
     }
 
     /// What is photographed.
@@ -175,6 +227,7 @@ pub fn plan(inputs: &Inputs, options: &StudyOptions) -> Vec<Case> {
         prior: LightPriorKind::Deep,
         spoilt: Spoilt::Clean,
         shadows: false,
+        way: Way::Own,
         seen: false,
     };
     let mut cases = Vec::new();
@@ -218,6 +271,14 @@ pub fn plan(inputs: &Inputs, options: &StudyOptions) -> Vec<Case> {
                     let (material, light, figure) = (material.clone(), light.clone(), Figure::Shadows);
                     cases.push(Case { figure, material, light, shadows, ..base.clone() });
                 }
+            }
+        }
+    }
+    for material in take(&some, materials(2, 4)) {
+        for light in take(&lights, lit(1, 3)) {
+            for (&model, way) in options.models.iter().flat_map(|model| Way::COMPARED.map(|way| (model, way))) {
+                let (material, light, figure) = (material.clone(), light.clone(), Figure::Schedules);
+                cases.push(Case { figure, material, light, way, model: Some(model), ..base.clone() });
             }
         }
     }
