@@ -3,11 +3,12 @@
 use super::arguments::{DemoOptions, FitOptions, ResumeOptions};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::export::RunFolder;
-use crate::fit::FitSettings;
+use crate::fit::{FitSettings, Method};
 use crate::insight::report::data::ReportData;
 use crate::job::open::{self, OpenStage, Tell};
 use crate::job::prepare::RunSettings;
 use crate::job::{self, Event, JobHandle, demo};
+use crate::scene::Scene;
 use crate::scene::demo::DemoSettings;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
@@ -27,6 +28,10 @@ pub fn demo(options: &DemoOptions, json: bool) -> Result<()> {
             Error::new(ErrorKind::Malformed, format!("not a settings file: {}", source.message()))
                 .at(Place::File(path.clone()))
         })?;
+        let chosen: Vec<String> = changes.keys().cloned().collect();
+        if Method::means_adam(&chosen) {
+            settings.fit.method = Method::Paper;
+        }
         let mut table = toml::Table::try_from(&settings.fit).unwrap_or_default();
         table.extend(changes);
         settings.fit = FitSettings::from_toml(&table.to_string())?;
@@ -43,7 +48,7 @@ pub fn demo(options: &DemoOptions, json: bool) -> Result<()> {
 
 /// Fits a scene.
 pub fn fit(options: &FitOptions, json: bool) -> Result<()> {
-    let settings = run_settings(options)?;
+    let mut settings = run_settings(options)?;
     settings.fit.validate()?;
     let folder = RunFolder::create(&options.output)?;
     if !json {
@@ -53,8 +58,12 @@ pub fn fit(options: &FitOptions, json: bool) -> Result<()> {
     stop_on_interrupt(Arc::clone(&stop));
     let (prepared, fitter, settings) = with_bar(json, |tell| {
         let opened = open::open_scene(&settings.scene, &settings.read, &stop, tell)?;
+        settings.fit.method = method_for(options, &opened.scene, settings.fit.method);
         open::start_new(opened, settings, &stop, tell)
     })?;
+    if !json && settings.fit.method == Method::Solver && !names_method(options) {
+        eprintln!("the method is the solver, since all photos hold linear radiance; --method paper takes Adam");
+    }
     let job = job::start(prepared, fitter, settings, folder.clone())?;
     watch(job, &folder, &stop, json)
 }
@@ -84,6 +93,19 @@ pub fn run_settings(options: &FitOptions) -> Result<RunSettings> {
         settings.atlas.keep_uv = uv;
     }
     Ok(settings)
+}
+
+/// The method that options ask for, which is that of `settings`, or, where they name none, the one for the scene.
+pub fn method_for(options: &FitOptions, scene: &Scene, of_settings: Method) -> Method {
+    match names_method(options) {
+        true => of_settings,
+        false => Method::suited_to_settings(scene, &options.fit.typed),
+    }
+}
+
+/// Whether options name a method: by itself, or in a settings file, which says all that differs from the defaults.
+fn names_method(options: &FitOptions) -> bool {
+    options.settings.is_some() || options.fit.typed.iter().any(|name| name == "method")
 }
 
 fn absolute(path: &Path) -> PathBuf {

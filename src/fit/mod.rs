@@ -7,7 +7,7 @@
 //! up, `weigh` applies consistency, `advance` moves the numbers, `held_out` judges them. [`state`] is all they change.
 //! `change` takes other settings between two steps, [`views`] leaves photos out, [`figures`] are for who watches.
 //! [`describe`] lists, reads and sets each setting by name, [`presets`] are whole sets of them.
-//! [`solver`] is the other method, `solver_step` does its steps.
+//! [`solver`] is the other method, `solver_step` does its steps, `method` says which of both suits a scene.
 //! [`start`] chooses where to begin, [`gauge`] names the freedom that photographs leave, [`checkpoint`] saves it all.
 //!
 //! A fit knows nothing of threads that watch it, of files it came from or of windows: that is `job`.
@@ -27,6 +27,7 @@ mod gradient;
 mod held_out;
 pub mod light_prior;
 pub mod loss;
+mod method;
 pub mod presets;
 pub mod schedule;
 pub mod settings;

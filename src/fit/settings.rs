@@ -1,21 +1,10 @@
 //! Every choice of a fit, once: the command line, the settings file and the window read this structure.
 
+pub use super::method::Method;
 use super::solver::settings::Choosing;
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::render::first_hits::PixelFilter;
 use serde::{Deserialize, Serialize};
-
-/// How maps and light are found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "lowercase")]
-pub enum Method {
-    /// As in the paper: many small steps of Adam along gradients of the path tracer.
-    #[default]
-    Paper,
-    /// A few large steps without noise: rays are traced once, then texels are solved in closed form and the light by
-    /// Gauss-Newton with the texels eliminated. Settings of Adam's steps do not matter to it.
-    Solver,
-}
 
 /// How gradients of different views are weighed against each other (multi-view gradient consistency, Joy and Poullis
 /// 2023, eq. 2 and 3).
@@ -74,7 +63,8 @@ pub struct FitSettings {
     /// Seed of all random numbers.
     #[arg(long, default_value_t = FitSettings::default().seed)]
     pub seed: u64,
-    /// How maps and light are found.
+    /// How maps and light are found. When it is not named, a scene all of whose photos hold linear radiance is given to the
+    /// solver.
     #[arg(long, value_enum, default_value_t)]
     pub method: Method,
     /// Width and height of the maps in texels: a power of two, 16 to 8192.

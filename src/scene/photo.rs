@@ -69,6 +69,11 @@ impl Photo {
         }
     }
 
+    /// Whether it was stored as linear radiance.
+    pub fn is_linear(&self) -> bool {
+        !matches!(self, Photo::Srgb8(_))
+    }
+
     /// Linear radiance of a pixel.
     pub fn radiance(&self, row: usize, column: usize) -> Vec3 {
         match self {

@@ -2,8 +2,10 @@
 
 use clap::Parser;
 use patina::cli::arguments::{Arguments, Task};
-use patina::cli::fit::run_settings;
-use patina::fit::{FitSettings, Preset};
+use patina::cli::fit::{method_for, run_settings};
+use patina::fit::{FitSettings, Method, Preset};
+use patina::image::Image;
+use patina::scene::{Photo, Scene};
 
 #[test]
 fn what_is_typed_wins_over_a_preset_and_over_a_file() {
@@ -29,4 +31,28 @@ fn what_is_typed_wins_over_a_preset_and_over_a_file() {
     assert_eq!((settings.read.shrink, settings.read.max_views), (2, 9));
     let both = ["patina", "fit", "s", "-o", "r", "--settings", file, "--preset", "quick"];
     assert!(Arguments::try_parse_from(both).is_err());
+}
+
+#[test]
+fn linear_photos_are_given_to_the_solver_unless_something_else_was_asked_for() {
+    let linear = crate::support::scene().0;
+    let mut bytes = Scene::clone(&linear);
+    let size = (bytes.views[0].photo.width(), bytes.views[0].photo.height());
+    bytes.views[0].photo = Photo::Srgb8(Image::filled(size.0, size.1, [90; 3]));
+    let of = |scene: &Scene, more: &[&str]| {
+        let words = ["patina", "fit", "scene", "-o", "run"].iter().chain(more);
+        let Some(Task::Fit(options)) = Arguments::try_parse_from(words).unwrap().task else { unreachable!() };
+        method_for(&options, scene, run_settings(&options).unwrap().fit.method)
+    };
+    assert_eq!(of(&linear, &[]), Method::Solver);
+    assert_eq!(of(&linear, &["--map-size", "64", "--preset", "careful"]), Method::Solver);
+    assert_eq!(of(&linear, &["--method", "paper"]), Method::Paper);
+    assert_eq!(of(&linear, &["--consistency", "exact"]), Method::Paper, "the solver knows no consistency");
+    assert_eq!(of(&bytes, &[]), Method::Paper);
+    assert_eq!(of(&bytes, &["--method", "solver"]), Method::Solver);
+
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("settings.toml");
+    patina::files::write_bytes(&file, b"[fit]\nseed = 2\n").unwrap();
+    assert_eq!(of(&linear, &["--settings", file.to_str().unwrap()]), Method::Paper, "the file is of Adam");
 }

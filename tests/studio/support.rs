@@ -3,6 +3,7 @@
 use eframe::App;
 use egui_kittest::{Harness, HarnessBuilder};
 use patina::export::exchange::{self, ExchangeOptions};
+use patina::fit::Method;
 use patina::scene::demo::DemoSettings;
 use patina::studio::act::Act;
 use patina::studio::layout::Panel;
@@ -129,6 +130,8 @@ impl TestStudio {
         self.wait("the atlas", |model| model.project.as_ref().is_some_and(|own| own.surface.is_some()));
         let model = self.model();
         let fit = &mut model.edits.fit;
+        // Many short steps, to be held and stopped between.
+        fit.method = Method::Paper;
         (fit.map_size, fit.levels, fit.steps_diffuse, fit.steps_all) = (64, 2, 6, 6);
         (fit.samples, fit.pixels_per_step, fit.views_per_step, fit.environment_height) = (2, 0, 2, 8);
         let edits = model.edits.clone();

@@ -1,6 +1,8 @@
 //! The first page: opening, recents, and what cannot be opened.
 
 use super::support::{Key, Modifiers, TestStudio, finished_run, small_scene};
+use patina::fit::{FitSettings, Method, Preset};
+use patina::studio::act::Act;
 use patina::studio::model::FitStatus;
 
 #[test]
@@ -58,6 +60,20 @@ fn a_recent_folder_that_is_gone_is_grey_and_can_be_forgotten() {
     assert!(studio.is_grey("scene-of-old"));
     studio.click("Forget");
     assert!(studio.controls("scene-of-old").is_empty() && studio.says("Nothing yet"));
+}
+
+#[test]
+fn a_scene_of_linear_photos_is_given_to_the_solver_and_presets_leave_it_there() {
+    let mut studio = TestStudio::opening(Some(small_scene().into()));
+    studio.wait("the scene", |model| model.project.is_some());
+    assert_eq!(studio.model().edits.fit.method, Method::Solver);
+    assert!(studio.log().contains("the method is the solver"), "{}", studio.log());
+    studio.act(Act::PanelFit);
+    studio.click("Careful");
+    assert_eq!(
+        studio.model().edits.fit,
+        FitSettings { method: Method::Solver, ..FitSettings::preset(Preset::Careful) }
+    );
 }
 
 #[test]

@@ -7,6 +7,7 @@ use super::project::Atlas;
 use super::{Cursor, Done, Edits, Model, Project, StageSwitches, Workspace};
 use crate::error::{Finding, Severity};
 use crate::export::RunFolder;
+use crate::fit::Method;
 use crate::image::RgbImage;
 use crate::insight::report::data::StageTime;
 use crate::job::demo;
@@ -75,7 +76,7 @@ impl Model {
         self.close();
         self.log.dismiss();
         let path = std::path::absolute(&path).unwrap_or(path);
-        let settings = RunSettings { scene: path.clone(), read, ..RunSettings::default() };
+        let mut settings = RunSettings { scene: path.clone(), read, ..RunSettings::default() };
         self.tasks.spawn(TITLE, move |context| {
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
             context.tell("looking at the folder", 0.0);
@@ -88,6 +89,7 @@ impl Model {
                 }
                 PathKind::Scene => {
                     let opened = open::open_scene(&path, &settings.read, &context.stop, &tell)?;
+                    settings.fit.method = Method::suited_to(&opened.scene);
                     context.tell("small pictures", 0.0);
                     Ok(Done::SceneRead(Box::new(SceneRead::new(Some(path), settings, opened))))
                 }
@@ -148,6 +150,9 @@ impl Model {
         }
         let views = read.scene.views.len();
         self.edits.fit = read.settings.fit.clone();
+        if self.edits.fit.method == Method::Solver {
+            self.log.note("The photos hold linear radiance: the method is the solver");
+        }
         self.eye = OrbitEye::around(bounds(&read.mesh));
         if let Some(truth) = &read.scene.truth {
             let light = Arc::new(truth.environment.clone());
