@@ -144,6 +144,7 @@ fn every_case_is_measured_and_a_second_sitting_adds_nothing() {
             "fig5,made-up-red,meadow,cook-torrance + deep (noise)",
             "fig5,made-up-red,meadow,cook-torrance + deep (8bit)",
             "schedules,made-up-red,meadow,cook-torrance + deep + own schedule (clean)",
+            "schedules,made-up-red,meadow,cook-torrance + deep + three times the rounds (clean)",
             "schedules,made-up-red,meadow,cook-torrance + deep + epsilon share 0.0001 (clean)",
             "schedules,made-up-red,meadow,cook-torrance + deep + epsilon share 0.01 (clean)",
             "schedules,made-up-red,meadow,cook-torrance + deep + released schedule (clean)",

@@ -59,18 +59,21 @@ pub enum Way {
     Own,
     /// The schedule that was released with the paper, on a light, pixels and a net of the same sizes.
     Released,
+    /// The program's own with three times the rounds.
+    Longer,
     /// The program's own with another [`ObjectSettings::epsilon_share`].
     Epsilon(f64),
 }
 
 impl Way {
     /// All that are compared.
-    const COMPARED: [Way; 4] = [Way::Own, Way::Epsilon(1e-4), Way::Epsilon(1e-2), Way::Released];
+    const COMPARED: [Way; 5] = [Way::Own, Way::Longer, Way::Epsilon(1e-4), Way::Epsilon(1e-2), Way::Released];
 
     /// `own` changed to this way.
     pub fn settings(self, own: &ObjectSettings) -> ObjectSettings {
         match self {
             Way::Own => own.clone(),
+            Way::Longer => ObjectSettings { outer_loops: 3 * own.outer_loops, ..own.clone() },
             Way::Epsilon(epsilon_share) => ObjectSettings { epsilon_share, ..own.clone() },
             Way::Released => ObjectSettings {
                 light_height: own.light_height,
@@ -86,6 +89,7 @@ impl Way {
     fn words(self) -> String {
         match self {
             Way::Own => "own schedule".into(),
+            Way::Longer => "three times the rounds".into(),
             Way::Released => "released schedule".into(),
             Way::Epsilon(share) => format!("epsilon share {share}"),
         }
