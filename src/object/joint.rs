@@ -136,7 +136,7 @@ pub fn estimate(
 
     watch(ObjectEvent::Stage("estimating"));
     let rounds = if known.reflectance.is_some() { settings.outer_loops.div_ceil(2) } else { settings.outer_loops };
-    let mut holder = LightHolder::new(settings, &light)?;
+    let mut holder = LightHolder::new(settings, known, &light)?;
     // While the light is held the objective is one from round to round, and what was learned of it stays true.
     let mut memory = StepMemory::default();
     for round in 1..=rounds {
@@ -189,11 +189,11 @@ pub(super) struct LightHolder {
 }
 
 impl LightHolder {
-    /// The priors that the settings ask for, for a light like `light`.
+    /// The priors that the settings ask for, for a light like `light`, beside what is known.
     ///
     /// # Errors
     /// A size for which there is no net.
-    pub fn new(settings: &ObjectSettings, light: &LogLight) -> Result<Self> {
+    pub fn new(settings: &ObjectSettings, known: &Known, light: &LogLight) -> Result<Self> {
         let (width, height) = (light.width, light.height);
         let gradient =
             |weight: f64| Some(GradientPrior::new(width, height, weight, EDGE_WIDTH)).filter(|_| weight > 0.0);
@@ -210,7 +210,11 @@ impl LightHolder {
                 let mut prior = DeepPrior::new(width, height, settings.net_channels, settings.seed)?;
                 prior.offset = light.mean().map(|mean| mean as f32);
                 let (steps, rate) = (settings.net_steps, settings.net_rate);
-                let (weight, carry) = (settings.net_weight, settings.net_carry);
+                let weight = match known.reflectance.is_some() {
+                    true => settings.net_weight,
+                    false => settings.net_weight_of_both,
+                };
+                let carry = settings.net_carry;
                 deep = Some(DeepTie::new(prior, width * height, weight, steps, rate, carry));
             }
         }

@@ -47,8 +47,11 @@ pub struct ObjectSettings {
     pub net_channels: usize,
     /// Rate of Adam on the net.
     pub net_rate: f32,
-    /// Pull between light and net: weight of their mean squared difference.
+    /// Pull between light and net where reflectance is known: weight of their mean squared difference.
     pub net_weight: f64,
+    /// The same where reflectance is estimated as well. What a model of it cannot follow is left to the light, which takes
+    /// it up the more the looser it is held; held too fast, it cannot follow the net, which takes few steps a round.
+    pub net_weight_of_both: f64,
     /// Share of the difference between light and net that is carried from step to step: 1 is ADMM, 0 a plain pull. In
     /// the few steps there are the plain pull found the better light and lowers one objective; ADMM chases what moves.
     pub net_carry: f32,
@@ -87,6 +90,7 @@ impl Default for ObjectSettings {
             net_channels: 32,
             net_rate: 0.01,
             net_weight: 0.05,
+            net_weight_of_both: 0.5,
             net_carry: 0.0,
             gradient_weight: 0.01,
             entropy_weight: 0.01,
@@ -162,6 +166,7 @@ impl ObjectSettings {
         }
         let weights = [
             ("net-weight", self.net_weight),
+            ("net-weight-of-both", self.net_weight_of_both),
             ("gradient-weight", self.gradient_weight),
             ("entropy-weight", self.entropy_weight),
             ("code-weight", self.code_weight),
