@@ -161,7 +161,7 @@ mod tests {
             assert!((own.albedo[channel] / library.albedo[channel] - 1.0).abs() < 0.05, "{own:?} {library:?}");
         }
         assert_eq!(opened.thumbnail(9).width(), 9);
-        std::fs::write(&path, b"cut").unwrap();
+        crate::files::write_bytes(&path, b"cut").unwrap();
         assert_eq!(OpenedMaterial::read(&path).unwrap_err().kind(), ErrorKind::Malformed);
         assert_eq!(OpenedMaterial::read(&folder.path().join("x.png")).unwrap_err().kind(), ErrorKind::Unsupported);
     }

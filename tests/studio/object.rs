@@ -330,7 +330,7 @@ fn a_measured_table_is_opened_and_shown_before_the_library() {
     studio.wait("the table once more", |model| !model.tasks.is_busy());
     assert_eq!(studio.model().materials.opened.len(), 1);
     let damaged = studio.folder.path().join("cut.binary");
-    std::fs::write(&damaged, b"cut").unwrap();
+    patina::files::write_bytes(&damaged, b"cut").unwrap();
     studio.model().dropped(damaged);
     studio.wait("the refusal", |model| !model.tasks.is_busy());
     assert!(studio.log().contains("cut.binary"), "{}", studio.log());
