@@ -69,6 +69,8 @@ fn a_scene_of_linear_photos_is_given_to_the_solver_and_presets_leave_it_there() 
     assert_eq!(studio.model().edits.fit.method, Method::Solver);
     assert!(studio.log().contains("the method is the solver"), "{}", studio.log());
     studio.act(Act::PanelFit);
+    studio.control("Method");
+    assert!(studio.controls("Consistency").is_empty(), "the solver knows none");
     studio.click("Careful");
     assert_eq!(
         studio.model().edits.fit,

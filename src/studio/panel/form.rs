@@ -1,7 +1,7 @@
 //! A form made of the one settings structure: names, helps and choices are those of the command line.
 
-use crate::fit::FitSettings;
 use crate::fit::describe::{SettingDescription, ValueKind};
+use crate::fit::{FitSettings, Method};
 use crate::studio::theme;
 use egui::{Checkbox, ComboBox, DragValue, Grid, RichText, Ui};
 use std::collections::HashMap;
@@ -18,9 +18,12 @@ pub struct FormMemory {
     pub all: bool,
 }
 
-/// Settings that most people change; the others stand below a heading.
-const FIRST: [&str; 8] =
-    ["map-size", "steps-diffuse", "steps-all", "bounces", "samples", "consistency", "background", "exposure"];
+/// Settings that most people change, whatever the method; the others stand below a heading.
+const FIRST: [&str; 5] = ["method", "map-size", "bounces", "background", "exposure"];
+/// The same of Adam alone,
+const FIRST_OF_ADAM: [&str; 4] = ["steps-diffuse", "steps-all", "samples", "consistency"];
+/// and of the solver.
+const FIRST_OF_SOLVER: [&str; 2] = ["solver-rounds", "solver-polish"];
 
 /// Draws the form. `live` while a fit runs: what cannot change then is grey.
 pub fn show(ui: &mut Ui, settings: &mut FitSettings, live: bool, memory: &mut FormMemory) {
@@ -32,7 +35,11 @@ pub fn show(ui: &mut Ui, settings: &mut FitSettings, live: bool, memory: &mut Fo
         memory.filter.clear();
     }
     let described = std::mem::take(&mut memory.described);
-    let is_first = |setting: &SettingDescription| FIRST.contains(&setting.name.as_str());
+    let of_method: &[&str] = match settings.method {
+        Method::Solver => &FIRST_OF_SOLVER,
+        Method::Paper => &FIRST_OF_ADAM,
+    };
+    let is_first = |setting: &SettingDescription| FIRST.iter().chain(of_method).any(|name| *name == setting.name);
     grid(ui, "first settings", described.iter().filter(|setting| is_first(setting)), settings, live, memory);
     ui.add_space(4.0);
     ui.checkbox(&mut memory.all, "All settings");
