@@ -382,8 +382,8 @@ fn the_small_ones_are_drawn_and_named() {
     let histogram = Histogram::of(&image);
     let display = DisplaySettings { exposure_stops: auto_exposure(&image), ..Default::default() };
     let mut thumbnails = ThumbnailCache::default();
-    thumbnails.insert("first", area::thumbnail(&image, 64));
-    thumbnails.insert("empty", RgbImage::default());
+    thumbnails.keep("first", &Arc::new(area::thumbnail(&image, 64)));
+    thumbnails.keep("empty", &Arc::new(RgbImage::default()));
     let mut harness = Harness::builder().with_size(vec2(420.0, 300.0)).wgpu().build_ui(move |ui| {
         egui::CentralPanel::default().show(ui, |ui| {
             picture::histogram::show(ui, "Luminance", &histogram, &display, vec2(300.0, 80.0));

@@ -3,7 +3,7 @@
 use super::settings::{BackgroundEvidence, FitSettings};
 use super::targets::is_radiance;
 use crate::error::{Error, ErrorKind, Place, Result};
-use crate::scene::{Background, Photo, PixelState, Scene};
+use crate::scene::{Background, PixelState, Scene};
 
 /// How far the rows of a camera's rotation may be from orthonormal.
 const ROTATION_TOLERANCE: f32 = 1e-3;
@@ -42,7 +42,7 @@ pub fn defects_of_photos(scene: &Scene) -> Vec<(String, u64)> {
     let mut defects = Vec::new();
     for view in &scene.views {
         // Eight bits always hold a radiance.
-        if matches!(view.photo, Photo::Srgb8(_)) {
+        if !view.photo.is_linear() {
             continue;
         }
         let (mut count, mut first) = (0, (0, 0));

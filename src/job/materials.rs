@@ -109,14 +109,18 @@ impl OpenedMaterial {
     /// # Errors
     /// Those of [`source::read`]; `Unsupported` for other files.
     pub fn read(path: &Path) -> Result<Self> {
-        let is_table = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("binary"));
-        if !is_table && !path.is_dir() {
+        if !Self::is_table(path) && !path.is_dir() {
             return Err(Error::new(ErrorKind::Unsupported, "a measured material is a .binary file in MERL's layout")
                 .at(Place::File(path.into()))
                 .remedy("`patina measured show` and `project` take other sources; or open a result of object mode"));
         }
         let found = source::read(&path.to_string_lossy(), None, None)?;
         Ok(OpenedMaterial { path: path.into(), material: MeasuredMaterial::new(&found.name, found.table) })
+    }
+
+    /// Whether a path is that of a table, by its ending.
+    pub fn is_table(path: &Path) -> bool {
+        path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("binary"))
     }
 
     /// Its name: that of the file without its ending, or of the folder.

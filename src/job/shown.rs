@@ -115,7 +115,7 @@ pub(super) fn go_on(stop: &AtomicBool) -> Result<()> {
 /// Stops that bring photographs without an exposure of their own to a visible range: 0 for 8-bit photographs.
 pub fn exposure_of(scene: &Scene) -> f32 {
     let Some(view) = scene.views.first() else { return 0.0 };
-    if matches!(view.photo, crate::scene::Photo::Srgb8(_)) {
+    if !view.photo.is_linear() {
         return 0.0;
     }
     let mut luminances: Vec<f64> = Vec::new();

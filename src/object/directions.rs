@@ -5,6 +5,7 @@
 
 use super::geometry::ObjectPixel;
 use super::nodes::angles;
+use super::settings::MOST_ROWS;
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::math::sphere;
 use glam::Vec3;
@@ -139,7 +140,7 @@ impl TexelDirections {
             let message = format!("an environment of {width} x {height} texels cannot be fitted");
             return Err(Error::new(ErrorKind::InvalidSetting, message)
                 .at(Place::Setting("light-size".into()))
-                .remedy("ask for 16 to 180 rows, twice as many columns"));
+                .remedy(format!("ask for 8 to {MOST_ROWS} rows, twice as many columns")));
         }
         Ok(Self::of_any_size(width, height))
     }

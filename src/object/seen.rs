@@ -27,12 +27,11 @@ impl LightSeen {
     /// Of the pixels of a transport with a reflectance under a light. Pixels that are black in a channel do not count there.
     pub fn of(transport: &Transport, table: &NodeTable, light: &LogLight) -> Self {
         let texels = light.texels();
-        let shares = shares(light.width, light.height);
-        let mean: DVec3 =
-            texels.iter().zip(&shares).map(|(radiance, share)| radiance.as_dvec3() * f64::from(*share)).sum();
+        let mean = light.environment().mean_radiance().as_dvec3();
         let picture = transport.forward(table, &texels);
         let by_pixels: Vec<Vec3> = picture.into_iter().map(|pixel| answer(mean, pixel, transport.pixels())).collect();
         let sums = transport.adjoint_by_light(table, &by_pixels);
+        let shares = shares(light.width, light.height);
         let per_steradian = |(sum, share): (&DVec3, &f32)| (*sum / (4.0 * PI * f64::from(*share))).as_vec3();
         let sensitivity = sums.iter().zip(&shares).map(per_steradian).collect();
         Self::new(Image::from_pixels(light.width, light.height, sensitivity))

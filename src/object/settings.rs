@@ -146,7 +146,7 @@ impl ObjectSettings {
             Err(Error::new(ErrorKind::InvalidSetting, message).at(Place::Setting(name.into())))
         };
         if !(8..=MOST_ROWS).contains(&self.light_height) {
-            return wrong("light-height", "the light needs 8 to 180 rows");
+            return wrong("light-height", &format!("the light needs 8 to {MOST_ROWS} rows"));
         }
         if self.pixels == 0 {
             return wrong("pixels", "at least one pixel is needed");

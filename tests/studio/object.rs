@@ -173,7 +173,7 @@ fn a_result_that_cannot_be_written_is_kept_and_can_be_saved_elsewhere() {
         if round == 1 {
             // A file takes the place of the folder of runs.
             std::fs::remove_dir_all(&spoiled).unwrap();
-            std::fs::write(&spoiled, "a file").unwrap();
+            patina::files::write_bytes(&spoiled, b"a file").unwrap();
         }
     }));
     studio.act(Act::ObjectStart);
@@ -202,10 +202,10 @@ fn files_that_do_not_do_are_refused_with_a_remedy_and_good_ones_work_after() {
     };
     let (narrow, black) = (mask("narrow.exr", 30, 1.0), mask("black.exr", 40, 0.0));
     let (torn, nowhere, dark) = (folder.join("torn.exr"), folder.join("nowhere.exr"), folder.join("dark.exr"));
-    std::fs::write(&torn, "no picture").unwrap();
+    patina::files::write_bytes(&torn, b"no picture").unwrap();
     file::write_exr_rgb(&dark, &Image::filled(40, 40, Vec3::ZERO)).unwrap();
     let mesh = folder.join("ball.obj");
-    std::fs::write(&mesh, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    patina::files::write_bytes(&mesh, b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     let good = studio.model().edits.object.clone();
     let mut cases = Vec::new();
     for (photo, word) in [(torn, "torn.exr"), (nowhere, "nowhere.exr"), (dark, "neither black nor saturated")] {

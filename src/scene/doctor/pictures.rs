@@ -4,7 +4,7 @@ use super::probe::Probe;
 use super::{Report, names_of};
 use crate::error::{Finding, Severity};
 use crate::math::{luminance, statistics::quantile};
-use crate::scene::{Photo, PixelState, Scene, View};
+use crate::scene::{PixelState, Scene, View};
 
 /// A view with more clipped pixels than this loses highlights that tell roughness.
 const HIGH_CLIPPED_SHARE: f64 = 0.05;
@@ -97,7 +97,7 @@ fn luminances(view: &View, probes: &[Probe], on_mesh: bool) -> Vec<f64> {
 /// A photo exposed so that its brightest percent reaches full scale has its median near the middle of the scale when
 /// it is encoded, and near 0.18² when linear values were stored and are decoded once more.
 fn looks_linear(view: &View, luminances: &[f64]) -> bool {
-    matches!(view.photo, Photo::Srgb8(_))
+    !view.photo.is_linear()
         && luminances.len() > 100
         && quantile(luminances, 0.995) > 0.5
         && quantile(luminances, 0.5) < 0.02
@@ -106,7 +106,7 @@ fn looks_linear(view: &View, luminances: &[f64]) -> bool {
 
 /// A float photo whose values end at 1 and have their middle where encoded photos have it.
 fn looks_encoded(view: &View, luminances: &[f64]) -> bool {
-    if matches!(view.photo, Photo::Srgb8(_)) || luminances.len() <= 100 {
+    if !view.photo.is_linear() || luminances.len() <= 100 {
         return false;
     }
     let lit: Vec<f64> = luminances.iter().copied().filter(|value| *value > 0.0).collect();

@@ -17,10 +17,12 @@ pub const SHOWING_TITLE: &str = "Drawing the material";
 pub const THUMBNAIL_SIDE: usize = 72;
 
 /// What was chosen to look at.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub enum Choice {
     /// A place on the map of codes.
     Place {
+        /// The library that the map is of.
+        library: Arc<Materials>,
         /// Along the two main directions.
         at: [f64; 2],
         /// Its materials with their shares, the largest first.
@@ -85,7 +87,8 @@ impl Model {
     /// Chooses a place on the map and draws its material.
     pub fn choose_material(&mut self, at: [f64; 2]) {
         let Some(library) = &self.materials.library else { return };
-        self.materials.choice = Some(Choice::Place { at, parts: library.map.parts_at(at) });
+        let parts = library.map.parts_at(at);
+        self.materials.choice = Some(Choice::Place { library: Arc::clone(library), at, parts });
         self.show_material();
     }
 
@@ -128,15 +131,13 @@ impl Model {
     /// Draws the chosen material in the chosen light.
     pub fn show_material(&mut self) {
         let Some(choice) = self.materials.choice.clone() else { return };
-        let library = self.materials.library.clone();
         let light = self.materials.light.as_ref().and_then(|name| self.shelf.find(name));
         let light = light.map(|light| Arc::clone(&light.environment));
         self.tasks.stop(SHOWING_TITLE);
         self.tasks.spawn(SHOWING_TITLE, move |_| {
-            let shown = match (&choice, library) {
-                (Choice::Opened(material), _) => material.shown(light.as_deref()),
-                (Choice::Place { parts, .. }, Some(library)) => library.shown(parts, light.as_deref())?,
-                (Choice::Place { parts, .. }, None) => Materials::shipped()?.shown(parts, light.as_deref())?,
+            let shown = match &choice {
+                Choice::Opened(material) => material.shown(light.as_deref()),
+                Choice::Place { library, parts, .. } => library.shown(parts, light.as_deref())?,
             };
             Ok(Done::MaterialShown(Box::new(shown)))
         });

@@ -11,6 +11,7 @@ use crate::fit::Method;
 use crate::image::RgbImage;
 use crate::insight::report::data::StageTime;
 use crate::job::demo;
+use crate::job::materials::OpenedMaterial;
 use crate::job::open::{self, OpenStage, OpenedRun, OpenedScene, PathKind};
 use crate::job::prepare::{Prepared, RunSettings, prepare_with};
 use crate::object::result_read;
@@ -56,7 +57,7 @@ impl Model {
     /// Opens a scene or run folder; a picture is a photo for object mode, a result of object mode is shown there, and so
     /// is a measured table.
     pub fn open(&mut self, path: PathBuf) {
-        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("binary")) {
+        if OpenedMaterial::is_table(&path) {
             self.workspace = Workspace::Object;
             return self.open_material(path);
         }

@@ -4,6 +4,7 @@ use crate::image::RgbImage;
 use crate::image::display::DisplaySettings;
 use eframe::egui::{Color32, ColorImage, Context, TextureHandle, TextureOptions};
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Thumbnails by name: linear, and as textures for the display they were last asked for.
 ///
@@ -14,14 +15,16 @@ pub struct ThumbnailCache {
 }
 
 struct Entry {
-    linear: RgbImage,
+    linear: Arc<RgbImage>,
     texture: Option<(DisplaySettings, TextureHandle)>,
 }
 
 impl ThumbnailCache {
-    /// Puts a linear thumbnail in place of what the name had.
-    pub fn insert(&mut self, name: impl Into<String>, thumbnail: RgbImage) {
-        self.entries.insert(name.into(), Entry { linear: thumbnail, texture: None });
+    /// Puts a linear thumbnail in place of what the name had, unless it is the same.
+    pub fn keep(&mut self, name: &str, thumbnail: &Arc<RgbImage>) {
+        if self.entries.get(name).is_none_or(|known| !Arc::ptr_eq(&known.linear, thumbnail)) {
+            self.entries.insert(name.into(), Entry { linear: Arc::clone(thumbnail), texture: None });
+        }
     }
 
     /// Whether there is a thumbnail of this name.

@@ -84,7 +84,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut MaterialsMemory) {
         }
     }
     let colours = theme::palette(ui.visuals());
-    if let Some(Choice::Place { at, parts }) = &model.materials.choice {
+    if let Some(Choice::Place { at, parts, .. }) = &model.materials.choice {
         let at = screen.position(*at);
         let painter = ui.painter_at(rect);
         painter.circle_stroke(at, 0.5 * SIDE + 2.0, Stroke::new(2.5, colours.accent));

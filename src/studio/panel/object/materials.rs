@@ -1,6 +1,5 @@
 //! The library: a sphere of every material, by kind and name; before it, measured tables that were opened.
 
-use crate::image::RgbImage;
 use crate::image::display::DisplaySettings;
 use crate::measured::Category;
 use crate::studio::act::Act;
@@ -11,7 +10,6 @@ use crate::studio::panel::{act_button_named, empty};
 use crate::studio::picture::ThumbnailCache;
 use crate::studio::theme;
 use egui::{ComboBox, Rect, RichText, ScrollArea, Sense, Stroke, StrokeKind, TextEdit, Ui, pos2, vec2};
-use std::collections::HashMap;
 use std::sync::Arc;
 
 /// Side of a sphere in points.
@@ -23,8 +21,6 @@ pub struct MaterialsMemory {
     filter: String,
     kind: Option<Category>,
     pub(super) thumbnails: ThumbnailCache,
-    /// Thumbnails of opened tables that are in the cache, by their paths.
-    opened: HashMap<String, Arc<RgbImage>>,
     filled: bool,
     pub(super) without_pictures: bool,
 }
@@ -34,7 +30,7 @@ impl MaterialsMemory {
     pub(super) fn fill(&mut self, model: &Model) {
         let Some(library) = model.materials.library.as_ref().filter(|_| !self.filled) else { return };
         for (place, picture) in library.map.places.iter().zip(&model.materials.thumbnails) {
-            self.thumbnails.insert(&place.name, (**picture).clone());
+            self.thumbnails.keep(&place.name, picture);
         }
         self.filled = !model.materials.thumbnails.is_empty();
     }
@@ -96,10 +92,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut MaterialsMemory) {
                 }
                 let key = material.path.display().to_string();
                 // A file may be opened again with other contents.
-                if memory.opened.get(&key).is_none_or(|known| !Arc::ptr_eq(known, thumbnail)) {
-                    memory.opened.insert(key.clone(), Arc::clone(thumbnail));
-                    memory.thumbnails.insert(&key, (**thumbnail).clone());
-                }
+                memory.thumbnails.keep(&key, thumbnail);
                 let is_chosen = matches!(&choice, Some(Choice::Opened(own)) if Arc::ptr_eq(own, material));
                 if tile(ui, memory, (&key, name), None, is_chosen) {
                     clicked_opened = Some(Arc::clone(material));
