@@ -3,7 +3,8 @@
 use super::choice::alternatives::TileAlternatives;
 use super::choice::apply::Undecided;
 use super::choice::check::Check;
-use super::diffuse::{self, DiffuseRow, Leaning};
+use super::diffuse::{self, Leaning};
+use super::diffuse_system::{DiffuseRow, DiffuseSystem};
 use super::estimate::Estimate;
 use super::lobe_evidence::LobePrior;
 use super::lobe_families;
@@ -94,10 +95,13 @@ impl SolverScene {
                 rho[texel as usize] = *own;
             }
         }
-        if !diffuse::solve(&self.footprints, &self.observations, &rows, &mut rho, LEANING, ITERATIONS, stop) {
+        let size = self.settings.map_size;
+        let mut system = DiffuseSystem::new(&self.footprints, &self.observations, &rows, size);
+        if !diffuse::solve(&mut system, &mut rho, LEANING, ITERATIONS, stop) {
             return None;
         }
-        let errors = self.errors_of(&rows, &rho);
+        let errors = self.errors_of(&rows, &system.models(&rho));
+        drop(system);
 
         // Nothing is dropped from here on.
         estimate.variances.fill([0.0; 8]);
@@ -165,11 +169,10 @@ impl SolverScene {
     }
 
     /// Squared errors of the pixels that tiles used.
-    fn errors_of(&self, rows: &[DiffuseRow], rho: &[[f32; 3]]) -> ErrorSums {
+    fn errors_of(&self, rows: &[DiffuseRow], models: &[[f32; 3]]) -> ErrorSums {
         let mut errors = ErrorSums::new(self.views.len());
-        for (observation, row) in self.observations.list.iter().zip(rows) {
+        for ((observation, row), model) in self.observations.list.iter().zip(rows).zip(models) {
             if row.weight > 0.0 && !observation.clipped {
-                let model = diffuse::model(&self.footprints, observation, row, rho);
                 let squared = (0..3).map(|c| f64::from(row.radiance[c] - model[c]).powi(2)).sum::<f64>() / 3.0;
                 errors.add(observation.view as usize, squared);
             }

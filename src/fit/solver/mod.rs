@@ -25,6 +25,7 @@ pub mod block;
 mod cell_sums;
 pub mod choice;
 pub mod diffuse;
+pub mod diffuse_system;
 pub mod eliminate;
 pub mod estimate;
 pub mod light_evidence;

@@ -4,7 +4,7 @@
 //! angles alone. One with one lobe gets that for all its texels. Diffuse reflectance of all texels is solved after this,
 //! with what the chosen lobes send.
 
-use super::super::diffuse::DiffuseRow;
+use super::super::diffuse_system::DiffuseRow;
 use super::super::lobe_evidence::LobeBelief;
 use super::super::tile::Tile;
 use super::Alternative;
