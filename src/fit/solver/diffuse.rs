@@ -143,3 +143,54 @@ pub fn solve(
     }
     true
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::diffuse_system::tests::{made_up, plain_models};
+    use super::*;
+
+    #[test]
+    fn the_solution_is_that_of_least_squares() {
+        let size = 16;
+        let (footprints, observations, mut rows) = made_up(size, 400);
+        // Photos of reflectances that no bound holds.
+        for row in &mut rows {
+            row.radiance = [0, 1, 2].map(|c| row.arriving[c] * (0.4 + 0.2 * row.radiance[c]));
+        }
+        let leaning = Leaning { start: 0.05, neighbours: 0.1 };
+        let start = vec![[0.3f32; 3]; size * size];
+        let mut rho = start.clone();
+        let mut system = DiffuseSystem::new(&footprints, &observations, &rows, size);
+        assert!(solve(&mut system, &mut rho, leaning, 200, &AtomicBool::new(false)));
+        let diagonal = system.transposed(|row| row.arriving.map(|arriving| row.weight * arriving.powi(2)));
+        let held = Held::new(diagonal, leaning);
+        // The objective, with what is leaned on, by channel: no small step from the solution makes it less.
+        let objective = |x: &[[f32; 3]], c: usize| -> f64 {
+            let models = plain_models(&footprints, &observations, &rows, x);
+            let pixels = rows
+                .iter()
+                .zip(&models)
+                .map(|(row, model)| f64::from(row.weight) * (f64::from(row.radiance[c]) - model[c]).powi(2));
+            let leaning = (0..x.len()).map(|texel| {
+                let own = f64::from(x[texel][c]);
+                let pulls = held.neighbours(texel).map(|other| (own - f64::from(x[other][c])).powi(2)).sum::<f64>();
+                f64::from(held.ridge) * (own - f64::from(start[texel][c])).powi(2)
+                    + 0.5 * f64::from(held.stiffness) * pulls
+            });
+            pixels.sum::<f64>() + leaning.sum::<f64>()
+        };
+        for texel in (0..size * size).step_by(7) {
+            for c in 0..3 {
+                assert!((0.01..0.99).contains(&rho[texel][c]), "{:?}", rho[texel]);
+                let moved = |by: f32| {
+                    let mut moved = rho.clone();
+                    moved[texel][c] += by;
+                    objective(&moved, c)
+                };
+                let (less, more) = (moved(-1e-2), moved(1e-2));
+                let (slope, curvature) = ((more - less) / 2e-2, (more + less - 2.0 * objective(&rho, c)) / 1e-4);
+                assert!((slope / curvature).abs() < 1e-3, "{texel} {c}: off by {}", slope / curvature);
+            }
+        }
+    }
+}

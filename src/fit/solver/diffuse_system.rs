@@ -215,3 +215,113 @@ impl Part {
         mean
     }
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::fit::solver::observations::Observation;
+    use crate::math::random::SequentialRandom;
+    use crate::render::cached::ShadingPoint;
+    use crate::render::cached::points::{NO_POINT, PointTap};
+    use glam::Vec3;
+
+    /// Pixels of two views on maps of `map_size`: each covers some texels side by side, some also one far away.
+    pub fn made_up(map_size: usize, pixels: usize) -> (Vec<ViewFootprints>, Observations, Vec<DiffuseRow>) {
+        let mut random = SequentialRandom::new(5);
+        let texels = map_size * map_size;
+        let mut footprints = Vec::new();
+        let mut list = Vec::new();
+        for view in 0..2 {
+            let mut of_view = ViewFootprints {
+                width: pixels,
+                height: 1,
+                points: Vec::new(),
+                texels: Vec::new(),
+                lit: Vec::new(),
+                escaped: vec![0.0; pixels],
+            };
+            for pixel in 0..pixels as u32 {
+                let first = (random.next_number() * (texels - map_size - 2) as f32) as u32;
+                let first_texel = of_view.texels.len() as u32;
+                of_view.texels.extend([(first, 0.5), (first + 1, 0.2), (first + map_size as u32, 0.2)]);
+                let other = if pixel % 5 == 0 { (random.next_number() * texels as f32) as u32 } else { first };
+                of_view.texels.push((other.min(texels as u32 - 1), 0.1));
+                of_view.points.push(ShadingPoint {
+                    pixel,
+                    share: 1.0,
+                    normal: Vec3::Z,
+                    to_viewer: Vec3::Z,
+                    points: PointTap { index: [0; 4], weight: [0.25; 4] },
+                    lobe_hits: [NO_POINT; 4],
+                    first_texel,
+                    texel_count: 4,
+                    first_lit: 0,
+                    lit_count: 0,
+                });
+                list.push(Observation { view, point: pixel, texel: first, radiance: [0.0; 3], clipped: false });
+            }
+            footprints.push(of_view);
+        }
+        list.sort_by_key(|observation| observation.texel);
+        let mut some = || [(); 3].map(|()| random.next_number());
+        let rows = (0..list.len())
+            .map(|index| DiffuseRow {
+                arriving: some().map(|value| 0.5 + value),
+                radiance: some(),
+                weight: if index % 7 == 0 { 0.0 } else { some()[0] },
+            })
+            .collect();
+        (footprints, Observations { list, ..Observations::default() }, rows)
+    }
+
+    /// Mean reflectance under each row times arriving light, tap by tap.
+    pub fn plain_models(
+        footprints: &[ViewFootprints],
+        observations: &Observations,
+        rows: &[DiffuseRow],
+        of: &[[f32; 3]],
+    ) -> Vec<[f64; 3]> {
+        let one = |(own, row): (&Observation, &DiffuseRow)| {
+            let view = &footprints[own.view as usize];
+            let taps = view.texels_of(&view.points[own.point as usize]);
+            [0, 1, 2].map(|c| {
+                let mean: f64 = taps.iter().map(|&(texel, w)| f64::from(w) * f64::from(of[texel as usize][c])).sum();
+                mean * f64::from(row.arriving[c])
+            })
+        };
+        observations.list.iter().zip(rows).map(one).collect()
+    }
+
+    #[test]
+    fn products_are_those_of_the_footprints_and_the_transposed_is_the_adjoint() {
+        let size = 64;
+        let (footprints, observations, rows) = made_up(size, 1500);
+        let mut system = DiffuseSystem::new(&footprints, &observations, &rows, size);
+        assert!(system.parts.len() > 8 && system.parts.iter().any(|part| !part.far.is_empty()));
+        let mut random = SequentialRandom::new(9);
+        let x: Vec<[f32; 3]> = (0..size * size).map(|_| [(); 3].map(|()| random.next_number())).collect();
+        let plain = plain_models(&footprints, &observations, &rows, &x);
+        let models = system.models(&x);
+        for ((own, plain), row) in models.iter().zip(&plain).zip(&rows) {
+            for c in 0..3 {
+                let expected = if row.weight > 0.0 { plain[c] } else { 0.0 };
+                assert!((f64::from(own[c]) - expected).abs() < 1e-6, "{own:?} {plain:?}");
+            }
+        }
+        // The dot product of A x with weighted photos is that of x with what the transposed makes of them.
+        let transposed = system.transposed(|row| [0, 1, 2].map(|c| row.weight * row.arriving[c] * row.radiance[c]));
+        let product = system.normal_product(&x);
+        for c in 0..3 {
+            let over_rows = |right: &dyn Fn(usize) -> f64| -> f64 {
+                (0..rows.len()).map(|k| f64::from(rows[k].weight) * plain[k][c] * right(k)).sum()
+            };
+            let over_texels = |right: &[[f32; 3]]| -> f64 {
+                x.iter().zip(right).map(|(x, right)| f64::from(x[c]) * f64::from(right[c])).sum()
+            };
+            let (one, other) = (over_rows(&|k| f64::from(rows[k].radiance[c])), over_texels(&transposed));
+            assert!((one / other - 1.0).abs() < 1e-6, "{one} {other}");
+            let (one, other) = (over_rows(&|k| plain[k][c]), over_texels(&product));
+            assert!((one / other - 1.0).abs() < 1e-6, "{one} {other}");
+        }
+    }
+}

@@ -1,14 +1,12 @@
 //! How likely pixels are if they share one lobe, whatever its F0 and width, and what is then believed of both.
 //!
-//! A surface is a dielectric, a metal, or neither: kinds that differ in F0 and in what lies under the lobe. A metal has
-//! next to no diffuse reflectance; F0 of all others is grey. Without that knowledge a wide lobe of a high F0 stands in
-//! for diffuse reflectance wherever the light is a little wrong, in the complementary colour where it is too much.
-//! The logarithm of the width is normal. Kinds that have the same belief of it make a family: one of them holds for any
-//! scene, others may come from what the scene has shown elsewhere ([`super::lobe_families`]).
+//! Diffuse reflectance and F0 are integrated in closed form at each width, for each kind of surface ([`super::lobe_prior`]);
+//! widths are summed over. A tile asks this of some thousand groups of texels, so what no group changes is made once
+//! ([`Evidence::new`]).
 
 use super::cell_sums::System;
+use super::lobe_prior::{LobeFamily, LobeKind, LobePrior};
 use super::lobe_widths::LOBE_WIDTHS;
-use glam::{DMat3, DVec3};
 
 /// Sums of a texel, or of a group, per width and channel, in units of the noise, with each texel's deviation from its
 /// group's diffuse reflectance eliminated.
@@ -36,106 +34,10 @@ impl LobeSumsOfGroup {
         let others = other.0.iter().flatten();
         self.0.iter_mut().flatten().zip(others).for_each(|(own, other)| own.add(other));
     }
-}
 
-/// What is believed of a kind of surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LobeKind {
-    /// Mean of F0 per channel, standard deviation of what its channels have in common, and of what they do not.
-    pub specular: ([f64; 3], f64, f64),
-    /// Mean per channel and standard deviation of a group's diffuse reflectance; `None` for the mean of what lies around.
-    pub diffuse: (Option<[f64; 3]>, f64),
-    /// Share of all surface.
-    pub share: f64,
-}
-
-impl LobeKind {
-    /// The channels' sums with what is believed of the group's diffuse reflectance.
-    fn with_belief(&self, sums: &[System; 3], around: [f64; 3]) -> [System; 3] {
-        let mean = self.diffuse.0.unwrap_or(around);
-        let mut all = *sums;
-        for (sums, mean) in all.iter_mut().zip(mean) {
-            sums.observe(self.diffuse.1.powi(-2), 1.0, 0.0, mean);
-        }
-        all
-    }
-
-    /// Logarithm of the evidence at one width, with mean and variance of F0 per channel; given what
-    /// [`LobeKind::precision`] says.
-    ///
-    /// Diffuse reflectance is integrated out, and it is at least zero: in a channel where it would be less at the best
-    /// F0 it is held at zero, and F0 found anew. Without that, wide and strong lobes over what they outshine, made up
-    /// for by less than black below, took over photographs (`saharov_bmvs`: RMSE of the maps .0446, with it .0367).
-    fn at_width(
-        &self,
-        (precision, log_determinant): (DMat3, f64),
-        sums: &[System; 3],
-        around: [f64; 3],
-    ) -> (f64, [(f64, f64); 3]) {
-        let all = self.with_belief(sums, around);
-        let mean = DVec3::from_array(self.specular.0);
-        let log_volume =
-            log_determinant + all.iter().map(|all| (all.ee * self.diffuse.1 * self.diffuse.1).ln()).sum::<f64>();
-        let mut held = [false; 3];
-        loop {
-            let (mut total, mut side) = (precision, precision * mean);
-            let mut cost = mean.dot(side);
-            for (channel, &System { ee, es, ss, ey, sy, yy }) in all.iter().enumerate() {
-                let keep = if held[channel] { 0.0 } else { 1.0 / ee };
-                total.col_mut(channel)[channel] += ss - es * es * keep;
-                side[channel] += sy - es * ey * keep;
-                cost += yy - ey * ey * keep;
-            }
-            let inverse = total.inverse();
-            let best = inverse * side;
-            let is_below = |c: usize| !held[c] && all[c].ey < all[c].es * best[c];
-            let below = [0, 1, 2].map(is_below);
-            if below == [false; 3] {
-                let log = self.share.ln() - 0.5 * (cost - side.dot(best) + total.determinant().ln() + log_volume);
-                return (log, [0, 1, 2].map(|c| (best[c].clamp(0.0, 1.0), inverse.col(c)[c].max(0.0))));
-            }
-            held = [0, 1, 2].map(|c| held[c] || below[c]);
-        }
-    }
-
-    /// Inverse covariance of F0, and the logarithm of the covariance's determinant.
-    fn precision(&self) -> (DMat3, f64) {
-        let (common, own) = (self.specular.1.powi(2), self.specular.2.powi(2));
-        let share = common / (own + 3.0 * common);
-        let precision = (DMat3::IDENTITY - DMat3::from_cols_array(&[share; 9])) * (1.0 / own);
-        (precision, 2.0 * own.ln() + (own + 3.0 * common).ln())
-    }
-}
-
-/// Kinds of surface whose widths are believed to be alike.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LobeFamily {
-    /// The kinds.
-    pub kinds: Vec<LobeKind>,
-    /// Mean and standard deviation of the logarithm of the width.
-    pub log_width: (f64, f64),
-    /// Standard deviations from the mean within which widths are looked at; beyond, another family has to hold.
-    pub reach: f64,
-}
-
-/// What is believed of lobes before looking.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LobePrior {
-    /// All kinds of surface; their shares sum to 1.
-    pub families: Vec<LobeFamily>,
-    /// Probability that a group that could be cut shares one lobe.
-    pub keep: f64,
-}
-
-impl Default for LobePrior {
-    /// Dielectrics, metals, and what is neither.
-    fn default() -> Self {
-        let grey = |value: f64| [value; 3];
-        let dielectric = LobeKind { specular: (grey(0.05), 0.025, 0.005), diffuse: (None, 0.35), share: 0.8 };
-        let metal = LobeKind { specular: (grey(0.55), 0.2, 0.15), diffuse: (Some(grey(0.05)), 0.1), share: 0.17 };
-        let other = LobeKind { specular: (grey(0.12), 0.08, 0.01), diffuse: (None, 0.35), share: 0.03 };
-        let any = LobeFamily { kinds: vec![dielectric, metal, other], log_width: (-0.6, 0.5), reach: f64::INFINITY };
-        LobePrior { families: vec![any], keep: 0.5 }
+    /// Whether no pixel is in it: it says nothing, and adds nothing to others.
+    pub fn is_empty(&self) -> bool {
+        self.0.iter().flatten().all(|sums| *sums == System::default())
     }
 }
 
@@ -162,97 +64,248 @@ impl LobeBelief {
 
 /// Points between two widths where the posterior is looked at.
 const FINE: usize = 4;
+/// Logarithm of the weight, relative to the best, below which a point or a kind counts for nothing.
+const NEGLIGIBLE: f64 = -21.0;
 
-/// Logarithm of the evidence that a group shares one lobe, and what is then believed of it.
-/// `around` is the mean diffuse reflectance of what lies around.
-pub fn shared_lobe(
-    sums: &LobeSumsOfGroup,
-    around: [f64; 3],
-    log_widths: &[f64; LOBE_WIDTHS],
-    prior: &LobePrior,
-) -> (f64, LobeBelief) {
-    let of = |family: &LobeFamily| family.lobe(sums, around, log_widths);
-    if let [family] = prior.families.as_slice() {
-        return of(family);
-    }
-    let families: Vec<(f64, LobeBelief)> = prior.families.iter().map(of).collect();
-    let total = log_sum(families.iter().map(|family| family.0));
-    let mut belief = LobeBelief::default();
-    for (log, own) in &families {
-        belief.mix(own, (log - total).exp());
-    }
-    (total, belief)
+/// Asks groups of texels for the evidence that they share one lobe.
+pub struct Evidence {
+    families: Vec<FamilyEvidence>,
 }
 
-impl LobeFamily {
-    /// Logarithm of the evidence of all kinds together, with their shares, and what is believed if it is one of them.
-    fn lobe(&self, sums: &LobeSumsOfGroup, around: [f64; 3], log_widths: &[f64; LOBE_WIDTHS]) -> (f64, LobeBelief) {
-        let (centre, deviation) = self.log_width;
+impl Evidence {
+    /// For groups among texels whose mean diffuse reflectance is `around`, at these widths, with what is believed before.
+    pub fn new(around: [f64; 3], log_widths: &[f64; LOBE_WIDTHS], prior: &LobePrior) -> Self {
+        Evidence { families: prior.families.iter().map(|own| FamilyEvidence::new(own, around, log_widths)).collect() }
+    }
+
+    /// Logarithm of the evidence that a group shares one lobe, and what is then believed of it.
+    pub fn shared_lobe(&self, sums: &LobeSumsOfGroup) -> (f64, LobeBelief) {
+        if let [family] = self.families.as_slice() {
+            return family.lobe(sums);
+        }
+        let families: Vec<(f64, LobeBelief)> = self.families.iter().map(|family| family.lobe(sums)).collect();
+        let total = log_sum(families.iter().map(|family| family.0));
+        let mut belief = LobeBelief::default();
+        for (log, own) in &families {
+            belief.mix(own, (log - total).exp());
+        }
+        (total, belief)
+    }
+}
+
+/// A kind of surface, ready to be asked. The inverse covariance of F0 has one number on its diagonal and one beside it.
+struct KindEvidence {
+    diagonal: f64,
+    beside: f64,
+    /// Inverse covariance times the mean of F0, and once more by the mean.
+    side: [f64; 3],
+    cost: f64,
+    /// Determinant of the covariance of F0, times the variance of diffuse reflectance of each channel.
+    volume: f64,
+    log_share: f64,
+    /// What is believed of diffuse reflectance, as sums over pixels.
+    ee: f64,
+    ey: [f64; 3],
+    yy: [f64; 3],
+}
+
+impl KindEvidence {
+    fn new(kind: &LobeKind, around: [f64; 3]) -> Self {
+        let (mean, common, own) = (kind.specular.0, kind.specular.1.powi(2), kind.specular.2.powi(2));
+        let share = common / (own + 3.0 * common);
+        let (diagonal, beside) = ((1.0 - share) / own, -share / own);
+        let sum: f64 = mean.iter().sum();
+        let side = mean.map(|value| (diagonal - beside) * value + beside * sum);
+        let variance = kind.diffuse.1.powi(2);
+        let diffuse = kind.diffuse.0.unwrap_or(around);
+        KindEvidence {
+            diagonal,
+            beside,
+            side,
+            cost: (0..3).map(|c| side[c] * mean[c]).sum(),
+            volume: own * own * (own + 3.0 * common) * variance.powi(3),
+            log_share: kind.share.ln(),
+            ee: 1.0 / variance,
+            ey: diffuse.map(|value| value / variance),
+            yy: diffuse.map(|value| value * value / variance),
+        }
+    }
+
+    /// Logarithm of the evidence at one width, with mean and variance of F0 per channel.
+    ///
+    /// Diffuse reflectance is integrated out, and it is at least zero: in a channel where it would be less at the best
+    /// F0 it is held at zero, and F0 found anew. Without that, wide and strong lobes over what they outshine, made up
+    /// for by less than black below, took over photographs (`saharov_bmvs`: RMSE of the maps .0446, with it .0367).
+    fn at_width(&self, sums: &[System; 3]) -> (f64, [(f64, f64); 3]) {
+        let all: [System; 3] = std::array::from_fn(|c| System {
+            ee: sums[c].ee + self.ee,
+            ey: sums[c].ey + self.ey[c],
+            yy: sums[c].yy + self.yy[c],
+            ..sums[c]
+        });
+        let volume = self.volume * all[0].ee * all[1].ee * all[2].ee;
+        let mut held = [false; 3];
+        loop {
+            let (mut own, mut side, mut cost) = ([self.diagonal; 3], self.side, self.cost);
+            for (c, &System { ee, es, ss, ey, sy, yy }) in all.iter().enumerate() {
+                let keep = if held[c] { 0.0 } else { 1.0 / ee };
+                own[c] += ss - es * es * keep;
+                side[c] += sy - es * ey * keep;
+                cost += yy - ey * ey * keep;
+            }
+            // The matrix has `own` on its diagonal and one number beside it: its inverse by cofactors.
+            let ([a, b, c], q) = (own, self.beside);
+            let cofactors = [b * c - q * q, a * c - q * q, a * b - q * q];
+            let [across_ab, across_ac, across_bc] = [c, b, a].map(|other| q * q - q * other);
+            let determinant = a * cofactors[0] + q * (across_ab + across_ac);
+            let best = [
+                (cofactors[0] * side[0] + across_ab * side[1] + across_ac * side[2]) / determinant,
+                (across_ab * side[0] + cofactors[1] * side[1] + across_bc * side[2]) / determinant,
+                (across_ac * side[0] + across_bc * side[1] + cofactors[2] * side[2]) / determinant,
+            ];
+            let below = [0, 1, 2].map(|c| !held[c] && all[c].ey < all[c].es * best[c]);
+            if below == [false; 3] {
+                let explained: f64 = (0..3).map(|c| side[c] * best[c]).sum();
+                let log = self.log_share - 0.5 * (cost - explained + (determinant * volume).ln());
+                let variance = |c: usize| (cofactors[c] / determinant).max(0.0);
+                return (log, [0, 1, 2].map(|c| (best[c].clamp(0.0, 1.0), variance(c))));
+            }
+            held = [0, 1, 2].map(|c| held[c] || below[c]);
+        }
+    }
+}
+
+/// A place between two widths.
+struct Point {
+    /// The narrower of the two, of those that are looked at.
+    node: usize,
+    /// Of the way to the wider.
+    share: f64,
+    log_width: f64,
+    /// Logarithm of what is believed of the width before looking, times the step from point to point.
+    log_prior: f64,
+}
+
+/// A family, ready to be asked.
+struct FamilyEvidence {
+    kinds: Vec<KindEvidence>,
+    /// The first width that is looked at.
+    first: usize,
+    /// Logarithms of all that are.
+    log_widths: Vec<f64>,
+    points: Vec<Point>,
+}
+
+impl FamilyEvidence {
+    fn new(family: &LobeFamily, around: [f64; 3], log_widths: &[f64; LOBE_WIDTHS]) -> Self {
+        let (centre, deviation) = family.log_width;
+        let reach = family.reach * deviation;
         // Three widths at least: the curvature between them is asked for.
-        let first = log_widths.partition_point(|&x| x < centre - self.reach * deviation).clamp(1, LOBE_WIDTHS - 2) - 1;
-        let last =
-            log_widths.partition_point(|&x| x <= centre + self.reach * deviation).clamp(first + 2, LOBE_WIDTHS - 1);
+        let first = log_widths.partition_point(|&x| x < centre - reach).clamp(1, LOBE_WIDTHS - 2) - 1;
+        let last = log_widths.partition_point(|&x| x <= centre + reach).clamp(first + 2, LOBE_WIDTHS - 1);
+        let own = log_widths[first..=last].to_vec();
+        let log_norm = (deviation * (2.0 * std::f64::consts::PI).sqrt()).ln();
+        let point = |index: usize| {
+            let node = (index / FINE).min(own.len() - 2);
+            let share = (index - node * FINE) as f64 / FINE as f64;
+            let log_width = own[node] * (1.0 - share) + own[node + 1] * share;
+            let step = (own[node + 1] - own[node]) / FINE as f64;
+            let log_prior = step.ln() - 0.5 * ((log_width - centre) / deviation).powi(2) - log_norm;
+            Point { node, share, log_width, log_prior }
+        };
+        let points = (0..=(own.len() - 1) * FINE).map(point).collect();
+        let kinds = family.kinds.iter().map(|kind| KindEvidence::new(kind, around)).collect();
+        FamilyEvidence { kinds, first, log_widths: own, points }
+    }
+
+    /// Logarithm of the evidence of all kinds together, with their shares, and what is believed if it is one of them.
+    fn lobe(&self, sums: &LobeSumsOfGroup) -> (f64, LobeBelief) {
+        let count = self.log_widths.len();
         // Per width: logarithm of the evidence, mean and square of F0.
         let mut log_at = [0.0f64; LOBE_WIDTHS];
         let mut specular = [[[0.0f64; 2]; 3]; LOBE_WIDTHS];
-        let precisions: Vec<_> = self.kinds.iter().map(LobeKind::precision).collect();
-        let mut of_kinds = Vec::with_capacity(self.kinds.len());
-        for node in first..=last {
-            of_kinds.clear();
-            let prepared = self.kinds.iter().zip(&precisions);
-            of_kinds.extend(prepared.map(|(kind, &precision)| kind.at_width(precision, &sums.0[node], around)));
-            log_at[node] = log_sum(of_kinds.iter().map(|kind| kind.0));
-            for (log_kind, of_channels) in &of_kinds {
-                let weight = (log_kind - log_at[node]).exp();
-                for (channel, (mean, variance)) in of_channels.iter().enumerate() {
-                    specular[node][channel][0] += weight * mean;
-                    specular[node][channel][1] += weight * (variance + mean * mean);
-                }
-            }
+        for node in 0..count {
+            (log_at[node], specular[node]) = self.at_width(&sums.0[self.first + node]);
         }
+        let log_at = &log_at[..count];
         // Between widths the logarithm of the evidence is a parabola, as that of a normal distribution is.
-        let mut points = [(0.0f64, 0usize, 0.0f64, 0.0f64); (LOBE_WIDTHS - 1) * FINE + 1];
-        let points = &mut points[..(last - first) * FINE + 1];
-        for (index, point) in points.iter_mut().enumerate() {
-            let node = (first + index / FINE).min(last - 1);
-            let share = (index - (node - first) * FINE) as f64 / FINE as f64;
-            let x = log_widths[node] * (1.0 - share) + log_widths[node + 1] * share;
-            let step = (log_widths[node + 1] - log_widths[node]) / FINE as f64;
-            let log = between(&log_widths[first..=last], &log_at[first..=last], node - first, x)
-                - 0.5 * ((x - centre) / deviation).powi(2);
-            *point = (log + step.ln(), node, share, x);
+        let bends = bends(&self.log_widths, log_at);
+        let log_of = |point: &Point| {
+            let Point { node, log_width, log_prior, .. } = *point;
+            let (slope, bent) = bends[node];
+            let rise = slope + bent * (log_width - self.log_widths[node + 1]);
+            log_at[node] + (log_width - self.log_widths[node]) * rise + log_prior
+        };
+        let mut logs = [0.0f64; (LOBE_WIDTHS - 1) * FINE + 1];
+        let mut largest = f64::NEG_INFINITY;
+        for (log, point) in logs.iter_mut().zip(&self.points) {
+            *log = log_of(point);
+            largest = largest.max(*log);
         }
-        let norm = (deviation * (2.0 * std::f64::consts::PI).sqrt()).ln();
-        let total = log_sum(points.iter().map(|point| point.0));
         let mut belief = LobeBelief::default();
-        for &(log, node, share, x) in points.iter() {
-            let weight = (log - total).exp();
-            if weight < 1e-9 {
+        if !largest.is_finite() {
+            return (largest, belief);
+        }
+        let mut total = 0.0;
+        for (log, &Point { node, share, log_width, .. }) in logs.iter().zip(&self.points) {
+            if log - largest < NEGLIGIBLE {
                 continue;
             }
+            let weight = (log - largest).exp();
+            total += weight;
             for c in 0..3 {
                 let mixed = |k: usize| specular[node][c][k] * (1.0 - share) + specular[node + 1][c][k] * share;
                 belief.mean[c] += weight * mixed(0);
                 belief.square[c] += weight * mixed(1);
             }
-            belief.mean[3] += weight * x;
-            belief.square[3] += weight * x * x;
+            belief.mean[3] += weight * log_width;
+            belief.square[3] += weight * log_width * log_width;
         }
-        (total - norm, belief)
+        belief.mean = belief.mean.map(|value| value / total);
+        belief.square = belief.square.map(|value| value / total);
+        (largest + total.ln(), belief)
+    }
+
+    /// Logarithm of the evidence at a width, and mean and square of F0 per channel, of all kinds together.
+    fn at_width(&self, sums: &[System; 3]) -> (f64, [[f64; 2]; 3]) {
+        let moments = |of_channels: [(f64, f64); 3]| of_channels.map(|(mean, variance)| [mean, variance + mean * mean]);
+        let mut kinds = self.kinds.iter().map(|kind| kind.at_width(sums));
+        let Some((mut largest, first)) = kinds.next() else { return (f64::NEG_INFINITY, [[0.0; 2]; 3]) };
+        // Weights relative to the likeliest so far.
+        let (mut total, mut sum) = (1.0, moments(first));
+        for (log, of_channels) in kinds {
+            let rise = log - largest;
+            if rise < NEGLIGIBLE {
+                continue;
+            }
+            let (keep, weight) = if rise > 0.0 { ((-rise).exp(), 1.0) } else { (1.0, rise.exp()) };
+            largest = largest.max(log);
+            total = keep * total + weight;
+            for (sum, own) in sum.iter_mut().zip(moments(of_channels)) {
+                *sum = [0, 1].map(|k| keep * sum[k] + weight * own[k]);
+            }
+        }
+        (largest + total.ln(), sum.map(|own| own.map(|value| value / total)))
     }
 }
 
-/// Between two nodes: the straight line, and the smaller of the curvatures at both ends where they have one sign. For a
-/// parabola that is the parabola; beside a kink it does not overshoot.
-fn between(x: &[f64], y: &[f64], node: usize, at: f64) -> f64 {
-    let slope = |k: usize| (y[k + 1] - y[k]) / (x[k + 1] - x[k]);
-    let curvature = |middle: usize| {
-        let middle = middle.clamp(1, x.len() - 2);
-        (slope(middle) - slope(middle - 1)) / (x[middle + 1] - x[middle - 1])
-    };
-    let (left, right) = (curvature(node), curvature(node + 1));
-    let bent = if left * right <= 0.0 { 0.0 } else { left.signum() * left.abs().min(right.abs()) };
-    y[node] + (at - x[node]) * (slope(node) + bent * (at - x[node + 1]))
+/// For each interval: the straight line's slope, and the smaller of the curvatures at both ends where they have one sign.
+/// For a parabola that is the parabola; beside a kink it does not overshoot.
+fn bends(x: &[f64], y: &[f64]) -> [(f64, f64); LOBE_WIDTHS] {
+    let count = x.len();
+    let mut slopes = [0.0f64; LOBE_WIDTHS];
+    let mut curvatures = [0.0f64; LOBE_WIDTHS];
+    for k in 0..count - 1 {
+        slopes[k] = (y[k + 1] - y[k]) / (x[k + 1] - x[k]);
+    }
+    for middle in 1..count - 1 {
+        curvatures[middle] = (slopes[middle] - slopes[middle - 1]) / (x[middle + 1] - x[middle - 1]);
+    }
+    std::array::from_fn(|node| {
+        let [left, right] = [node, node + 1].map(|middle| curvatures[middle.clamp(1, count - 2)]);
+        let bent = if left * right <= 0.0 { 0.0 } else { left.signum() * left.abs().min(right.abs()) };
+        (slopes[node], bent)
+    })
 }
 
 /// Logarithm of a sum of exponentials.
@@ -262,4 +315,72 @@ pub fn log_sum(logs: impl Iterator<Item = f64> + Clone) -> f64 {
         return largest;
     }
     largest + logs.map(|log| (log - largest).exp()).sum::<f64>().ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::SequentialRandom;
+    use glam::{DMat3, DVec3};
+
+    /// Sums of pixels that show a surface of F0 `.3` over a diffuse reflectance of `.2`, and some noise.
+    fn pixels(count: usize) -> [System; 3] {
+        let mut random = SequentialRandom::new(3);
+        let mut sums = [System::default(); 3];
+        for _ in 0..count {
+            for sums in &mut sums {
+                let [e, s, noise] = [(); 3].map(|()| f64::from(random.next_number()));
+                sums.observe(40.0, 0.5 + e, s, 0.2 * (0.5 + e) + 0.3 * s + 0.02 * noise);
+            }
+        }
+        sums
+    }
+
+    #[test]
+    fn a_width_is_judged_as_by_whole_matrices() {
+        for kind in &LobePrior::default().families[0].kinds {
+            for count in [0, 1, 30] {
+                let (around, sums) = ([0.3, 0.25, 0.2], pixels(count));
+                let (log, of_channels) = KindEvidence::new(kind, around).at_width(&sums);
+                // F0 of all channels together: normal before looking, diffuse reflectance eliminated channel by channel.
+                let (common, own) = (kind.specular.1.powi(2), kind.specular.2.powi(2));
+                let covariance = DMat3::from_diagonal(DVec3::splat(own)) + DMat3::from_cols_array(&[common; 9]);
+                let (mut total, mean) = (covariance.inverse(), DVec3::from_array(kind.specular.0));
+                let mut side = total * mean;
+                let (mut cost, mut volume) = (mean.dot(side), covariance.determinant());
+                for c in 0..3 {
+                    let mut all = sums[c];
+                    all.observe(kind.diffuse.1.powi(-2), 1.0, 0.0, kind.diffuse.0.unwrap_or(around)[c]);
+                    total.col_mut(c)[c] += all.ss - all.es * all.es / all.ee;
+                    side[c] += all.sy - all.es * all.ey / all.ee;
+                    cost += all.yy - all.ey * all.ey / all.ee;
+                    volume *= all.ee * kind.diffuse.1.powi(2);
+                }
+                let best = total.inverse() * side;
+                assert!((0..3).all(|c| sums[c].ey + 1e-9 >= sums[c].es * best[c]), "no channel is held");
+                let expected = kind.share.ln() - 0.5 * (cost - side.dot(best) + (total.determinant() * volume).ln());
+                assert!((log - expected).abs() < 1e-8 * (1.0 + expected.abs()), "{log} {expected}");
+                for (c, (mean, variance)) in of_channels.into_iter().enumerate() {
+                    assert!((mean - best[c]).abs() < 1e-8, "{mean} {best}");
+                    assert!((variance / total.inverse().col(c)[c] - 1.0).abs() < 1e-8);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_parabola_is_met_between_widths_and_nothing_is_asked_of_what_is_empty() {
+        let x: Vec<f64> = (0..LOBE_WIDTHS).map(|k| (k as f64 * 0.7).powf(1.1)).collect();
+        let parabola = |x: f64| 2.0 - 3.0 * (x - 1.7).powi(2);
+        let y: Vec<f64> = x.iter().map(|&x| parabola(x)).collect();
+        for (node, (slope, bent)) in bends(&x, &y).into_iter().take(LOBE_WIDTHS - 1).enumerate() {
+            let at = 0.3 * x[node] + 0.7 * x[node + 1];
+            let found = y[node] + (at - x[node]) * (slope + bent * (at - x[node + 1]));
+            assert!((found - parabola(at)).abs() < 1e-9, "{node}: {found}");
+        }
+        let mut sums = LobeSumsOfGroup::default();
+        assert!(sums.is_empty());
+        sums.0[3][1] = pixels(1)[1];
+        assert!(!sums.is_empty());
+    }
 }

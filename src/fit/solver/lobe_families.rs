@@ -10,7 +10,7 @@
 //! its half of what is believed.
 
 use super::estimate::Estimate;
-use super::lobe_evidence::{LobeFamily, LobeKind, LobePrior};
+use super::lobe_prior::{LobeFamily, LobeKind, LobePrior};
 use crate::material::texels::Texel;
 
 /// Share of the prior that is left to what holds for any scene.

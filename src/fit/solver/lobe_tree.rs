@@ -12,7 +12,8 @@
 //!
 //! [`super::lobe_evidence`] asks one group; here groups are made and weighed.
 
-use super::lobe_evidence::{LobeBelief, LobePrior, LobeSumsOfGroup, log_sum, shared_lobe};
+use super::lobe_evidence::{Evidence, LobeBelief, LobeSumsOfGroup, log_sum};
+use super::lobe_prior::LobePrior;
 use super::lobe_widths::LOBE_WIDTHS;
 
 /// A texel of a tile: where it lies and what tells it from others.
@@ -57,8 +58,10 @@ pub fn beliefs(
             *sum += f64::from(value) / texels.len() as f64;
         }
     }
-    let alone = sums.iter().map(|sums| shared_lobe(sums, around, log_widths, prior)).collect();
-    let tree = Tree { texels, sums, alone, around, log_widths, prior };
+    let evidence = Evidence::new(around, log_widths, prior);
+    let unseen = evidence.shared_lobe(&LobeSumsOfGroup::default());
+    let alone = |sums: &LobeSumsOfGroup| (!sums.is_empty()).then(|| evidence.shared_lobe(sums));
+    let tree = Tree { texels, sums, alone: sums.iter().map(alone).collect(), unseen, evidence, prior };
     let root = tree.grow((0..texels.len() as u32).collect(), (0, 0), side, true);
     let mut made = vec![LobeBelief::default(); texels.len()];
     tree.spread(&root, 1.0, &mut made);
@@ -74,24 +77,25 @@ pub fn beliefs(
 struct Tree<'a> {
     texels: &'a [TreeTexel],
     sums: &'a [LobeSumsOfGroup],
-    /// Evidence and belief of each texel alone.
-    alone: Vec<(f64, LobeBelief)>,
-    /// Mean diffuse reflectance of all texels.
-    around: [f64; 3],
-    log_widths: &'a [f64; LOBE_WIDTHS],
+    /// Evidence and belief of each texel alone; `None` where it has no pixel of its own.
+    alone: Vec<Option<(f64, LobeBelief)>>,
+    /// The same of groups without pixels.
+    unseen: (f64, LobeBelief),
+    evidence: Evidence,
     prior: &'a LobePrior,
 }
 
 impl Tree<'_> {
     fn grow(&self, texels: Vec<u32>, corner: (u16, u16), side: usize, by_colour: bool) -> Node {
-        let (log_leaf, leaf) = match texels.as_slice() {
-            &[texel] => self.alone[texel as usize],
-            _ => {
-                let mut sums = LobeSumsOfGroup::default();
-                for &texel in &texels {
-                    sums.add(&self.sums[texel as usize]);
-                }
-                shared_lobe(&sums, self.around, self.log_widths, self.prior)
+        // Maps may be finer than photos: what has no pixels adds nothing, and of one that has some the answer is known.
+        let mut seen = texels.iter().map(|&texel| texel as usize).filter(|&texel| self.alone[texel].is_some());
+        let (log_leaf, leaf) = match (seen.next(), seen.next()) {
+            (None, _) => self.unseen,
+            (Some(one), None) => self.alone[one].unwrap_or(self.unseen),
+            (Some(one), Some(other)) => {
+                let mut sums = self.sums[one].clone();
+                [other].into_iter().chain(seen).for_each(|texel| sums.add(&self.sums[texel]));
+                self.evidence.shared_lobe(&sums)
             }
         };
         let mut cuts = Vec::new();
@@ -200,7 +204,7 @@ impl Tree<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::cell_sums::System;
-    use super::super::lobe_evidence::{LobeFamily, LobeKind};
+    use super::super::lobe_prior::{LobeFamily, LobeKind};
     use super::super::lobe_widths::weighed_log_widths;
     use super::*;
 

@@ -11,8 +11,8 @@
 //!    ([`light_shape`]), with a weak wish for smoothness. [`light_round`] is the round as a whole,
 //!    [`light_evidence`] says what each texel of the light is known by.
 //! 5. [`maps`]: block by block, then in tiles ([`tile`]) with the footprints of pixels, where the evidence decides which
-//!    texels share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_widths`], [`lobe_families`]), then [`mod@diffuse`]: all diffuse texels
-//!    together.
+//!    texels share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_prior`], [`lobe_widths`], [`lobe_families`]), then
+//!    [`mod@diffuse`]: all diffuse texels together ([`diffuse_system`]).
 //! 6. [`choice`]: views that took no part say what lobes, light between surfaces and the light's resolution bought.
 //! 7. [`solver`]: the steps in their order. A fit does them one by one, as [`crate::fit::Fitter`] does those of Adam: on
 //!    photos and maps of half size first, whose light and maps the full size begins from ([`crate::fit::schedule`]).
@@ -34,6 +34,7 @@ pub mod light_shape;
 pub mod light_step;
 pub mod lobe_evidence;
 pub mod lobe_families;
+pub mod lobe_prior;
 pub mod lobe_tree;
 pub mod lobe_widths;
 pub mod maps;

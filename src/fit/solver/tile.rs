@@ -5,7 +5,8 @@
 
 use super::block::PixelTerms;
 use super::cell_sums::System;
-use super::lobe_evidence::{LobeBelief, LobePrior, LobeSumsOfGroup};
+use super::lobe_evidence::{LobeBelief, LobeSumsOfGroup};
+use super::lobe_prior::LobePrior;
 use super::lobe_tree::{TreeTexel, beliefs};
 use super::lobe_widths::{LOBE_WIDTHS, WidthStencil, weighed_log_widths, weighed_stencils};
 use super::round::{BlockWork, Round, log_widths};

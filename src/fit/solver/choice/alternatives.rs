@@ -7,7 +7,7 @@
 //! would be integrated anew otherwise, which is what takes the time.
 
 use super::super::block::MOST_NODES;
-use super::super::lobe_evidence::LobePrior;
+use super::super::lobe_prior::LobePrior;
 use super::super::tile::{Tile, forgiven, least_noise};
 use super::apply::ChosenLobe;
 use super::student::StudentNoise;

@@ -1,7 +1,7 @@
 //! The check from its beginning to its end: which views judge, tiles as they are solved, and what comes out.
 
 use super::super::estimate::Estimate;
-use super::super::lobe_evidence::LobePrior;
+use super::super::lobe_prior::LobePrior;
 use super::super::observations::Observation;
 use super::super::scene::SolverScene;
 use super::super::tile::Tile;
