@@ -108,7 +108,10 @@ struct Position {
 
 /// All positions of a fit, in order. The first step goes from coarse to fine with maps that grow along; the second works
 /// on maps of full size, on halved photographs first.
-fn positions(settings: &FitSettings) -> Vec<Position> {
+fn positions(settings: &FitSettings, finest: Finest) -> Vec<Position> {
+    if settings.method == Method::Solver {
+        return positions_of_solver(settings, finest);
+    }
     let mut positions = Vec::new();
     let mut add = |kind: StageKind, total: usize, places: usize, maps_grow: bool| {
         let places = if total > 0 { places } else { 0 };
@@ -117,9 +120,6 @@ fn positions(settings: &FitSettings) -> Vec<Position> {
             positions.push(Position { kind, photo_level, map_size, visit: 0, total, place, places });
         }
     };
-    if settings.method == Method::Solver {
-        return positions_of_solver(settings);
-    }
     let levels = settings.levels;
     match settings.steps {
         Steps::TwoStep => {
@@ -132,9 +132,25 @@ fn positions(settings: &FitSettings) -> Vec<Position> {
     positions
 }
 
+/// Who makes the finest maps of the solver's method, where there are coarser ones.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Finest {
+    /// The solver.
+    Solver,
+    /// Polishing alone. Photographs are not what the solver's model says at edges and silhouettes: its finest maps take
+    /// most of the time there and end further off than Adam's from the coarser ones.
+    Polish,
+}
+
+impl Finest {
+    fn of(settings: &FitSettings) -> Self {
+        if settings.solver_polish > 0 { Finest::Polish } else { Finest::Solver }
+    }
+}
+
 /// Light and maps on the coarsest level, twice where there is a finer one; on each of those some rounds more, and maps
 /// anew. What is done there is cheap, and the second maps know which lobes the first have shown.
-fn positions_of_solver(settings: &FitSettings) -> Vec<Position> {
+fn positions_of_solver(settings: &FitSettings, finest: Finest) -> Vec<Position> {
     let mut positions: Vec<Position> = Vec::new();
     let mut add = |kind: StageKind, total: usize, photo_level: usize| {
         let map_size = settings.map_size >> photo_level;
@@ -154,7 +170,8 @@ fn positions_of_solver(settings: &FitSettings) -> Vec<Position> {
         add(StageKind::NarrowLight, ROUNDS_AFTER_MAPS, coarsest);
         add(StageKind::Maps, 1, coarsest);
     }
-    for level in (0..coarsest).rev() {
+    let finest = usize::from(finest == Finest::Polish);
+    for level in (finest..coarsest).rev() {
         add(StageKind::NarrowLight, FINER_ROUNDS, level);
         add(StageKind::Maps, 1, level);
     }
@@ -167,7 +184,7 @@ fn positions_of_solver(settings: &FitSettings) -> Vec<Position> {
 pub fn stages(settings: &FitSettings) -> Vec<Stage> {
     let mut stages = Vec::new();
     let mut before = 0;
-    for position in positions(settings) {
+    for position in positions(settings, Finest::of(settings)) {
         before = if position.place == 0 { 0 } else { before };
         let end = position.total * (position.place + 1) / position.places;
         add_stage(&mut stages, &position, before, end);
@@ -210,7 +227,11 @@ pub fn revised(settings: &FitSettings, plan: &[Stage], stage: usize, step_in_sta
         (None, Some(last)) => (plan.len() - 1, last.steps),
         (None, None) => return Err(foreign()),
     };
-    let positions = positions(settings);
+    // What the solver has begun on the finest maps is done.
+    let begun = &plan[..=stage];
+    let is_finest = |own: &Stage| own.photo_level == 0 && own.kind.is_of_solver();
+    let finest = if begun.iter().any(is_finest) { Finest::Solver } else { Finest::of(settings) };
+    let positions = positions(settings, finest);
     let is_at = |stage: &Stage, position: &Position| {
         (stage.kind, stage.photo_level, stage.map_size, stage.visit)
             == (position.kind, position.photo_level, position.map_size, position.visit)
@@ -258,7 +279,7 @@ pub fn revised(settings: &FitSettings, plan: &[Stage], stage: usize, step_in_sta
 
 /// A plan has no place in these settings since a kind was taken away or added whole: then that setting is named.
 fn over_or(otherwise: Error, settings: &FitSettings, plan: &[Stage]) -> Error {
-    let (own, other) = (plan.iter().map(|stage| stage.kind), positions(settings));
+    let (own, other) = (plan.iter().map(|stage| stage.kind), positions(settings, Finest::of(settings)));
     for kind in own {
         if !other.iter().any(|position| position.kind == kind) {
             return of_steps(settings, kind, "these steps have begun".into());

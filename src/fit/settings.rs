@@ -155,8 +155,8 @@ pub struct FitSettings {
     #[arg(long, value_enum, default_value_t)]
     pub solver_choices: Choosing,
     /// Optimiser steps after the solver's maps, on all maps and the light, by the gradient of whole paths: for photos of
-    /// real places, whose edges, background and geometry the solver's model does not carry. Where its model holds, they
-    /// make maps worse.
+    /// real places, whose edges, background and geometry the solver's model does not carry. The solver then leaves the
+    /// finest maps to them. Where its model holds, they make maps worse.
     #[arg(long, default_value_t = FitSettings::default().solver_polish)]
     pub solver_polish: usize,
     /// Optimiser steps between two looks at the held-out views; 0 never looks.

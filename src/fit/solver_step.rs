@@ -10,6 +10,7 @@ use super::settings::Method;
 use super::solver::{Choices, Estimate, SolverScene, SolverSettings, SolverStep, StepReport, TransportError};
 use super::state::LossRow;
 use super::targets::targets;
+use super::work::halved;
 use crate::error::Result;
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::material::MaterialMaps;
@@ -23,18 +24,21 @@ impl Fitter {
     pub(super) fn solver_step(&mut self, stage: &Stage, stop: &AtomicBool) -> Result<StepOutcome> {
         let began = Instant::now();
         let whole = SolverSettings::of(&self.settings);
-        let check_choices = whole.check_choices && stage.photo_level == 0;
+        // What the model needs is asked on the finest maps that the solver makes, once.
+        let last_maps = self.state.plan.iter().rfind(|stage| stage.kind == StageKind::Maps);
+        let check_choices = whole.check_choices && last_maps.is_some_and(|last| last.map_size == stage.map_size);
+        let is_last = last_maps == Some(stage);
         // The grid is not halved with the maps: light that reaches points too far apart bounds what small maps can show.
         let settings = SolverSettings { map_size: stage.map_size, check_choices, ..whole };
-        if self.solver.as_ref().is_some_and(|solver| solver.settings.map_size != settings.map_size) {
-            self.solver = None;
-        }
-        if self.solver.is_none() {
+        if self.solver.as_ref().is_none_or(|solver| solver.settings.map_size != settings.map_size) {
+            // Photos and maps are other ones; what points of the surface see of each other and of the light is the same.
+            let traced = self.solver.take().map(|solver| solver.transport);
             let (scene, surface) = (&self.scene, &self.surface);
             let targets = targets(scene, &self.training, stage.photo_level);
-            self.solver = SolverScene::build(scene, surface, targets, &self.held_out, settings, stop)?;
+            self.solver = SolverScene::build(scene, surface, targets, &self.held_out, settings, traced, stop)?;
         }
-        let Some(solver) = self.solver.take() else { return Ok(StepOutcome::Interrupted) };
+        let Some(mut solver) = self.solver.take() else { return Ok(StepOutcome::Interrupted) };
+        solver.settings.check_choices = check_choices && is_last;
         let step = match stage.kind {
             StageKind::Maps => SolverStep::Maps,
             _ => SolverStep::Light(self.light_rounds_done()),
@@ -83,8 +87,12 @@ impl Fitter {
     /// of a session, or when `stop` was raised.
     pub fn transport_error(&self, stop: &AtomicBool) -> Option<TransportError> {
         let solver = self.solver.as_ref()?;
-        let estimate =
-            Estimate { texels: self.state.texels.clone(), light: self.state.light.clone(), ..Estimate::default() };
+        let (mut texels, mut size) = (self.state.texels.clone(), self.state.map_size);
+        // Maps that were polished may be finer than those the solver has footprints for.
+        while size > solver.settings.map_size {
+            (texels, size) = (halved(&texels, size), size / 2);
+        }
+        let estimate = Estimate { texels, light: self.state.light.clone(), ..Estimate::default() };
         solver.transport_error(&self.surface, &estimate, stop)
     }
 

@@ -113,3 +113,15 @@ fn doubled(texels: &[Texel<f32>], size: usize) -> Vec<Texel<f32>> {
         })
         .collect()
 }
+
+/// Maps of half the size: each texel is the mean of four.
+pub(super) fn halved(texels: &[Texel<f32>], size: usize) -> Vec<Texel<f32>> {
+    let half = size / 2;
+    (0..half * half)
+        .map(|index| {
+            let first = 2 * (index / half) * size + 2 * (index % half);
+            let four = [first, first + 1, first + size, first + size + 1].map(|texel| texels[texel]);
+            std::array::from_fn(|k| 0.25 * four.iter().map(|texel| texel[k]).sum::<f32>())
+        })
+        .collect()
+}

@@ -68,6 +68,7 @@ pub struct SolverScene {
 
 impl SolverScene {
     /// Traces the cache and gathers the evidence of these photographs; `held_out` judge. `None` when `stop` was raised.
+    /// `traced` is a cache of the same surface that serves if it is the one that would be traced.
     ///
     /// # Errors
     /// `InvalidScene` when no pixel of any view is evidence.
@@ -77,6 +78,7 @@ impl SolverScene {
         targets: Vec<Target>,
         held_out: &[Target],
         settings: SolverSettings,
+        traced: Option<CachedTransport>,
         stop: &AtomicBool,
     ) -> Result<Option<Self>> {
         let cached = CachedSettings {
@@ -86,7 +88,8 @@ impl SolverScene {
             lobe_strength: 1.0,
             seed: settings.seed,
         };
-        let Some(transport) = CachedTransport::build(surface, cached, settings.light_size, stop) else {
+        let build = || CachedTransport::build(surface, cached, settings.light_size, stop);
+        let Some(transport) = traced.filter(|own| own.is_of(&cached, settings.light_size)).or_else(build) else {
             return Ok(None);
         };
         let first_hits = FootprintSettings {

@@ -63,8 +63,15 @@ impl Solver {
         let views: Vec<usize> = (0..scene.views.len()).filter(|&view| !scene.views[view].held_out).collect();
         let judging: Vec<usize> = (0..scene.views.len()).filter(|&view| scene.views[view].held_out).collect();
         let judging = if settings.check_choices { targets(scene, &judging, 0) } else { Vec::new() };
-        let made =
-            SolverScene::build(scene, surface, targets(scene, &views, 0), &judging, settings, &AtomicBool::new(false))?;
+        let made = SolverScene::build(
+            scene,
+            surface,
+            targets(scene, &views, 0),
+            &judging,
+            settings,
+            None,
+            &AtomicBool::new(false),
+        )?;
         let Some(scene) = made else { return Err(Error::new(ErrorKind::Stopped, "stopped")) };
         let (width, height) = settings.light_size;
         let light = light.map_or_else(|| scene.constant_light(), |light| light.resampled(width, height));

@@ -89,6 +89,11 @@ impl CachedTransport {
         (!stop.load(Ordering::Relaxed)).then_some(made)
     }
 
+    /// Whether it is the one that is built with these settings for lights of this size.
+    pub fn is_of(&self, settings: &CachedSettings, light_size: (usize, usize)) -> bool {
+        self.settings == *settings && (self.basis.width, self.basis.height) == light_size
+    }
+
     /// Bytes it takes.
     pub fn memory_bytes(&self) -> usize {
         self.visibility.shares.len() + self.grid.points.len() * 60
