@@ -5,7 +5,7 @@ use super::choice::Choices;
 use super::estimate::Estimate;
 use super::round::{BlockWork, Round};
 use super::scene::SolverScene;
-use crate::render::cached::{CachedTransport, PointLight};
+use crate::render::cached::{CachedTransport, LightPlanes, PointLight};
 use crate::scene::Scene;
 
 /// Figures of one step.
@@ -84,7 +84,7 @@ pub fn squared_error(model: &[f32; 3], term: &PixelTerms) -> f64 {
 
 impl SolverScene {
     /// The light at the points of the grid.
-    pub fn point_light(&self, estimate: &Estimate, planes: &[Vec<f32>; 3]) -> PointLight {
+    pub fn point_light(&self, estimate: &Estimate, planes: &LightPlanes) -> PointLight {
         let reflectance = self.transport.reflectance_of_points(&estimate.texels, self.settings.map_size);
         self.transport.point_light(planes, &reflectance)
     }
@@ -117,7 +117,7 @@ impl SolverScene {
     pub(super) fn round<'a>(
         &'a self,
         estimate: &'a Estimate,
-        planes: &'a [Vec<f32>; 3],
+        planes: &'a LightPlanes,
         at_points: &'a PointLight,
     ) -> Round<'a> {
         Round {

@@ -7,7 +7,7 @@ use super::observations::{Observation, Observations};
 use super::plan::Block;
 use crate::render::cached::irradiance::add_irradiance_row;
 use crate::render::cached::lobe_sum::{LobeSums, add_lobe_row, lobe_sums, lobe_with_derivative, wide_from};
-use crate::render::cached::{CachedTransport, PointLight, ShadingPoint, ViewFootprints};
+use crate::render::cached::{CachedTransport, LightPlanes, PointLight, ShadingPoint, ViewFootprints};
 
 /// Widths that are looked at: evenly in the logarithm, closer where lobes are wide.
 pub const WIDTHS: [f32; MOST_NODES] = [0.02, 0.04, 0.075, 0.12, 0.18, 0.26, 0.37, 0.52, 0.73, 1.0];
@@ -23,7 +23,7 @@ pub struct Round<'a> {
     /// Logarithm of each view's gain.
     pub log_gains: &'a [f32],
     /// The light in planes.
-    pub light: &'a [Vec<f32>; 3],
+    pub light: &'a LightPlanes,
     /// The light at the points of the grid.
     pub at_points: &'a PointLight,
     /// Whether there is a lobe.

@@ -6,7 +6,7 @@
 
 use super::vector::WIDEST;
 use crate::math::sphere::{direction_of_texel, solid_angle_of_texel, tap_of_direction};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec4};
 
 /// Points along each side of a texel for the integrals.
 const SPLIT: usize = 8;
@@ -24,6 +24,16 @@ pub struct LightBasis {
     pub direction: [Vec<f32>; 3],
     /// `∫ hat dω` in sr.
     pub solid_angle: Vec<f32>,
+}
+
+/// A light, both as the sums over all hats and as those over a few texels read it; padded with darkness to whole
+/// vectors.
+#[derive(Clone, Debug)]
+pub struct LightPlanes {
+    /// Radiance, one plane a channel.
+    pub channels: [Vec<f32>; 3],
+    /// Radiance and 1, texel by texel.
+    pub texels: Vec<Vec4>,
 }
 
 impl LightBasis {
@@ -79,16 +89,19 @@ impl LightBasis {
         Vec3::new(self.direction[0][texel], self.direction[1][texel], self.direction[2][texel])
     }
 
-    /// A light as one plane a channel, padded.
+    /// A light in the order of the basis.
     ///
     /// # Panics
     /// Never on a light of the size of the basis; a shorter one is padded with darkness, a longer one cut.
-    pub fn planes(&self, light: &[[f32; 3]]) -> [Vec<f32>; 3] {
-        [0, 1, 2].map(|channel| {
+    pub fn planes(&self, light: &[[f32; 3]]) -> LightPlanes {
+        let channels = [0, 1, 2].map(|channel| {
             let mut plane: Vec<f32> = light.iter().take(self.count()).map(|radiance| radiance[channel]).collect();
             plane.resize(self.padded(), 0.0);
             plane
-        })
+        });
+        let [red, green, blue] = &channels;
+        let texels = (0..self.padded()).map(|texel| Vec4::new(red[texel], green[texel], blue[texel], 1.0)).collect();
+        LightPlanes { channels, texels }
     }
 }
 

@@ -9,7 +9,7 @@
 //! frame that turns with the viewer ([`super::half_vector`]).
 
 use super::half_vector;
-use super::light_basis::LightBasis;
+use super::light_basis::{LightBasis, LightPlanes};
 use super::lobe_kernel::{MOST_AT_ONCE, row_in, sums_in};
 use super::vector::versions;
 use glam::Vec3;
@@ -61,7 +61,7 @@ impl LobeSums {
 }
 
 /// The sums of a lobe at several widths, without derivatives. `sums` is as long as `widths`.
-pub fn lobe_sums(basis: &LightBasis, place: &LobePlace, light: &[Vec<f32>; 3], widths: &[f32], sums: &mut [LobeSums]) {
+pub fn lobe_sums(basis: &LightBasis, place: &LobePlace, light: &LightPlanes, widths: &[f32], sums: &mut [LobeSums]) {
     let narrow = widths.partition_point(|&width| width < wide_from(basis));
     for (sum, &width) in sums.iter_mut().zip(&widths[..narrow]) {
         *sum = half_vector::lobe_sums(basis, place, light, width, half_vector::place_count(basis, width));
@@ -75,7 +75,7 @@ pub fn lobe_sums(basis: &LightBasis, place: &LobePlace, light: &[Vec<f32>; 3], w
 ///
 /// Over hats the derivative is that of the sum. Over half vectors it is the difference of the sum at widths two per cent
 /// apart: the places move with the width, and between hats the sum bends.
-pub fn lobe_with_derivative(basis: &LightBasis, place: &LobePlace, light: &[Vec<f32>; 3], width: f32) -> LobeSums {
+pub fn lobe_with_derivative(basis: &LightBasis, place: &LobePlace, light: &LightPlanes, width: f32) -> LobeSums {
     let mut sums = [LobeSums::default()];
     if width >= wide_from(basis) {
         wide_sums_with_derivative(basis, place, light, &[width], &mut sums);
@@ -105,14 +105,14 @@ versions! {
     fn wide_sums(
         basis: &LightBasis,
         place: &LobePlace,
-        light: &[Vec<f32>; 3],
+        light: &LightPlanes,
         widths: &[f32],
         sums: &mut [LobeSums],
     ) = sums_in[false];
     fn wide_sums_with_derivative(
         basis: &LightBasis,
         place: &LobePlace,
-        light: &[Vec<f32>; 3],
+        light: &LightPlanes,
         widths: &[f32],
         sums: &mut [LobeSums],
     ) = sums_in[true];
@@ -121,29 +121,24 @@ versions! {
 
 #[cfg(test)]
 mod tests {
+    use super::super::half_vector_kernel;
     use super::super::vector::Plain;
     use super::*;
     use crate::material::{LobeGeometry, Material};
     use crate::math::random::SequentialRandom;
     use crate::math::sphere::{direction_of_texel, solid_angle_of_texel};
 
-    fn light_of(basis: &LightBasis, seed: u64) -> [Vec<f32>; 3] {
+    fn light_of(basis: &LightBasis, seed: u64) -> LightPlanes {
         let mut random = SequentialRandom::new(seed);
-        let mut light = [(); 3].map(|()| vec![0.0f32; basis.padded()]);
-        for texel in 0..basis.count() {
-            for plane in &mut light {
-                plane[texel] = 0.2 + 0.3 * random.next_number();
-            }
-        }
+        let mut light: Vec<[f32; 3]> =
+            (0..basis.count()).map(|_| [(); 3].map(|()| 0.2 + 0.3 * random.next_number())).collect();
         // A sun.
-        for plane in &mut light {
-            plane[8 * 64 + 20] = 80.0;
-        }
-        light
+        light[8 * 64 + 20] = [80.0; 3];
+        basis.planes(&light)
     }
 
     /// The integrals by brute force over the bilinear light: the lobe of the path tracer on a fine grid.
-    fn truth(light: &[Vec<f32>; 3], normal: Vec3, viewer: Vec3, width: f32) -> ([f64; 3], [f64; 3]) {
+    fn truth(light: &LightPlanes, normal: Vec3, viewer: Vec3, width: f32) -> ([f64; 3], [f64; 3]) {
         let (mut base, mut grazing) = ([0.0; 3], [0.0; 3]);
         let (fine_width, fine_height) = (64 * 10, 32 * 10);
         for row in 0..fine_height {
@@ -159,7 +154,7 @@ mod tests {
                 let tap = crate::math::sphere::tap_of_direction(direction, 64, 32);
                 for channel in 0..3 {
                     let radiance: f64 =
-                        (0..4).map(|k| f64::from(light[channel][tap.index[k] as usize] * tap.weight[k])).sum();
+                        (0..4).map(|k| f64::from(light.channels[channel][tap.index[k] as usize] * tap.weight[k])).sum();
                     base[channel] += (whole - grazing_lobe) * radiance * solid;
                     grazing[channel] += grazing_lobe * radiance * solid;
                 }
@@ -213,23 +208,30 @@ mod tests {
         let place = LobePlace { normal, to_viewer, shares: &shares };
         for width in [0.03f32, 0.2, 0.3, 0.55, 1.0] {
             let sums = lobe_with_derivative(&basis, &place, &light, width);
+            let mut plain = [LobeSums::default()];
             if width >= wide_from(&basis) {
-                let mut plain = [LobeSums::default()];
                 sums_in::<Plain, true>(&basis, &place, &light, &[width], &mut plain);
-                for channel in 0..3 {
-                    for (a, b) in [
-                        (sums.base[channel], plain[0].base[channel]),
-                        (sums.grazing[channel], plain[0].grazing[channel]),
-                        (sums.d_base[channel], plain[0].d_base[channel]),
-                    ] {
-                        assert!((a - b).abs() < 2e-5 * sums.base[channel], "{width}: {a} {b}");
-                    }
+            } else {
+                let count = half_vector::place_count(&basis, width);
+                plain[0] = half_vector_kernel::sums_in::<Plain>(&basis, &place, &light, width, count);
+                // Its derivative is a difference of sums.
+                plain[0].d_base = sums.d_base;
+            }
+            for channel in 0..3 {
+                for (a, b) in [
+                    (sums.base[channel], plain[0].base[channel]),
+                    (sums.grazing[channel], plain[0].grazing[channel]),
+                    (sums.hidden[channel / 2], plain[0].hidden[channel / 2]),
+                    (sums.d_base[channel], plain[0].d_base[channel]),
+                ] {
+                    assert!((a - b).abs() < 2e-5 * sums.base[channel], "{width}: {a} {b}");
                 }
             }
             for channel in 0..3 {
                 let mut row = vec![0.0; basis.padded()];
                 add_lobe_row(&basis, &place, width, [0.3, 1.0], &mut row);
-                let by_row: f64 = row.iter().zip(&light[channel]).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum();
+                let by_row: f64 =
+                    row.iter().zip(&light.channels[channel]).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum();
                 let direct = f64::from(0.3 * sums.base[channel] + sums.grazing[channel]);
                 assert!((by_row / direct - 1.0).abs() < 2e-6, "{width}: {by_row} {direct}");
             }

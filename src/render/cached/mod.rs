@@ -22,6 +22,7 @@
 pub mod bounce;
 pub mod footprint;
 pub mod half_vector;
+mod half_vector_kernel;
 pub mod irradiance;
 pub mod light_basis;
 mod lobe_kernel;
@@ -39,6 +40,6 @@ pub mod visibility;
 mod tests;
 
 pub use footprint::{FootprintSettings, ShadingPoint, ViewFootprints};
-pub use light_basis::LightBasis;
+pub use light_basis::{LightBasis, LightPlanes};
 pub use points::VisibilityGrid;
 pub use transport::{CachedSettings, CachedTransport, PointLight};

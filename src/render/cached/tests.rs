@@ -102,7 +102,7 @@ fn light_at_points_is_linear_with_an_exact_transpose() {
     };
     let forward = sum(&arriving, &d_arriving);
     let backward: f64 = (0..3)
-        .map(|c| planes[c].iter().zip(&d_light[c]).map(|(&a, &b)| f64::from(a) * f64::from(b)).sum::<f64>())
+        .map(|c| planes.channels[c].iter().zip(&d_light[c]).map(|(&a, &b)| f64::from(a) * f64::from(b)).sum::<f64>())
         .sum();
     assert!(count > 300 && (forward / backward - 1.0).abs() < 1e-6, "{count} {forward} {backward}");
 }

@@ -4,10 +4,9 @@ use super::bounce::BounceMatrix;
 use super::footprint::{ShadingPoint, ViewFootprints};
 use super::half_vector;
 use super::irradiance::{irradiance, irradiance_backward};
-use super::light_basis::LightBasis;
+use super::light_basis::{LightBasis, LightPlanes};
 use super::lobe_sum::{LobePlace, LobeSums, lobe_sums};
 use super::points::{NO_POINT, VisibilityGrid};
-use super::vector::WIDEST;
 use super::visibility::Visibility;
 use crate::material::texels::Texel;
 use crate::render::Surface;
@@ -100,12 +99,14 @@ impl CachedTransport {
     }
 
     /// Direct light at all points: irradiance over pi.
-    pub fn direct(&self, light: &[Vec<f32>; 3]) -> Vec<[f32; 3]> {
+    pub fn direct(&self, light: &LightPlanes) -> Vec<[f32; 3]> {
         let point_of = |index: usize| &self.grid.points[index];
         (0..self.grid.points.len())
             .into_par_iter()
             .with_min_len(64)
-            .map(|index| irradiance(&self.basis, point_of(index).shading_normal, self.visibility.of(index), light))
+            .map(|index| {
+                irradiance(&self.basis, point_of(index).shading_normal, self.visibility.of(index), &light.channels)
+            })
             .collect()
     }
 
@@ -160,7 +161,7 @@ impl CachedTransport {
     }
 
     /// Light at all points, with as many bounces as paths have.
-    pub fn point_light(&self, light: &[Vec<f32>; 3], reflectance: &[[f32; 3]]) -> PointLight {
+    pub fn point_light(&self, light: &LightPlanes, reflectance: &[[f32; 3]]) -> PointLight {
         let direct = self.direct(light);
         self.with_bounces(direct, reflectance)
     }
@@ -252,7 +253,7 @@ impl CachedTransport {
     /// Radiance of a shading point with a material of seven numbers.
     pub fn shade(
         &self,
-        light: &[Vec<f32>; 3],
+        light: &LightPlanes,
         at: &PointLight,
         footprints: &ViewFootprints,
         point: &ShadingPoint,
@@ -288,7 +289,7 @@ impl CachedTransport {
         &self,
         footprints: &ViewFootprints,
         texels: &[Texel<f32>],
-        light: &[Vec<f32>; 3],
+        light: &LightPlanes,
         at: &PointLight,
     ) -> Vec<[f32; 3]> {
         let shaded: Vec<[f32; 3]> = footprints
@@ -321,13 +322,9 @@ const ALBEDO_SPAN: f32 = 5.0;
 
 /// Directional albedo of the lobe, averaged over the hemisphere with the cosine, at even steps of log width.
 fn lobe_albedo() -> Vec<[f32; 2]> {
-    let constant = LightBasis { width: 1, height: 1, ..LightBasis::new(1, 1) };
-    let light = [(); 3].map(|()| {
-        let mut plane = vec![0.0f32; constant.padded().max(WIDEST)];
-        plane[0] = 1.0;
-        plane
-    });
-    let shares = vec![255u8; constant.padded().max(WIDEST)];
+    let constant = LightBasis::new(1, 1);
+    let light = constant.planes(&[[1.0; 3]]);
+    let shares = vec![255u8; constant.padded()];
     (0..=20)
         .map(|step| {
             let width = (ALBEDO_SPAN * (step as f32 / 20.0 - 1.0)).exp();

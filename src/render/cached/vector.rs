@@ -43,6 +43,8 @@ pub trait Vector: Copy {
     fn min(self, other: Self) -> Self;
     /// Square root.
     fn sqrt(self) -> Self;
+    /// Where a number is above zero the one of `above`, elsewhere the one of `other`.
+    fn where_positive(self, above: Self, other: Self) -> Self;
     /// Whether any number is above zero.
     fn any_positive(self) -> bool;
     /// Exponent `e` and mantissa `m` in `[1, 2)` of positive normal numbers.
@@ -162,6 +164,10 @@ impl Vector for Plain {
     #[inline(always)]
     fn sqrt(self) -> Self {
         Plain(self.0.map(f32::sqrt))
+    }
+    #[inline(always)]
+    fn where_positive(self, above: Self, other: Self) -> Self {
+        Plain(std::array::from_fn(|k| if self.0[k] > 0.0 { above.0[k] } else { other.0[k] }))
     }
     #[inline(always)]
     fn any_positive(self) -> bool {

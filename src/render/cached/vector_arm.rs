@@ -64,6 +64,10 @@ impl Vector for Neon {
         Neon(unsafe { vsqrtq_f32(self.0) })
     }
     #[inline(always)]
+    fn where_positive(self, above: Self, other: Self) -> Self {
+        Neon(unsafe { vbslq_f32(vcgtq_f32(self.0, vdupq_n_f32(0.0)), above.0, other.0) })
+    }
+    #[inline(always)]
     fn any_positive(self) -> bool {
         unsafe { vmaxvq_f32(self.0) > 0.0 }
     }

@@ -64,6 +64,13 @@ impl Vector for Avx2 {
         Avx2(unsafe { _mm256_sqrt_ps(self.0) })
     }
     #[inline(always)]
+    fn where_positive(self, above: Self, other: Self) -> Self {
+        Avx2(unsafe {
+            let is_positive = _mm256_cmp_ps::<_CMP_GT_OQ>(self.0, _mm256_setzero_ps());
+            _mm256_blendv_ps(other.0, above.0, is_positive)
+        })
+    }
+    #[inline(always)]
     fn any_positive(self) -> bool {
         unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(self.0, _mm256_setzero_ps())) != 0 }
     }
@@ -153,6 +160,13 @@ impl Vector for Avx512 {
     #[inline(always)]
     fn sqrt(self) -> Self {
         Avx512(unsafe { _mm512_sqrt_ps(self.0) })
+    }
+    #[inline(always)]
+    fn where_positive(self, above: Self, other: Self) -> Self {
+        Avx512(unsafe {
+            let is_positive = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.0, _mm512_setzero_ps());
+            _mm512_mask_blend_ps(is_positive, other.0, above.0)
+        })
     }
     #[inline(always)]
     fn any_positive(self) -> bool {

@@ -8,7 +8,7 @@ use super::clustered::ClusteredMean;
 use super::student::StudentNoise;
 use super::{ALTERNATIVES, Alternative, LOBE_ALTERNATIVES};
 use crate::render::cached::lobe_sum::{LobeSums, lobe_sums};
-use crate::render::cached::{CachedTransport, PointLight, ViewFootprints};
+use crate::render::cached::{CachedTransport, LightPlanes, PointLight, ViewFootprints};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -60,7 +60,7 @@ pub struct Judgement {
 }
 
 /// A light to judge under: its planes, and what reaches the points of the grid.
-pub type JudgedLight<'a> = (&'a [Vec<f32>; 3], &'a PointLight);
+pub type JudgedLight<'a> = (&'a LightPlanes, &'a PointLight);
 
 /// A view that judges: its footprints, and its pixels.
 pub type JudgingView<'a> = (&'a ViewFootprints, Cow<'a, [Observation]>);

@@ -38,6 +38,7 @@ fn operations<V: Vector>(numbers: &[f32]) -> Vec<f32> {
             a.max(b),
             a.min(b),
             a.sqrt(),
+            a.sub(b).where_positive(a, b.mul(V::splat(3.0))),
             exponent,
             mantissa,
             whole,
@@ -57,7 +58,7 @@ fn operations<V: Vector>(numbers: &[f32]) -> Vec<f32> {
 
 /// The same in the order of vectors of another width: operation by operation. Sums are of eight at least.
 fn compare<V: Vector>(numbers: &[f32], found: &[f32]) {
-    const OPERATIONS: usize = 15;
+    const OPERATIONS: usize = 16;
     let plain = operations::<Plain>(numbers);
     let of = |made: &[f32], lanes: usize, operation: usize, index: usize| {
         made[(index / lanes * OPERATIONS + operation) * (lanes + 2) + index % lanes]
