@@ -59,6 +59,7 @@ pub fn fit(options: &FitOptions, json: bool) -> Result<()> {
     let (prepared, fitter, settings) = with_bar(json, |tell| {
         let opened = open::open_scene(&settings.scene, &settings.read, &stop, tell)?;
         settings.fit.method = method_for(options, &opened.scene, settings.fit.method);
+        suit_solver(options, &opened.scene, &mut settings.fit);
         open::start_new(opened, settings, &stop, tell)
     })?;
     if !json && settings.fit.method == Method::Solver && !names_method(options) {
@@ -100,6 +101,13 @@ pub fn method_for(options: &FitOptions, scene: &Scene, of_settings: Method) -> M
     match names_method(options) {
         true => of_settings,
         false => Method::suited_to_settings(scene, &options.fit.typed),
+    }
+}
+
+/// Where the method is the solver, sets what suits it on this scene and was not asked for.
+pub fn suit_solver(options: &FitOptions, scene: &Scene, settings: &mut FitSettings) {
+    if settings.method == Method::Solver && options.settings.is_none() {
+        Method::suit_solver(scene, settings, &options.fit.typed);
     }
 }
 

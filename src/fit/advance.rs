@@ -46,9 +46,10 @@ impl Fitter {
     pub(super) fn move_parameters(&mut self, stage: &Stage, sums: &StepSums) {
         let Some(work) = &mut self.work else { return };
         let rate = stage.rate(self.state.step_in_stage, self.settings.final_rate);
-        let free = if stage.kind == StageKind::Diffuse { 0.0 } else { rate };
+        let of_maps = rate * stage.share_of_maps();
+        let free = if stage.kind == StageKind::Diffuse { 0.0 } else { of_maps };
         let rates = TexelRates {
-            diffuse: rate * self.settings.rate_diffuse,
+            diffuse: of_maps * self.settings.rate_diffuse,
             specular: free * self.settings.rate_specular,
             log_width: free * self.settings.rate_roughness,
         };

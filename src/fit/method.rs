@@ -1,5 +1,6 @@
 //! Which of the two ways to find maps and light: Adam by paths, or the solver.
 
+use super::settings::FitSettings;
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 
@@ -22,9 +23,19 @@ impl Method {
     /// maps, light and pictures under another light, in less time. On photographs of real places, 8 bits a channel, Adam
     /// through whole paths is some tenths of a decibel ahead on views that were held out. The README has both tables.
     pub fn suited_to(scene: &Scene) -> Self {
-        match !scene.views.is_empty() && scene.views.iter().all(|view| view.photo.is_linear()) {
-            true => Method::Solver,
-            false => Method::Paper,
+        if is_rendered(scene) { Method::Solver } else { Method::Paper }
+    }
+
+    /// Sets what suits the solver on a scene, but for what is among the `chosen` settings: no polishing where its model
+    /// holds, some after photographs, of which edges, silhouettes and errors of geometry are a large part. The solver is
+    /// then left with the sizes below the full one, and does with one more of them.
+    pub fn suit_solver(scene: &Scene, settings: &mut FitSettings, chosen: &[String]) {
+        let is_free = |name: &str| !chosen.iter().any(|own| own == name);
+        if is_free("solver-polish") {
+            settings.solver_polish = if is_rendered(scene) { 0 } else { POLISH_OF_PHOTOGRAPHS };
+        }
+        if is_free("solver-levels") && settings.solver_polish > 0 {
+            settings.solver_levels = FitSettings::default().solver_levels + 1;
         }
     }
 
@@ -41,6 +52,14 @@ impl Method {
         chosen.iter().any(|name| OF_ADAM.contains(&name.as_str()))
     }
 }
+
+/// Whether all photos hold linear radiance.
+fn is_rendered(scene: &Scene) -> bool {
+    !scene.views.is_empty() && scene.views.iter().all(|view| view.photo.is_linear())
+}
+
+/// From here on more steps bring a scene of photographs little: 60 leave a tenth of a decibel, 150 bring none.
+const POLISH_OF_PHOTOGRAPHS: usize = 80;
 
 /// Settings that say nothing to the solver, unless it polishes.
 const OF_ADAM: [&str; 15] = [
@@ -64,7 +83,6 @@ const OF_ADAM: [&str; 15] = [
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::FitSettings;
     use crate::image::Image;
     use crate::scene::Photo;
     use crate::scene::demo::{DemoSettings, build};

@@ -73,6 +73,12 @@ impl Stage {
         final_rate + (1.0 - final_rate) * 0.5 * (1.0 + (std::f32::consts::PI * progress).cos())
     }
 
+    /// The share of the step sizes that maps are moved by. What polishing begins with is near: full steps only add
+    /// noise to it, which takes most of the polishing to settle.
+    pub fn share_of_maps(&self) -> f32 {
+        if self.kind == StageKind::Polish { 0.25 } else { 1.0 }
+    }
+
     /// Strength of the specular lobe at a step of this stage: rises linearly over the first `ramp` steps of its kind.
     pub fn lobe_strength(&self, step: usize, ramp: usize) -> f32 {
         match self.kind {

@@ -2,7 +2,7 @@
 
 use clap::Parser;
 use patina::cli::arguments::{Arguments, Task};
-use patina::cli::fit::{method_for, run_settings};
+use patina::cli::fit::{method_for, run_settings, suit_solver};
 use patina::fit::{FitSettings, Method, Preset};
 use patina::image::Image;
 use patina::scene::{Photo, Scene};
@@ -50,6 +50,17 @@ fn linear_photos_are_given_to_the_solver_unless_something_else_was_asked_for() {
     assert_eq!(of(&linear, &["--consistency", "exact"]), Method::Paper, "the solver knows no consistency");
     assert_eq!(of(&bytes, &[]), Method::Paper);
     assert_eq!(of(&bytes, &["--method", "solver"]), Method::Solver);
+    let polish = |scene: &Scene, more: &[&str]| {
+        let words = ["patina", "fit", "scene", "-o", "run", "--method", "solver"].iter().chain(more);
+        let Some(Task::Fit(options)) = Arguments::try_parse_from(words).unwrap().task else { unreachable!() };
+        let mut settings = run_settings(&options).unwrap().fit;
+        suit_solver(&options, scene, &mut settings);
+        (settings.solver_polish, settings.solver_levels)
+    };
+    assert_eq!((polish(&linear, &[]), polish(&bytes, &[])), ((0, 2), (80, 3)));
+    assert_eq!(polish(&linear, &["--solver-polish", "5"]), (5, 3));
+    assert_eq!(polish(&bytes, &["--solver-polish", "0"]), (0, 2));
+    assert_eq!(polish(&bytes, &["--solver-levels", "1"]), (80, 1));
 
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("settings.toml");

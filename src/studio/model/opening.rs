@@ -91,6 +91,7 @@ impl Model {
                 PathKind::Scene => {
                     let opened = open::open_scene(&path, &settings.read, &context.stop, &tell)?;
                     settings.fit.method = Method::suited_to(&opened.scene);
+                    Method::suit_solver(&opened.scene, &mut settings.fit, &[]);
                     context.tell("small pictures", 0.0);
                     Ok(Done::SceneRead(Box::new(SceneRead::new(Some(path), settings, opened))))
                 }

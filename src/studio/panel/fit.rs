@@ -92,8 +92,15 @@ fn presets(ui: &mut Ui, model: &mut Model) {
     ui.add_enabled_ui(!live, |ui| {
         ui.horizontal(|ui| {
             for preset in Preset::ALL {
-                let (exclude, seed, method) = (own.exclude.clone(), own.seed, own.method);
-                let settings = FitSettings { exclude, seed, method, ..FitSettings::preset(preset) };
+                let settings = FitSettings {
+                    exclude: own.exclude.clone(),
+                    seed: own.seed,
+                    // What the scene asks for.
+                    method: own.method,
+                    solver_polish: own.solver_polish,
+                    solver_levels: own.solver_levels,
+                    ..FitSettings::preset(preset)
+                };
                 let differences = settings.differences(&FitSettings::default());
                 let mut text = match differences.is_empty() {
                     true => "The usual settings".to_owned(),
