@@ -4,7 +4,7 @@
 //! probability, their azimuths follow the golden angle, and the frame turns with the viewer: the sum is a smooth
 //! function of normal, viewer and width, without noise. The light and its visibility are read bilinearly, as the hats are.
 //!
-//! What a place weighs and where it reads is found for several places at a time ([`super::half_vector_kernel`]); the
+//! What a place weighs and where it reads is found for several places at a time (`half_vector_kernel.rs`); the
 //! light is read one by one.
 
 use super::half_vector_kernel::{row_in, sums_in};
