@@ -3,8 +3,10 @@
 use super::arguments::{CheckOptions, CompareOptions, Layer, RelightOptions, RenderOptions};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::export::RunFolder;
+use crate::fit::Suited;
 use crate::fit::views::{ViewUse, uses_of};
 use crate::image::file;
+use crate::insight::report::number;
 use crate::insight::scores::{aggregate, score_halves};
 use crate::job::pictures::{light_of, matched, parameters, relit, surface_of};
 use crate::job::prepare::RunSettings;
@@ -24,9 +26,18 @@ pub fn check(options: &CheckOptions, json: bool) -> Result<()> {
     let bvh = Bvh::build(&scene.mesh.positions, &scene.mesh.triangles)?;
     let report = doctor::check_with(&scene, &bvh);
     if json {
-        println!("{}", serde_json::json!({"event": "check", "findings": report.findings, "views": report.views}));
+        println!(
+            "{}",
+            serde_json::json!({"event": "check", "findings": report.findings, "views": report.views,
+            "texels_resolved": report.texels_resolved})
+        );
     } else {
         println!("{}: {} triangles, {} views", scene.name, scene.mesh.triangles.len(), scene.views.len());
+        if let Some(texels) = report.texels_resolved {
+            let size = Suited::to(&scene, report.texels_resolved).map_size.unwrap_or_default();
+            let texels = number::whole(texels as u64);
+            println!("the photos resolve some {texels} texels of the surface, about maps of {size} x {size}");
+        }
         for finding in &report.findings {
             println!("{finding}");
         }

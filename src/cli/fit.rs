@@ -3,12 +3,11 @@
 use super::arguments::{DemoOptions, FitOptions, ResumeOptions};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::export::RunFolder;
-use crate::fit::{FitSettings, Method};
+use crate::fit::{FitSettings, Method, Suited};
 use crate::insight::report::data::ReportData;
-use crate::job::open::{self, OpenStage, Tell};
+use crate::job::open::{self, OpenStage, OpenedScene, Tell};
 use crate::job::prepare::RunSettings;
 use crate::job::{self, Event, JobHandle, demo};
-use crate::scene::Scene;
 use crate::scene::demo::DemoSettings;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
@@ -50,6 +49,7 @@ pub fn demo(options: &DemoOptions, json: bool) -> Result<()> {
 pub fn fit(options: &FitOptions, json: bool) -> Result<()> {
     let mut settings = run_settings(options)?;
     settings.fit.validate()?;
+    let of_preset = settings.fit.map_size;
     let folder = RunFolder::create(&options.output)?;
     if !json {
         eprintln!("reading and checking {}", settings.scene.display());
@@ -58,12 +58,18 @@ pub fn fit(options: &FitOptions, json: bool) -> Result<()> {
     stop_on_interrupt(Arc::clone(&stop));
     let (prepared, fitter, settings) = with_bar(json, |tell| {
         let opened = open::open_scene(&settings.scene, &settings.read, &stop, tell)?;
-        settings.fit.method = method_for(options, &opened.scene, settings.fit.method);
-        suit_solver(options, &opened.scene, &mut settings.fit);
+        suit(options, &opened, &mut settings.fit);
         open::start_new(opened, settings, &stop, tell)
     })?;
-    if !json && settings.fit.method == Method::Solver && !names_method(options) {
+    let is_free = |name: &str| options.settings.is_none() && !options.fit.typed.iter().any(|own| own == name);
+    if !json && settings.fit.method == Method::Solver && is_free("method") {
         eprintln!("the method is the solver, since all photos hold linear radiance; --method paper takes Adam");
+    }
+    if !json && settings.fit.map_size < of_preset && is_free("map-size") {
+        let size = settings.fit.map_size;
+        eprintln!(
+            "maps of {size} x {size} texels are about what the photos resolve; --map-size {of_preset} takes larger ones"
+        );
     }
     let job = job::start(prepared, fitter, settings, folder.clone())?;
     watch(job, &folder, &stop, json)
@@ -96,24 +102,18 @@ pub fn run_settings(options: &FitOptions) -> Result<RunSettings> {
     Ok(settings)
 }
 
-/// The method that options ask for, which is that of `settings`, or, where they name none, the one for the scene.
-pub fn method_for(options: &FitOptions, scene: &Scene, of_settings: Method) -> Method {
-    match names_method(options) {
-        true => of_settings,
-        false => Method::suited_to_settings(scene, &options.fit.typed),
+/// Sets what suits the scene and was not asked for. A settings file asks for all: it says what differs from the defaults.
+pub fn suit(options: &FitOptions, opened: &OpenedScene, settings: &mut FitSettings) {
+    if options.settings.is_some() {
+        return;
     }
-}
-
-/// Where the method is the solver, sets what suits it on this scene and was not asked for.
-pub fn suit_solver(options: &FitOptions, scene: &Scene, settings: &mut FitSettings) {
-    if settings.method == Method::Solver && options.settings.is_none() {
-        Method::suit_solver(scene, settings, &options.fit.typed);
+    let suited = Suited::to(&opened.scene, opened.report.texels_resolved);
+    let asked = settings.clone();
+    suited.apply(settings, &options.fit.typed);
+    if settings.method == Method::Paper {
+        // What the solver would do is no setting of such a run.
+        (settings.solver_polish, settings.solver_levels) = (asked.solver_polish, asked.solver_levels);
     }
-}
-
-/// Whether options name a method: by itself, or in a settings file, which says all that differs from the defaults.
-fn names_method(options: &FitOptions) -> bool {
-    options.settings.is_some() || options.fit.typed.iter().any(|name| name == "method")
 }
 
 fn absolute(path: &Path) -> PathBuf {

@@ -53,6 +53,8 @@ pub struct Fitter {
     pub(super) work: Option<StageWork>,
     /// What the solver traced; `None` under Adam and before its first step.
     pub(super) solver: Option<SolverScene>,
+    /// How often the photos that it has were halved.
+    pub(super) solver_photo_level: usize,
     /// What the solver's light is known by; of nothing under Adam and before its first round on the light.
     pub(super) light_known: LightKnown,
     /// What judging views say of the model's freedoms; `None` under Adam and before the maps of full size.
@@ -151,6 +153,7 @@ impl Fitter {
             figures,
             work: None,
             solver: None,
+            solver_photo_level: 0,
             light_known: LightKnown::default(),
             choices: None,
         })

@@ -7,7 +7,8 @@
 //! up, `weigh` applies consistency, `advance` moves the numbers, `held_out` judges them. [`state`] is all they change.
 //! `change` takes other settings between two steps, [`views`] leaves photos out, [`figures`] are for who watches.
 //! [`describe`] lists, reads and sets each setting by name, [`presets`] are whole sets of them.
-//! [`solver`] is the other method, `solver_step` does its steps, `method` says which of both suits a scene.
+//! [`solver`] is the other method, `solver_step` does its steps, [`suited`] says which of both a scene
+//! asks for, and what else it does.
 //! [`start`] chooses where to begin, [`gauge`] names the freedom that photographs leave, [`checkpoint`] saves it all.
 //!
 //! A fit knows nothing of threads that watch it, of files it came from or of windows: that is `job`.
@@ -35,6 +36,7 @@ pub mod solver;
 mod solver_step;
 pub mod start;
 pub mod state;
+pub mod suited;
 pub mod targets;
 pub mod views;
 mod weigh;
@@ -45,4 +47,5 @@ pub use fitter::{Fitter, StepOutcome};
 pub use presets::Preset;
 pub use settings::{FitSettings, Method};
 pub use state::{FitState, LossRow};
+pub use suited::Suited;
 pub use views::ViewUse;

@@ -2,6 +2,7 @@
 
 use super::settings::{FitSettings, Method, Steps};
 use crate::error::{Error, ErrorKind, Place, Result};
+use of_solver::{SolverShare, positions_of_solver};
 use serde::{Deserialize, Serialize};
 
 /// Which maps move in a stage. The light moves in all of them.
@@ -50,6 +51,11 @@ pub struct Stage {
 }
 
 impl Stage {
+    /// Whether another stage works on photos and maps of the same sizes.
+    pub fn is_of_level_of(&self, other: &Stage) -> bool {
+        (self.photo_level, self.map_size) == (other.photo_level, other.map_size)
+    }
+
     /// Name for logs: `diffuse 1/4`, `all 1/1`, `maps 1/2` or `maps`.
     pub fn name(&self) -> String {
         let kind = match self.kind {
@@ -90,14 +96,6 @@ impl Stage {
     }
 }
 
-/// Width of the solver's maps on a coarse level, at least.
-const LEAST_COARSE_MAP: usize = 128;
-/// Rounds of the solver on the light on each level but the coarsest.
-const FINER_ROUNDS: usize = 2;
-/// Rounds on the coarsest level after its first maps, which tell the lobes they are done with; maps are made anew after
-/// them.
-const ROUNDS_AFTER_MAPS: usize = 1;
-
 /// A place in the order of stages, whether or not steps fall to it.
 struct Position {
     kind: StageKind,
@@ -114,9 +112,9 @@ struct Position {
 
 /// All positions of a fit, in order. The first step goes from coarse to fine with maps that grow along; the second works
 /// on maps of full size, on halved photographs first.
-fn positions(settings: &FitSettings, finest: Finest) -> Vec<Position> {
+fn positions(settings: &FitSettings, share: SolverShare) -> Vec<Position> {
     if settings.method == Method::Solver {
-        return positions_of_solver(settings, finest);
+        return positions_of_solver(settings, share);
     }
     let mut positions = Vec::new();
     let mut add = |kind: StageKind, total: usize, places: usize, maps_grow: bool| {
@@ -138,59 +136,12 @@ fn positions(settings: &FitSettings, finest: Finest) -> Vec<Position> {
     positions
 }
 
-/// Who makes the finest maps of the solver's method, where there are coarser ones.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Finest {
-    /// The solver.
-    Solver,
-    /// Polishing alone. Photographs are not what the solver's model says at edges and silhouettes: its finest maps take
-    /// most of the time there and end further off than Adam's from the coarser ones.
-    Polish,
-}
-
-impl Finest {
-    fn of(settings: &FitSettings) -> Self {
-        if settings.solver_polish > 0 { Finest::Polish } else { Finest::Solver }
-    }
-}
-
-/// Light and maps on the coarsest level, twice where there is a finer one; on each of those some rounds more, and maps
-/// anew. What is done there is cheap, and the second maps know which lobes the first have shown.
-fn positions_of_solver(settings: &FitSettings, finest: Finest) -> Vec<Position> {
-    let mut positions: Vec<Position> = Vec::new();
-    let mut add = |kind: StageKind, total: usize, photo_level: usize| {
-        let map_size = settings.map_size >> photo_level;
-        if total > 0 {
-            let is_like = |other: &&Position| (other.kind, other.photo_level) == (kind, photo_level);
-            let visit = positions.iter().filter(is_like).count();
-            positions.push(Position { kind, photo_level, map_size, visit, total, place: 0, places: 1 });
-        }
-    };
-    let is_large = |level: &usize| settings.map_size >> level >= LEAST_COARSE_MAP;
-    let coarsest = (1..settings.solver_levels).take_while(is_large).last().unwrap_or(0);
-    let wide = settings.solver_rounds / 2;
-    add(StageKind::WideLight, wide, coarsest);
-    add(StageKind::NarrowLight, settings.solver_rounds - wide, coarsest);
-    add(StageKind::Maps, 1, coarsest);
-    if coarsest > 0 {
-        add(StageKind::NarrowLight, ROUNDS_AFTER_MAPS, coarsest);
-        add(StageKind::Maps, 1, coarsest);
-    }
-    let finest = usize::from(finest == Finest::Polish);
-    for level in (finest..coarsest).rev() {
-        add(StageKind::NarrowLight, FINER_ROUNDS, level);
-        add(StageKind::Maps, 1, level);
-    }
-    add(StageKind::Polish, settings.solver_polish, 0);
-    positions
-}
-
 /// The stages of a fit that begins: the steps of a kind are shared evenly over its levels; a level without any is left
 /// out.
 pub fn stages(settings: &FitSettings) -> Vec<Stage> {
     let mut stages = Vec::new();
     let mut before = 0;
-    for position in positions(settings, Finest::of(settings)) {
+    for position in positions(settings, SolverShare::of(settings)) {
         before = if position.place == 0 { 0 } else { before };
         let end = position.total * (position.place + 1) / position.places;
         add_stage(&mut stages, &position, before, end);
@@ -233,11 +184,8 @@ pub fn revised(settings: &FitSettings, plan: &[Stage], stage: usize, step_in_sta
         (None, Some(last)) => (plan.len() - 1, last.steps),
         (None, None) => return Err(foreign()),
     };
-    // What the solver has begun on the finest maps is done.
-    let begun = &plan[..=stage];
-    let is_finest = |own: &Stage| own.photo_level == 0 && own.kind.is_of_solver();
-    let finest = if begun.iter().any(is_finest) { Finest::Solver } else { Finest::of(settings) };
-    let positions = positions(settings, finest);
+    let share = SolverShare::of(settings).as_begun(&plan[..=stage], settings.map_size);
+    let positions = positions(settings, share);
     let is_at = |stage: &Stage, position: &Position| {
         (stage.kind, stage.photo_level, stage.map_size, stage.visit)
             == (position.kind, position.photo_level, position.map_size, position.visit)
@@ -285,7 +233,7 @@ pub fn revised(settings: &FitSettings, plan: &[Stage], stage: usize, step_in_sta
 
 /// A plan has no place in these settings since a kind was taken away or added whole: then that setting is named.
 fn over_or(otherwise: Error, settings: &FitSettings, plan: &[Stage]) -> Error {
-    let (own, other) = (plan.iter().map(|stage| stage.kind), positions(settings, Finest::of(settings)));
+    let (own, other) = (plan.iter().map(|stage| stage.kind), positions(settings, SolverShare::of(settings)));
     for kind in own {
         if !other.iter().any(|position| position.kind == kind) {
             return of_steps(settings, kind, "these steps have begun".into());
@@ -310,5 +258,6 @@ fn of_steps(settings: &FitSettings, kind: StageKind, message: String) -> Error {
         .remedy("steps that are done stay done: ask for at least as many, or start a new run")
 }
 
+mod of_solver;
 #[cfg(test)]
 mod tests;

@@ -67,7 +67,8 @@ pub struct FitSettings {
     /// solver.
     #[arg(long, value_enum, default_value_t)]
     pub method: Method,
-    /// Width and height of the maps in texels: a power of two, 16 to 8192.
+    /// Width and height of the maps in texels: a power of two, 16 to 8192. When not given, neither here nor by a settings
+    /// file, maps are made smaller where less holds what the photos resolve, but not below 256.
     #[arg(long, default_value_t = FitSettings::default().map_size)]
     pub map_size: usize,
     /// Height of the environment in texels; it is twice as wide.

@@ -26,16 +26,19 @@ impl Fitter {
         let whole = SolverSettings::of(&self.settings);
         // What the model needs is asked on the finest maps that the solver makes, once.
         let last_maps = self.state.plan.iter().rfind(|stage| stage.kind == StageKind::Maps);
-        let check_choices = whole.check_choices && last_maps.is_some_and(|last| last.map_size == stage.map_size);
+        let check_choices = whole.check_choices && last_maps.is_some_and(|last| last.is_of_level_of(stage));
         let is_last = last_maps == Some(stage);
         // The grid is not halved with the maps: light that reaches points too far apart bounds what small maps can show.
         let settings = SolverSettings { map_size: stage.map_size, check_choices, ..whole };
-        if self.solver.as_ref().is_none_or(|solver| solver.settings.map_size != settings.map_size) {
+        let level = (stage.photo_level, stage.map_size);
+        let is_of_level = |solver: &SolverScene| (self.solver_photo_level, solver.settings.map_size) == level;
+        if !self.solver.as_ref().is_some_and(is_of_level) {
             // Photos and maps are other ones; what points of the surface see of each other and of the light is the same.
             let traced = self.solver.take().map(|solver| solver.transport);
             let (scene, surface) = (&self.scene, &self.surface);
             let targets = targets(scene, &self.training, stage.photo_level);
             self.solver = SolverScene::build(scene, surface, targets, &self.held_out, settings, traced, stop)?;
+            self.solver_photo_level = stage.photo_level;
         }
         let Some(mut solver) = self.solver.take() else { return Ok(StepOutcome::Interrupted) };
         solver.settings.check_choices = check_choices && is_last;

@@ -36,7 +36,7 @@ pub fn pace(plan: &[Stage], losses: &[LossRow]) -> (f64, f64) {
 fn relative_cost(plan: &[Stage], stage: &Stage, step: usize) -> f64 {
     let shrunk = 0.5f64.powi(stage.photo_level as i32);
     let is_first_of_level =
-        step == 0 && plan.iter().find(|own| own.map_size == stage.map_size).is_some_and(|own| own.kind == stage.kind);
+        step == 0 && plan.iter().find(|own| own.is_of_level_of(stage)).is_some_and(|own| own.kind == stage.kind);
     // The cache is traced before the first step of a level.
     let cache = if is_first_of_level && stage.kind.is_of_solver() { 6.0 * shrunk } else { 0.0 };
     cache

@@ -2,9 +2,10 @@
 
 use clap::Parser;
 use patina::cli::arguments::{Arguments, Task};
-use patina::cli::fit::{method_for, run_settings, suit_solver};
+use patina::cli::fit::{run_settings, suit};
 use patina::fit::{FitSettings, Method, Preset};
 use patina::image::Image;
+use patina::job::open::OpenedScene;
 use patina::scene::{Photo, Scene};
 
 #[test]
@@ -39,11 +40,7 @@ fn linear_photos_are_given_to_the_solver_unless_something_else_was_asked_for() {
     let mut bytes = Scene::clone(&linear);
     let size = (bytes.views[0].photo.width(), bytes.views[0].photo.height());
     bytes.views[0].photo = Photo::Srgb8(Image::filled(size.0, size.1, [90; 3]));
-    let of = |scene: &Scene, more: &[&str]| {
-        let words = ["patina", "fit", "scene", "-o", "run"].iter().chain(more);
-        let Some(Task::Fit(options)) = Arguments::try_parse_from(words).unwrap().task else { unreachable!() };
-        method_for(&options, scene, run_settings(&options).unwrap().fit.method)
-    };
+    let of = |scene: &Scene, more: &[&str]| suited(scene, None, more).method;
     assert_eq!(of(&linear, &[]), Method::Solver);
     assert_eq!(of(&linear, &["--map-size", "64", "--preset", "careful"]), Method::Solver);
     assert_eq!(of(&linear, &["--method", "paper"]), Method::Paper);
@@ -51,10 +48,7 @@ fn linear_photos_are_given_to_the_solver_unless_something_else_was_asked_for() {
     assert_eq!(of(&bytes, &[]), Method::Paper);
     assert_eq!(of(&bytes, &["--method", "solver"]), Method::Solver);
     let polish = |scene: &Scene, more: &[&str]| {
-        let words = ["patina", "fit", "scene", "-o", "run", "--method", "solver"].iter().chain(more);
-        let Some(Task::Fit(options)) = Arguments::try_parse_from(words).unwrap().task else { unreachable!() };
-        let mut settings = run_settings(&options).unwrap().fit;
-        suit_solver(&options, scene, &mut settings);
+        let settings = suited(scene, None, &[&["--method", "solver"], more].concat());
         (settings.solver_polish, settings.solver_levels)
     };
     assert_eq!((polish(&linear, &[]), polish(&bytes, &[])), ((0, 2), (80, 3)));
@@ -66,4 +60,27 @@ fn linear_photos_are_given_to_the_solver_unless_something_else_was_asked_for() {
     let file = folder.path().join("settings.toml");
     patina::files::write_bytes(&file, b"[fit]\nseed = 2\n").unwrap();
     assert_eq!(of(&linear, &["--settings", file.to_str().unwrap()]), Method::Paper, "the file is of Adam");
+}
+
+#[test]
+fn maps_hold_what_the_photos_resolve_unless_a_size_was_asked_for() {
+    let scene = crate::support::scene().0;
+    let of = |more: &[&str]| suited(&scene, Some(100_000.0), more).map_size;
+    assert_eq!(of(&[]), 512);
+    assert_eq!(of(&["--map-size", "2048"]), 2048, "the default, but typed");
+    assert_eq!(of(&["--preset", "quick"]), 512);
+    assert_eq!(suited(&scene, Some(10_000.0), &["--preset", "quick"]).map_size, 256);
+    assert_eq!(suited(&scene, Some(1e9), &["--preset", "quick"]).map_size, 512);
+    assert_eq!(suited(&scene, None, &[]).map_size, 2048);
+}
+
+/// The settings of a line for a scene of which photos resolve so many texels.
+fn suited(scene: &Scene, texels_resolved: Option<f64>, more: &[&str]) -> FitSettings {
+    let words = ["patina", "fit", "scene", "-o", "run"].iter().chain(more);
+    let Some(Task::Fit(options)) = Arguments::try_parse_from(words).unwrap().task else { unreachable!() };
+    let mut opened = OpenedScene { scene: scene.clone(), report: Default::default(), timings: Vec::new() };
+    opened.report.texels_resolved = texels_resolved;
+    let mut settings = run_settings(&options).unwrap().fit;
+    suit(&options, &opened, &mut settings);
+    settings
 }

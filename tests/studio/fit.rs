@@ -149,9 +149,11 @@ fn a_preset_sets_the_form_and_undo_brings_the_own_settings_back() {
     let own = studio.model().edits.fit.clone();
     assert!(studio.says("Differs from the usual"));
     studio.click("Quick");
-    assert_eq!(studio.model().edits.fit, FitSettings::preset(Preset::Quick));
+    // The photos are small, and so are the maps that suit them.
+    assert_eq!(studio.model().edits.fit, FitSettings { map_size: 256, ..FitSettings::preset(Preset::Quick) });
     studio.click("Balanced");
-    assert!(!studio.says("Differs from the usual"), "the balanced preset is the usual one");
+    assert!(studio.says("Differs from the usual: method paper"), "the method is no matter of presets");
+    assert!(!studio.says("method paper,"), "all else of the balanced preset is the usual");
     studio.frames(4);
     studio.press(Modifiers::COMMAND, Key::Z);
     studio.press(Modifiers::COMMAND, Key::Z);

@@ -70,11 +70,12 @@ fn a_scene_of_linear_photos_is_given_to_the_solver_and_presets_leave_it_there() 
     assert!(studio.log().contains("the method is the solver"), "{}", studio.log());
     studio.act(Act::PanelFit);
     studio.control("Method");
+    assert!(!studio.says("Differs from the usual"), "what suits the scene is the usual there");
     assert!(studio.controls("Consistency").is_empty(), "the solver knows none");
     studio.click("Careful");
     assert_eq!(
         studio.model().edits.fit,
-        FitSettings { method: Method::Solver, ..FitSettings::preset(Preset::Careful) }
+        FitSettings { method: Method::Solver, map_size: 256, ..FitSettings::preset(Preset::Careful) }
     );
 }
 

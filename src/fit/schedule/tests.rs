@@ -94,9 +94,17 @@ fn the_solver_visits_the_smallest_size_twice_and_keeps_its_plan_wherever_it_is()
     let polished = FitSettings { solver_polish: 3, ..settings.clone() };
     let plan_with = stages(&polished);
     assert_eq!(plan_with.len(), 6);
+    // Polishing wants the structure of full maps from halved photos.
+    assert!(plan_with.iter().all(|stage| stage.map_size == 256));
+    assert_eq!(plan_with.iter().map(|stage| stage.photo_level).collect::<Vec<_>>(), [1, 1, 1, 1, 1, 0]);
     for (stage, step) in walk(&plan_with) {
         assert_eq!(revised(&polished, &plan_with, stage, step).unwrap(), plan_with, "{stage}, {step}");
     }
+    // Left out once more, whole photos follow with maps of the same size.
+    let without = revised(&settings, &plan_with, 2, 0).unwrap();
+    assert_eq!(without[..5], plan_with[..5]);
+    assert_eq!(without[5..].iter().map(Stage::name).collect::<Vec<_>>(), ["narrow light", "maps"]);
+    assert!(without[5..].iter().all(|stage| stage.map_size == 256 && !stage.is_of_level_of(&without[4])));
     // Without coarser maps the solver makes what there is.
     let small = stages(&FitSettings { map_size: 64, ..polished });
     assert_eq!(small.iter().map(Stage::name).collect::<Vec<_>>(), ["wide light", "narrow light", "maps", "polish"]);

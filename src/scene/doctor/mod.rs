@@ -13,6 +13,7 @@
 //! | [`pixel_centre`], [`edge_profile`] | where do pixel centres lie in the intrinsics, to a hundredth of a pixel |
 //! | [`pictures`] | encoding, clipping, darkness |
 //! | [`exposure`] | do views agree on the radiance of what they share |
+//! | [`resolution`] | how much detail of the surface do the photos resolve |
 //!
 //! It refuses to repair: it measures and says what to do.
 
@@ -25,6 +26,7 @@ pub mod overlay;
 pub mod pictures;
 pub mod pixel_centre;
 pub mod probe;
+pub mod resolution;
 pub mod silhouette;
 
 pub use overlay::overlay;
@@ -46,6 +48,9 @@ pub struct Report {
     pub pixel_centre: Option<CentreMeasurement>,
     /// Figures of the mesh.
     pub mesh: geometry::MeshCheck,
+    /// How many texels of one size the whole surface takes so that each is as small as what a pixel covers where training
+    /// photos look closely; `None` where none of them sees it.
+    pub texels_resolved: Option<f64>,
 }
 
 /// Figures of a view. Shares are in [0, 1].
@@ -123,6 +128,7 @@ pub fn check_with(scene: &Scene, bvh: &Bvh) -> Report {
     cameras::check_sight(scene, &probes, &mut report);
     silhouette::check(scene, &probes, &mut report);
     pictures::check(scene, &probes, &mut report);
+    resolution::check(scene, &probes, &mut report);
     exposure::check(scene, bvh, &probes, &mut report);
     pixel_centre::check(scene, bvh, &mut report);
     sort(&mut report.findings);

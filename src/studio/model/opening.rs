@@ -7,7 +7,7 @@ use super::project::Atlas;
 use super::{Cursor, Done, Edits, Model, Project, StageSwitches, Workspace};
 use crate::error::{Finding, Severity};
 use crate::export::RunFolder;
-use crate::fit::Method;
+use crate::fit::{FitSettings, Method, Suited};
 use crate::image::RgbImage;
 use crate::insight::report::data::StageTime;
 use crate::job::demo;
@@ -30,6 +30,7 @@ const THUMBNAIL_SIDE: usize = 128;
 pub struct SceneRead {
     path: Option<PathBuf>,
     settings: RunSettings,
+    suited: Option<Suited>,
     scene: Arc<Scene>,
     mesh: Arc<Mesh>,
     findings: Vec<Finding>,
@@ -90,10 +91,11 @@ impl Model {
                 }
                 PathKind::Scene => {
                     let opened = open::open_scene(&path, &settings.read, &context.stop, &tell)?;
-                    settings.fit.method = Method::suited_to(&opened.scene);
-                    Method::suit_solver(&opened.scene, &mut settings.fit, &[]);
+                    let suited = Suited::to(&opened.scene, opened.report.texels_resolved);
+                    suited.apply(&mut settings.fit, &[]);
                     context.tell("small pictures", 0.0);
-                    Ok(Done::SceneRead(Box::new(SceneRead::new(Some(path), settings, opened))))
+                    let read = SceneRead::new(Some(path), settings, opened);
+                    Ok(Done::SceneRead(Box::new(SceneRead { suited: Some(suited), ..read })))
                 }
             }
         });
@@ -155,6 +157,10 @@ impl Model {
         if self.edits.fit.method == Method::Solver {
             self.log.note("The photos hold linear radiance: the method is the solver");
         }
+        if read.suited.is_some() && self.edits.fit.map_size < FitSettings::default().map_size {
+            let size = self.edits.fit.map_size;
+            self.log.note(format!("Maps of {size} x {size} texels are about what the photos resolve"));
+        }
         self.eye = OrbitEye::around(bounds(&read.mesh));
         if let Some(truth) = &read.scene.truth {
             let light = Arc::new(truth.environment.clone());
@@ -172,6 +178,7 @@ impl Model {
             scene: Some(read.scene),
             mesh: read.mesh,
             surface: None,
+            suited: read.suited,
             settings: read.settings,
             findings: read.findings,
             timings: read.timings,
@@ -292,6 +299,7 @@ impl SceneRead {
         let (thumbnails, clipped_shares) = small_pictures(&scene);
         SceneRead {
             path,
+            suited: None,
             settings,
             scene: Arc::new(scene),
             mesh: Arc::new(mesh),

@@ -4,6 +4,7 @@ use super::known::Known;
 use super::lights::LightName;
 use crate::atlas::{AtlasQuality, chart_borders};
 use crate::error::Finding;
+use crate::fit::Suited;
 use crate::image::{GreyImage, RgbImage};
 use crate::insight::cursor::UvIndex;
 use crate::insight::report::data::StageTime;
@@ -53,6 +54,8 @@ pub struct Project {
     pub mesh: Arc<Mesh>,
     /// The surface with the atlas; `None` until it is made.
     pub surface: Option<Arc<Surface>>,
+    /// What suits the scene where nobody chose; `None` for runs and for scenes made in code.
+    pub suited: Option<Suited>,
     /// Settings beyond those of the fit: how it was read, how the atlas is made.
     pub settings: RunSettings,
     /// How good the atlas is, where it was made here.

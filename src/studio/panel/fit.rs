@@ -89,19 +89,20 @@ fn presets(ui: &mut Ui, model: &mut Model) {
     heading(ui, "Preset");
     let live = model.fit.status.is_live();
     let own = model.edits.fit.clone();
+    let for_scene = |preset| {
+        let mut settings = FitSettings::preset(preset);
+        match model.project.as_ref().and_then(|project| project.suited.as_ref()) {
+            Some(suited) => suited.apply(&mut settings, &[]),
+            None => (settings.solver_polish, settings.solver_levels) = (own.solver_polish, own.solver_levels),
+        }
+        settings
+    };
+    let usual = for_scene(Preset::Balanced);
+    let presets = Preset::ALL.map(|preset| (preset, for_scene(preset)));
     ui.add_enabled_ui(!live, |ui| {
         ui.horizontal(|ui| {
-            for preset in Preset::ALL {
-                let settings = FitSettings {
-                    exclude: own.exclude.clone(),
-                    seed: own.seed,
-                    // What the scene asks for.
-                    method: own.method,
-                    solver_polish: own.solver_polish,
-                    solver_levels: own.solver_levels,
-                    ..FitSettings::preset(preset)
-                };
-                let differences = settings.differences(&FitSettings::default());
+            for (preset, settings) in presets {
+                let differences = settings.differences(&usual);
                 let mut text = match differences.is_empty() {
                     true => "The usual settings".to_owned(),
                     false => "Differs from the usual settings in".to_owned(),
@@ -109,6 +110,8 @@ fn presets(ui: &mut Ui, model: &mut Model) {
                 for (name, value, usual) in differences {
                     text += &format!("\n{}: {value} instead of {usual}", form::words(&name));
                 }
+                let settings =
+                    FitSettings { exclude: own.exclude.clone(), seed: own.seed, method: own.method, ..settings };
                 let response = ui.selectable_label(own == settings, preset.label()).on_hover_text(text);
                 if response.clicked() {
                     model.edits.fit = settings;
@@ -116,7 +119,7 @@ fn presets(ui: &mut Ui, model: &mut Model) {
             }
         });
     });
-    let changed = own.differences(&FitSettings::default());
+    let changed = own.differences(&usual);
     if !changed.is_empty() {
         let names: Vec<String> = changed.iter().map(|(name, value, _)| format!("{name} {value}")).collect();
         ui.label(RichText::new(format!("Differs from the usual: {}", names.join(", "))).weak());

@@ -1,0 +1,100 @@
+//! The stages of the solver's method: which maps it makes on photos of which size, and what it leaves to polishing.
+
+use super::{Position, Stage, StageKind};
+use crate::fit::settings::FitSettings;
+
+/// Width of the solver's maps on a coarse level, at least.
+const LEAST_COARSE_MAP: usize = 128;
+/// Rounds of the solver on the light on each level but the coarsest.
+const FINER_ROUNDS: usize = 2;
+/// Rounds on the coarsest level after its first maps, which tell the lobes they are done with; maps are made anew after
+/// them.
+const ROUNDS_AFTER_MAPS: usize = 1;
+
+/// Who makes the finest maps of the solver's method, where there are coarser ones.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Finest {
+    /// The solver.
+    Solver,
+    /// Polishing alone. Photographs are not what the solver's model says at edges and silhouettes: its finest maps take
+    /// most of the time there and end further off than Adam's from the coarser ones.
+    Polish,
+}
+
+/// The size of the solver's maps on halved photos.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum CoarseMaps {
+    /// Halved as often as the photos.
+    Halved,
+    /// Halved once less. Polishing takes few and small steps: what it shall keep of structure the maps must have before.
+    Finer,
+}
+
+/// The solver's part in maps of all sizes.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) struct SolverShare {
+    finest: Finest,
+    coarse_maps: CoarseMaps,
+}
+
+impl SolverShare {
+    pub(super) fn of(settings: &FitSettings) -> Self {
+        match settings.solver_polish > 0 {
+            true => SolverShare { finest: Finest::Polish, coarse_maps: CoarseMaps::Finer },
+            false => SolverShare { finest: Finest::Solver, coarse_maps: CoarseMaps::Halved },
+        }
+    }
+
+    /// The same once the stages of a plan have begun: what the solver has begun on whole photos is done, and maps have the
+    /// sizes they began with.
+    pub(super) fn as_begun(self, begun: &[Stage], map_size: usize) -> Self {
+        let of_solver = || begun.iter().filter(|stage| stage.kind.is_of_solver());
+        let has_finest = of_solver().any(|stage| stage.photo_level == 0);
+        let coarse = of_solver().find(|stage| stage.photo_level > 0);
+        SolverShare {
+            finest: if has_finest { Finest::Solver } else { self.finest },
+            coarse_maps: coarse.map_or(self.coarse_maps, |stage| {
+                match stage.map_size << stage.photo_level == map_size {
+                    true => CoarseMaps::Halved,
+                    false => CoarseMaps::Finer,
+                }
+            }),
+        }
+    }
+}
+
+/// Light and maps on the coarsest level, twice where there is a finer one; on each of those some rounds more, and maps
+/// anew. What is done there is cheap, and the second maps know which lobes the first have shown.
+pub(super) fn positions_of_solver(settings: &FitSettings, share: SolverShare) -> Vec<Position> {
+    let SolverShare { finest, coarse_maps } = share;
+    let mut positions: Vec<Position> = Vec::new();
+    let map_size_at = |photo_level: usize| match coarse_maps {
+        CoarseMaps::Halved => settings.map_size >> photo_level,
+        CoarseMaps::Finer => settings.map_size >> photo_level.saturating_sub(1),
+    };
+    let mut add = |kind: StageKind, total: usize, photo_level: usize| {
+        let map_size = map_size_at(photo_level);
+        if total > 0 {
+            let is_like = |other: &&Position| (other.kind, other.photo_level) == (kind, photo_level);
+            let visit = positions.iter().filter(is_like).count();
+            positions.push(Position { kind, photo_level, map_size, visit, total, place: 0, places: 1 });
+        }
+    };
+    let is_large = |level: &usize| map_size_at(*level) >= LEAST_COARSE_MAP;
+    let coarsest = (1..settings.solver_levels).take_while(is_large).last().unwrap_or(0);
+    let wide = settings.solver_rounds / 2;
+    add(StageKind::WideLight, wide, coarsest);
+    add(StageKind::NarrowLight, settings.solver_rounds - wide, coarsest);
+    add(StageKind::Maps, 1, coarsest);
+    if coarsest > 0 {
+        add(StageKind::NarrowLight, ROUNDS_AFTER_MAPS, coarsest);
+        add(StageKind::Maps, 1, coarsest);
+    }
+    let finest = usize::from(finest == Finest::Polish);
+    for level in (finest..coarsest).rev() {
+        add(StageKind::NarrowLight, FINER_ROUNDS, level);
+        add(StageKind::Maps, 1, level);
+    }
+    add(StageKind::Polish, settings.solver_polish, 0);
+    positions
+}
