@@ -6,7 +6,7 @@
 //! | `settings.toml` | settings of the run | `patina fit`, at its start |
 //! | `checkpoint` | state to resume from | `patina fit`, while it runs |
 //! | `diffuse.exr specular.exr roughness.exr seen.exr env.exr mesh.obj` | the result | `patina fit`, at its end |
-//! | `diffuse_deviation.exr specular_deviation.exr roughness_deviation.exr` | standard deviations of the maps given the light | `patina fit --method solver`, at its end |
+//! | `diffuse_deviation.exr specular_deviation.exr roughness_deviation.exr` | standard deviations of the maps | `patina fit --method solver`, at its end |
 //! | `lobe_sharing.exr` | number of texels that share a texel's lobe, 0 where no pixel shows the texel best | the same |
 //! | `choices.exr` | what views that took no part chose: 1 no lobe, 2 one lobe a region, 3 lobes of their own; 0 where less than two judge | the same, unless resumed after its maps |
 //! | `environment_evidence.exr` | what a texel of the light is known by: highlights (red), background (green), diffuse light and shadows (blue); the rest to 1 is belief | the same, unless resumed after its rounds |

@@ -28,6 +28,9 @@ struct Header {
     #[serde(default)]
     variances: usize,
     light_texels: usize,
+    /// Of versions that kept it.
+    #[serde(default)]
+    light_scale_deviation: Option<f64>,
     views: usize,
     losses: Vec<LossRow>,
     non_finite: Vec<(String, u64)>,
@@ -45,6 +48,7 @@ pub fn write(path: &Path, state: &FitState) -> Result<()> {
         map_size: state.map_size,
         variances: state.variances.len(),
         light_texels: state.light.len(),
+        light_scale_deviation: state.light_scale_deviation,
         views: state.log_gains.len(),
         losses: state.losses.clone(),
         non_finite: state.non_finite.clone(),
@@ -181,6 +185,7 @@ pub fn read(path: &Path) -> Result<FitState> {
         moments: texel_moments,
         variances,
         light,
+        light_scale_deviation: header.light_scale_deviation,
         light_moments,
         log_gains,
         gain_moments,
@@ -219,6 +224,7 @@ mod tests {
             moments: Moments::zeros(4),
             variances: vec![[0.25; 8]; 4],
             light: vec![[1.5, 1e5, 1e-7]; 8],
+            light_scale_deviation: Some(f64::MAX),
             light_moments: Moments::zeros(8),
             log_gains: vec![0.1, -0.1],
             gain_moments: Moments::zeros(2),

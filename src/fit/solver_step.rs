@@ -71,10 +71,11 @@ impl Fitter {
         before + self.stage().filter(is_round).map_or(0, |_| self.state.step_in_stage)
     }
 
-    /// Standard deviations of the maps' values given the light, as maps: only the solver knows them, and only at its end.
+    /// Standard deviations of the maps' values, as maps: only the solver knows them, and only at its end.
     pub fn deviations(&self) -> Option<MaterialMaps> {
-        self.knows_deviations()
-            .then(|| Estimate::deviations(&self.state.texels, &self.state.variances, self.state.map_size))
+        let state = &self.state;
+        let of_light = state.light_scale_deviation;
+        self.knows_deviations().then(|| Estimate::deviations(&state.texels, &state.variances, state.map_size, of_light))
     }
 
     fn knows_deviations(&self) -> bool {
@@ -111,9 +112,9 @@ impl Fitter {
     }
 
     /// Standard deviation, relative, of the factor that light and reflectance have in common, see
-    /// [`LightKnown`](super::solver::light_evidence::LightKnown). `None` as for [`Self::light_evidence`].
+    /// [`FitState::light_scale_deviation`](super::FitState).
     pub fn light_scale_deviation(&self) -> Option<f64> {
-        (!self.light_known.shares.is_empty()).then_some(self.light_known.scale_deviation)
+        self.state.light_scale_deviation
     }
 
     /// What views that took no part say of the model's freedoms: which are needed where, what they bought and what they
@@ -156,6 +157,9 @@ impl Fitter {
         state.variances = estimate.variances;
         state.light = estimate.light;
         self.light_known = estimate.light_known;
+        if !self.light_known.shares.is_empty() {
+            state.light_scale_deviation = Some(self.light_known.scale_deviation.min(f64::MAX));
+        }
         for (&view, gain) in solver.views.iter().zip(estimate.log_gains) {
             state.log_gains[view] = gain;
         }

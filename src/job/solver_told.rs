@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// What is told of maps and light; everything is `None` under Adam. Large parts are shared, so that a copy costs little.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SolverTold {
-    /// Standard deviations of the maps' values given the light, in their units; known once the maps are made.
+    /// Standard deviations of the maps' values, in their units; known once the maps are made.
     pub deviations: Option<Arc<MaterialMaps>>,
     /// Number of texels that share a texel's lobe, 0 where none was found; known once the maps are made.
     pub lobe_sharing: Option<Arc<GreyImage>>,
@@ -125,7 +125,7 @@ impl SolverTold {
             median(&mut values)
         };
         facts.push(fact(
-            "median standard deviation given the light",
+            "median standard deviation",
             format!(
                 "diffuse {:.3}, specular {:.3}, roughness {:.3}",
                 median_of(&|texel| deviations.diffuse.pixels()[texel].element_sum() / 3.0),

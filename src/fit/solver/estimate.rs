@@ -27,6 +27,18 @@ pub struct Estimate {
 /// Standard deviations of a texel's numbers when nothing is known of it.
 const UNKNOWN_DEVIATION: [f32; 8] = [0.3, 0.3, 0.3, 0.2, 0.2, 0.2, 0.5, 0.0];
 
+/// A light's scale that is known less well counts as known to this, relative.
+const MOST_LIGHT_DEVIATION: f64 = 0.25;
+/// What arrives at places that face differently errs by this share of what the scale may err by: what all have in common
+/// is no error of a map after its factor. With it 91 % of the texels of `toys` are held by stated intervals of nine tenths,
+/// 90 % of the demo and, in the mean, 92 % of the hard cases; without it 88, 89 and 77 %.
+const IRRADIANCE_SHARE: f32 = 0.5;
+/// By what a light that was found puts lobes off, all alike where they see the same of it: specular reflectance relative
+/// to itself, logarithm of the width. A lobe sees more detail of the light than irradiance does, which photos tell little
+/// of. Chosen on `toys` and the demo, of whose texels intervals without it held 68 and 86 % in specular reflectance, 83
+/// and 75 % in roughness.
+const LOBE_LIGHT_ERRORS: [f32; 2] = [0.25, 0.08];
+
 /// What is known of a texel before anything was solved.
 pub const START_TEXEL: Texel<f32> = [0.4, 0.4, 0.4, 0.08, 0.08, 0.08, -0.7, 0.0];
 
@@ -83,12 +95,31 @@ impl Estimate {
     }
 
     /// Standard deviations of the values of maps of this size, by [`Estimate::texels`] and [`Estimate::variances`]: how far
-    /// a value may be off given the light that was found. A texel that was not solved for has those of what is believed of
-    /// any surface.
-    pub fn deviations(texels: &[Texel<f32>], variances: &[Texel<f32>], map_size: usize) -> MaterialMaps {
+    /// a value may be off. A texel that was not solved for has those of what is believed of any surface.
+    /// `light_deviation` is the relative standard deviation of the light's scale; `None` for a light that is known, which
+    /// adds nothing.
+    pub fn deviations(
+        texels: &[Texel<f32>],
+        variances: &[Texel<f32>],
+        map_size: usize,
+        light_deviation: Option<f64>,
+    ) -> MaterialMaps {
+        let [of_diffuse, of_specular, of_log_width] = light_deviation.map_or([0.0; 3], |deviation| {
+            let of_diffuse = IRRADIANCE_SHARE * deviation.min(MOST_LIGHT_DEVIATION) as f32;
+            [of_diffuse, LOBE_LIGHT_ERRORS[0], LOBE_LIGHT_ERRORS[1]]
+        });
         let deviation = |texel: usize, number: usize| {
             let own = variances[texel];
-            if own[7] > 0.0 && own[number] > 0.0 { own[number].sqrt() } else { UNKNOWN_DEVIATION[number] }
+            if own[7] > 0.0 && own[number] > 0.0 {
+                let by_light = match number {
+                    0..3 => of_diffuse * texels[texel][number],
+                    3..6 => of_specular * texels[texel][number],
+                    _ => of_log_width,
+                };
+                own[number].sqrt().hypot(by_light)
+            } else {
+                UNKNOWN_DEVIATION[number]
+            }
         };
         let colour = |first: usize| {
             Image::from_fn(map_size, map_size, |row, column| {
@@ -117,5 +148,31 @@ impl Estimate {
             self.light.iter().map(|&radiance| Vec3::from_array(radiance).max(Vec3::ZERO)).collect();
         pixels.resize(width * height, Vec3::ZERO);
         Environment { radiance: Image::from_pixels(width, height, pixels) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_light_that_was_found_makes_intervals_wider_and_one_that_is_known_does_not() {
+        let texels = [[0.4, 0.4, 0.4, 0.1, 0.1, 0.1, -0.5, 0.0], START_TEXEL];
+        let texels = [texels[0], texels[0], texels[1], texels[1]];
+        let solved = [0.01, 0.01, 0.01, 0.0001, 0.0001, 0.0001, 0.04, 3.0];
+        let variances = [solved, solved, [0.0; 8], [0.0; 8]];
+        let of = |light| Estimate::deviations(&texels, &variances, 2, light);
+        let (known, close, open) = (of(None), of(Some(0.1)), of(Some(f64::MAX)));
+        assert_eq!(known.diffuse[(0, 0)], Vec3::splat(0.1));
+        assert_eq!(known.specular[(0, 0)], Vec3::splat(0.01));
+        let near = |value: f32, expected: f32| assert!((value - expected).abs() < 1e-6, "{value} for {expected}");
+        near(close.diffuse[(0, 0)].x, 0.1f32.hypot(0.05 * 0.4));
+        near(open.diffuse[(0, 0)].x, 0.1f32.hypot(0.125 * 0.4));
+        near(close.specular[(0, 0)].y, 0.01f32.hypot(0.25 * 0.1));
+        // r = exp(-1), dr = 2 r d(ln a).
+        near(close.roughness[(0, 0)], 2.0 * (-1.0f32).exp() * 0.2f32.hypot(0.08));
+        // Where nothing was found, what is believed of any surface is left as it is.
+        assert_eq!(close.diffuse[(1, 0)], known.diffuse[(1, 0)]);
+        assert_eq!(known.diffuse[(1, 1)], Vec3::splat(UNKNOWN_DEVIATION[0]));
     }
 }

@@ -13,7 +13,7 @@ const LOOKED_AT: usize = 60_000;
 /// What is told of a texel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Told {
-    /// Standard deviation of the diffuse reflectance given the light, mean of the channels.
+    /// Standard deviation of the diffuse reflectance, mean of the channels.
     Diffuse,
     /// The same of the specular reflectance F0.
     Specular,

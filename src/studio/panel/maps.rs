@@ -35,13 +35,9 @@ impl Map {
         (Map::TimesSeen, "Seen", "How many photos see a texel; hatched: none"),
         (Map::PhotoError, "Error", "Root mean square error over the photos that see a texel"),
         (Map::Disagreement, "Disagreement", "Variance over photos of the gradient by diffuse, in [0, 1]"),
-        (Map::Told(Told::Diffuse), "± diffuse", "Standard deviation of diffuse given the light, mean of the channels"),
-        (
-            Map::Told(Told::Specular),
-            "± specular",
-            "Standard deviation of specular given the light, mean of the channels",
-        ),
-        (Map::Told(Told::Roughness), "± roughness", "Standard deviation of roughness given the light"),
+        (Map::Told(Told::Diffuse), "± diffuse", "Standard deviation of diffuse, mean of the channels"),
+        (Map::Told(Told::Specular), "± specular", "Standard deviation of specular, mean of the channels"),
+        (Map::Told(Told::Roughness), "± roughness", "Standard deviation of roughness"),
         (
             Map::Told(Told::LobeSharing),
             "Shared lobe",

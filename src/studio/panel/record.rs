@@ -183,9 +183,9 @@ fn body(ui: &mut Ui, model: &mut Model, record: &TexelRecord) {
 fn uncertainty(model: &Model, (row, column): (usize, usize)) -> Vec<(&'static str, String, &'static str)> {
     let Some(project) = &model.project else { return Vec::new() };
     let named = [
-        (Told::Diffuse, "± diffuse", "Standard deviation given the light, mean of the channels"),
-        (Told::Specular, "± specular", "Standard deviation given the light, mean of the channels"),
-        (Told::Roughness, "± roughness", "Standard deviation given the light"),
+        (Told::Diffuse, "± diffuse", "Standard deviation, mean of the channels"),
+        (Told::Specular, "± specular", "Standard deviation, mean of the channels"),
+        (Told::Roughness, "± roughness", "Standard deviation"),
         (Told::LobeSharing, "Shared lobe", "Texels that share this texel's specular lobe"),
         (
             Told::Choice,
