@@ -112,7 +112,9 @@ fn main() -> Result<()> {
         lights.log_rmse.aligned,
         lights.brightest_angle_degrees.unwrap_or(f64::NAN)
     );
-    let deviations = Estimate::deviations(&solver.estimate.texels, &solver.estimate.variances, settings.map_size);
+    let of_light = (!settings.fixed_light).then_some(solver.estimate.light_known.scale_deviation);
+    let Estimate { texels, variances, .. } = &solver.estimate;
+    let deviations = Estimate::deviations(texels, variances, settings.map_size, of_light);
     if let Some(held) = interval_coverage(&maps, &deviations, &truth.maps, &truth.texels_seen, &errors) {
         println!(
             "90 % intervals hold the truth: diffuse (aligned) {:.3}, specular {:.3}, roughness {:.3}",
