@@ -10,7 +10,7 @@
 //! | `lobe_sharing.exr` | number of texels that share a texel's lobe, 0 where no pixel shows the texel best | the same |
 //! | `choices.exr` | what views that took no part chose: 1 no lobe, 2 one lobe a region, 3 lobes of their own; 0 where less than two judge | the same, unless resumed after its maps |
 //! | `environment_evidence.exr` | what a texel of the light is known by: highlights (red), background (green), diffuse light and shadows (blue); the rest to 1 is belief | the same, unless resumed after its rounds |
-//! | `light_scale.json` | how far photos leave the factor open that light and reflectance have in common: `relative_deviation`, null where they say nothing | the same |
+//! | `light_scale.json` | how far photos leave the factor open that light and reflectance have in common: `relative_deviation`, null where they say nothing | `patina fit --method solver`, at its end |
 //! | `loss.csv` | the loss of every step | `patina fit` |
 //! | `capture.csv` | how each photo lies against the model's picture: shift, roll, gain, doubtful mask | `patina fit`, at its end |
 //! | `report.json report.html` | scores and pictures | `patina fit`, `patina compare` |

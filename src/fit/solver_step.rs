@@ -112,9 +112,9 @@ impl Fitter {
     }
 
     /// Standard deviation, relative, of the factor that light and reflectance have in common, see
-    /// [`FitState::light_scale_deviation`](super::FitState).
+    /// [`FitState::light_scale_deviation`](super::FitState), infinite where the photos leave the factor open.
     pub fn light_scale_deviation(&self) -> Option<f64> {
-        self.state.light_scale_deviation
+        self.state.light_scale_deviation.map(|deviation| if deviation < f64::MAX { deviation } else { f64::INFINITY })
     }
 
     /// What views that took no part say of the model's freedoms: which are needed where, what they bought and what they
