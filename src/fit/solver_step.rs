@@ -114,7 +114,7 @@ impl Fitter {
     /// Standard deviation, relative, of the factor that light and reflectance have in common, see
     /// [`FitState::light_scale_deviation`](super::FitState), infinite where the photos leave the factor open.
     pub fn light_scale_deviation(&self) -> Option<f64> {
-        self.state.light_scale_deviation.map(|deviation| if deviation < f64::MAX { deviation } else { f64::INFINITY })
+        self.state.told_light_scale_deviation()
     }
 
     /// What views that took no part say of the model's freedoms: which are needed where, what they bought and what they
@@ -158,7 +158,7 @@ impl Fitter {
         state.light = estimate.light;
         self.light_known = estimate.light_known;
         if !self.light_known.shares.is_empty() {
-            state.light_scale_deviation = Some(self.light_known.scale_deviation.min(f64::MAX));
+            state.keep_light_scale_deviation(self.light_known.scale_deviation);
         }
         for (&view, gain) in solver.views.iter().zip(estimate.log_gains) {
             state.log_gains[view] = gain;

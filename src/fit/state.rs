@@ -71,11 +71,37 @@ pub struct FitState {
 }
 
 impl FitState {
+    /// Keeps what a round on the light left open of its scale, as a number a checkpoint can hold.
+    pub(super) fn keep_light_scale_deviation(&mut self, deviation: f64) {
+        self.light_scale_deviation = Some(deviation.min(f64::MAX));
+    }
+
+    /// What [`Self::keep_light_scale_deviation`] was given: infinite where the photos leave the scale open.
+    pub(super) fn told_light_scale_deviation(&self) -> Option<f64> {
+        self.light_scale_deviation.map(|deviation| if deviation < f64::MAX { deviation } else { f64::INFINITY })
+    }
+
     /// Counts numbers that were not finite, under a name that says where and what they were.
     pub(super) fn count_non_finite(&mut self, name: String, count: u64) {
         match self.non_finite.iter_mut().find(|(known, _)| *known == name) {
             Some((_, total)) => *total += count,
             None => self.non_finite.push((name, count)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_open_scale_of_the_light_is_told_as_open() {
+        let mut state = FitState::default();
+        assert_eq!(state.told_light_scale_deviation(), None);
+        for deviation in [0.0, 0.05, f64::INFINITY] {
+            state.keep_light_scale_deviation(deviation);
+            assert!(state.light_scale_deviation.is_some_and(f64::is_finite), "a checkpoint cannot hold {state:?}");
+            assert_eq!(state.told_light_scale_deviation(), Some(deviation));
         }
     }
 }

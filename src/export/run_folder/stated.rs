@@ -120,3 +120,23 @@ impl RunFolder {
         self.file(LOBE_SHARING_FILE).is_file().then(|| self.read_grey(LOBE_SHARING_FILE)).transpose()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_open_scale_of_the_light_is_written_as_null_and_read_as_open() {
+        let parent = tempfile::tempdir().unwrap();
+        let folder = RunFolder::create(&parent.path().join("run")).unwrap();
+        assert_eq!(folder.read_light_scale_deviation().unwrap(), None);
+        for (deviation, text) in [(0.25, "0.25"), (f64::INFINITY, "null")] {
+            folder.write_light_scale_deviation(deviation).unwrap();
+            let written = std::fs::read_to_string(folder.file(LIGHT_SCALE_FILE)).unwrap();
+            assert_eq!(written, format!("{{\"relative_deviation\":{text}}}"));
+            assert_eq!(folder.read_light_scale_deviation().unwrap(), Some(deviation));
+        }
+        crate::files::write_bytes(&folder.file(LIGHT_SCALE_FILE), b"{}").unwrap();
+        assert_eq!(folder.read_light_scale_deviation().unwrap_err().kind(), ErrorKind::Malformed);
+    }
+}
