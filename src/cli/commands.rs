@@ -29,7 +29,7 @@ pub fn check(options: &CheckOptions, json: bool) -> Result<()> {
         println!(
             "{}",
             serde_json::json!({"event": "check", "findings": report.findings, "views": report.views,
-            "texels_resolved": report.texels_resolved})
+            "texels_resolved": report.texels_resolved, "surface": report.surface})
         );
     } else {
         println!("{}: {} triangles, {} views", scene.name, scene.mesh.triangles.len(), scene.views.len());

@@ -14,12 +14,16 @@
 //! | [`pictures`] | encoding, clipping, darkness |
 //! | [`exposure`] | do views agree on the radiance of what they share |
 //! | [`resolution`] | how much detail of the surface do the photos resolve |
+//! | [`facets`], [`closeness`], [`detail`] | is the mesh too coarse, are walls or gaps or patterns as fine as pixels |
 //!
 //! It refuses to repair: it measures and says what to do.
 
 pub mod cameras;
+pub mod closeness;
+pub mod detail;
 pub mod edge_profile;
 pub mod exposure;
+pub mod facets;
 pub mod geometry;
 pub mod normals;
 pub mod overlay;
@@ -51,6 +55,21 @@ pub struct Report {
     /// How many texels of one size the whole surface takes so that each is as small as what a pixel covers where training
     /// photos look closely; `None` where none of them sees it.
     pub texels_resolved: Option<f64>,
+    /// Of what training photos show of the surface, how much is too fine for them, or too coarse in the mesh.
+    pub surface: SurfaceCheck,
+}
+
+/// Shares in [0, 1] of what training photos show of the surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct SurfaceCheck {
+    /// Triangles that are wide and turn much from one to the next: [`facets`].
+    pub coarse_share: f64,
+    /// Walls thinner than a pixel: [`closeness`].
+    pub thin_share: f64,
+    /// What lies within a pixel of another surface: [`closeness`].
+    pub touching_share: f64,
+    /// What has its contrast in single pixels: [`detail`].
+    pub fine_share: f64,
 }
 
 /// Figures of a view. Shares are in [0, 1].
@@ -129,6 +148,9 @@ pub fn check_with(scene: &Scene, bvh: &Bvh) -> Report {
     silhouette::check(scene, &probes, &mut report);
     pictures::check(scene, &probes, &mut report);
     resolution::check(scene, &probes, &mut report);
+    facets::check(scene, &probes, &mut report);
+    closeness::check(scene, bvh, &probes, &mut report);
+    detail::check(scene, bvh, &probes, &mut report);
     exposure::check(scene, bvh, &probes, &mut report);
     pixel_centre::check(scene, bvh, &mut report);
     sort(&mut report.findings);

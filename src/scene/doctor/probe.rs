@@ -6,6 +6,8 @@ use glam::{Vec2, Vec3};
 
 /// About this many pixels of a view are probed.
 const PROBES_PER_VIEW: usize = 16_000;
+/// A pixel's piece of a surface that is seen edge on counts as if it were seen under this cosine.
+const LEAST_COSINE: f32 = 0.05;
 
 /// What the ray through a pixel's centre meets.
 #[derive(Clone, Copy, Debug)]
@@ -57,6 +59,15 @@ pub fn surface_at(mesh: &Mesh, hit: &Hit) -> Option<(Vec3, Vec3, Vec3)> {
         (i * weights.x + j * weights.y + k * weights.z).normalize_or(normal)
     };
     Some((a * weights.x + b * weights.y + c * weights.z, normal, shading))
+}
+
+/// The piece of surface that a pixel shows around a place with a normal, in squared world units.
+pub fn area_in_pixel(camera: &Camera, place_in_world: Vec3, normal_in_world: Vec3) -> f32 {
+    let to_camera = camera.position_in_world() - place_in_world;
+    let cosine = to_camera.normalize_or_zero().dot(normal_in_world).abs().max(LEAST_COSINE);
+    let depth = -to_camera.dot(camera.forward_in_world());
+    // The pixel's solid angle, (depth / distance)^3 / focal^2, times distance^2 / cosine.
+    depth.powi(3) / (to_camera.length() * camera.focal_pixels.x * camera.focal_pixels.y * cosine)
 }
 
 /// Whether the view has a mask: some pixel is background.

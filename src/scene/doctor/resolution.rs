@@ -5,16 +5,13 @@
 //! a piece goes into the whole surface, since an atlas spreads its texels evenly.
 
 use super::Report;
-use super::probe::{Probe, surface_at};
-use crate::scene::{Camera, Mesh, Scene};
-use glam::Vec3;
+use super::probe::{Probe, area_in_pixel, surface_at};
+use crate::scene::{Mesh, Scene};
 use rayon::prelude::*;
 
 /// Share of the surface, each piece counted as often as it is seen, that is covered by larger pixels than the one that
 /// counts: grazing and distant looks at a place go unheeded, and so do a few very close ones.
 const COARSER_SHARE: f64 = 0.75;
-/// A pixel's piece of a surface that is seen edge on counts as if it were seen under this cosine.
-const LEAST_COSINE: f32 = 0.05;
 
 /// Sets [`Report::texels_resolved`] from what the probes of the training views meet.
 pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
@@ -39,15 +36,6 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
     report.texels_resolved = chosen.map(|area| surface_area(&scene.mesh) / area);
 }
 
-/// The piece of surface that a pixel shows around a place with a normal, in squared world units.
-fn area_in_pixel(camera: &Camera, place_in_world: Vec3, normal_in_world: Vec3) -> f32 {
-    let to_camera = camera.position_in_world() - place_in_world;
-    let cosine = to_camera.normalize_or_zero().dot(normal_in_world).abs().max(LEAST_COSINE);
-    let depth = -to_camera.dot(camera.forward_in_world());
-    // The pixel's solid angle, (depth / distance)^3 / focal^2, times distance^2 / cosine.
-    depth.powi(3) / (to_camera.length() * camera.focal_pixels.x * camera.focal_pixels.y * cosine)
-}
-
 fn surface_area(mesh: &Mesh) -> f64 {
     (0..mesh.triangles.len()).map(|triangle| 0.5 * f64::from(mesh.area_vector(triangle).length())).sum()
 }
@@ -58,7 +46,8 @@ mod tests {
     use crate::image::Image;
     use crate::scene::demo::{DemoSettings, build};
     use crate::scene::doctor;
-    use crate::scene::{Photo, PixelState, View};
+    use crate::scene::{Camera, Photo, PixelState, View};
+    use glam::Vec3;
     use std::f32::consts::FRAC_PI_2;
 
     /// A square of 2 x 2 units in the plane z = 0, and cameras on its axis that see it whole or in part.
