@@ -1,7 +1,8 @@
 //! A tile of the maps: blocks that were solved one by one, put right together.
 //!
 //! Blocks book a pixel at the one texel it covers most. Here diffuse reflectance is solved with the footprints inside the
-//! tile, pixels are relieved of what they cover of the neighbours, and what is left tells of lobes ([`super::lobe_tree`]).
+//! tile, pixels are relieved of what they cover of the neighbours, of their diffuse reflectance and of what their lobes
+//! send, and what is left tells of the lobe of the one texel ([`super::lobe_tree`]).
 
 use super::block::PixelTerms;
 use super::cell_sums::System;
@@ -47,8 +48,10 @@ pub(super) struct TilePixel {
     pub(super) clipped: bool,
     /// Where its taps lie.
     taps: std::ops::Range<usize>,
-    /// What its lobe sends.
+    /// What the lobes of the texels it shows send.
     pub(super) lobe: [f32; 3],
+    /// How much more that is than if all of it had the lobe of its own texel.
+    beside: [f32; 3],
     /// Takes no part: it judges.
     pub(super) withheld: bool,
 }
@@ -142,6 +145,7 @@ impl Tile {
                     clipped: observation.clipped,
                     taps: start..tile.taps.len(),
                     lobe: [0.0; 3],
+                    beside: [0.0; 3],
                     withheld: false,
                 });
             }
@@ -182,10 +186,23 @@ impl Tile {
     pub(super) fn set_lobes(&mut self) {
         let widths = log_widths();
         for pixel in &mut self.pixels {
-            let mean = &self.lobes[pixel.texel].mean;
-            let stencil = WidthStencil::new(&widths, mean[3], pixel.nodes.0..pixel.nodes.1);
-            let terms = &pixel.terms;
-            pixel.lobe = [0, 1, 2].map(|c| mean[c] as f32 * stencil.of(&terms.base, c) + stencil.of(&terms.grazing, c));
+            let of_texel = |texel: usize| {
+                let mean = &self.lobes[texel].mean;
+                let stencil = WidthStencil::new(&widths, mean[3], pixel.nodes.0..pixel.nodes.1);
+                let of =
+                    |c: usize| mean[c] as f32 * stencil.of(&pixel.terms.base, c) + stencil.of(&pixel.terms.grazing, c);
+                [0, 1, 2].map(of)
+            };
+            let own = of_texel(pixel.texel);
+            let mut beside = [0.0f32; 3];
+            for &(texel, weight) in &self.taps[pixel.taps.clone()] {
+                if texel as usize != pixel.texel {
+                    let lobe = of_texel(texel as usize);
+                    (0..3).for_each(|c| beside[c] += weight * (lobe[c] - own[c]));
+                }
+            }
+            pixel.beside = beside;
+            pixel.lobe = [0, 1, 2].map(|c| own[c] + beside[c]);
         }
     }
 
@@ -291,7 +308,8 @@ impl Tile {
             for c in 0..3 {
                 let e = f64::from(pixel.terms.arriving[c]);
                 let neighbours = self.under(pixel, c) - self.rho[pixel.texel][c];
-                let radiance = f64::from(pixel.terms.radiance[c] - pixel.terms.arriving[c] * neighbours);
+                let beside = pixel.beside[c] + pixel.terms.arriving[c] * neighbours;
+                let radiance = f64::from(pixel.terms.radiance[c] - beside);
                 // A width that was not looked at is the narrowest that was, and worse.
                 for (sums, stencil) in own.iter_mut().zip(&stencils[pixel.nodes.0]) {
                     let s = f64::from(stencil.of(&pixel.terms.base, c));
