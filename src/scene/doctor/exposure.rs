@@ -55,7 +55,10 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
                     ),
                 )
                 .at(Place::View(view.name.clone()))
-                .remedy("fit an exposure per view, or develop all photos with one exposure and white balance"),
+                .remedy(
+                    "fit an exposure per view, or develop all photos with one exposure and white balance; of things that \
+                     shine all over it may be their gloss",
+                ),
             );
         }
     }
