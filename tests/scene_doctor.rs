@@ -6,10 +6,13 @@ mod scene_fixture;
 
 use glam::{Mat3, Vec3};
 use patina::Severity;
+use patina::job::demo::photograph;
 use patina::scene::doctor::{self, Report, check};
+use patina::scene::hard::{HardCase, HardSettings, build};
 use patina::scene::{Camera, Mesh, Photo, PixelState, Scene};
 use patina::trace::Bvh;
 use scene_fixture::*;
+use std::sync::atomic::AtomicBool;
 
 fn severity_of(report: &Report, code: &str) -> Option<Severity> {
     let finding = report.findings.iter().find(|finding| finding.code == code)?;
@@ -252,4 +255,18 @@ fn the_outline_is_drawn_where_the_mask_ends() {
         }
     }
     assert!(drawn > 100);
+}
+
+#[test]
+fn a_texture_finer_than_the_photos_is_told() {
+    let of = |case: HardCase| {
+        let settings = HardSettings { views: 8, held_out: 1, light_height: 8, ..Default::default() };
+        let mut hard = build(case, &settings).unwrap();
+        photograph(&mut hard.scene, 64, 1, 1.0, &AtomicBool::new(false), &|_| {}).unwrap();
+        let report = check(&hard.scene);
+        (report.surface.fine_share, severity_of(&report, "detail-too-fine"))
+    };
+    let (plain, fine) = (of(HardCase::Plain), of(HardCase::FineTexture));
+    assert_eq!((plain.1, fine.1), (None, Some(Severity::Warning)));
+    assert!(fine.0 > 2.0 * plain.0, "plain {plain:?}, fine {fine:?}");
 }

@@ -115,12 +115,10 @@ fn mean_and_variance(values: [f64; 4]) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use crate::image::Image;
-    use crate::job::demo::photograph;
     use crate::scene::doctor::check;
     use crate::scene::hard::{HardCase, HardSettings, build};
     use crate::scene::{Photo, Scene};
     use glam::Vec3;
-    use std::sync::atomic::AtomicBool;
 
     fn told(scene: &Scene) -> (f64, bool) {
         let report = check(scene);
@@ -147,17 +145,5 @@ mod tests {
         assert_eq!(with(1, 0.5), (1.0, true));
         scene.views.iter_mut().for_each(|view| view.held_out = true);
         assert_eq!(told(&scene), (0.0, false), "held-out photos are not asked");
-    }
-
-    #[test]
-    fn a_texture_finer_than_the_photos_is_told() {
-        let of = |case: HardCase| {
-            let settings = HardSettings { views: 8, held_out: 1, light_height: 8, ..Default::default() };
-            let mut hard = build(case, &settings).unwrap();
-            photograph(&mut hard.scene, 64, 1, 1.0, &AtomicBool::new(false), &|_| {}).unwrap();
-            told(&hard.scene)
-        };
-        let (plain, fine) = (of(HardCase::Plain), of(HardCase::FineTexture));
-        assert!(fine.1 && !plain.1 && fine.0 > 2.0 * plain.0, "plain {plain:?}, fine {fine:?}");
     }
 }
