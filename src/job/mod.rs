@@ -5,13 +5,12 @@
 //! and the window drive the same job, so neither can do what the other cannot.
 //!
 //! [`open`] opens scenes and runs, begins fits and takes them up; [`prepare`] turns a scene into a surface with an atlas,
-//! [`worker`] is the thread, `save` keeps the run folder whole while it runs, [`outcome`] renders, scores and
-//! writes the run folder, [`demo`] makes the built-in scene, [`study`]
-//! fits many times over and makes tables, [`contest`] holds methods against each other by the clock, [`hard`] on
-//! cases that break fits; [`scale`] and [`tracer_speed`] time parts; [`rivals`] fits reflectance models to measured tables.
-//! [`preview`] draws for a window beside a fit. After a fit, [`gallery`] makes what a user shows, [`gauge`] moves its
-//! scale, [`entanglement`] tells how much light is baked into the maps, [`regions`] reads measured materials for parts of
-//! a surface.
+//! [`worker`] is the thread and [`handle`] what a watcher holds of it, `save` keeps the run folder whole while it runs,
+//! [`outcome`] renders, scores and writes the run folder, [`demo`] makes the built-in scene, [`study`] fits many times over
+//! and makes tables, [`contest`] holds methods against each other by the clock, [`hard`] on cases that break fits;
+//! [`scale`] and [`tracer_speed`] time parts; [`rivals`] fits reflectance models to measured tables. [`preview`] draws for
+//! a window beside a fit. After a fit, [`gallery`] makes what a user shows, [`gauge`] moves its scale, [`entanglement`]
+//! tells how much light is baked into the maps, [`regions`] reads measured materials for parts of a surface.
 //!
 //! [`object`] is the job of object mode, light and reflectance from photos of one object; [`materials`] its library of
 //! materials to look at.
@@ -24,6 +23,7 @@ pub mod entanglement;
 mod facts;
 pub mod gallery;
 pub mod gauge;
+pub mod handle;
 pub mod hard;
 pub mod materials;
 pub mod object;
@@ -45,10 +45,11 @@ pub mod tracer_speed;
 mod view;
 pub mod worker;
 
+pub use handle::{JobHandle, JobOptions, Wake};
 pub use prepare::RunSettings;
 pub use slot::Slot;
 pub use solver_told::SolverTold;
-pub use worker::{JobHandle, JobOptions, Wake, start, start_with};
+pub use worker::{start, start_with};
 
 use crate::error::{Error, Finding};
 use crate::fit::{FitSettings, LossRow};

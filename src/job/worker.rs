@@ -1,5 +1,6 @@
 //! The thread of a job.
 
+use super::handle::{JobHandle, JobOptions, Wake};
 use super::outcome;
 use super::prepare::{Prepared, RunSettings};
 use super::save::Saver;
@@ -12,7 +13,6 @@ use crate::insight::report::data::StageTime;
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Time between two snapshots, at least; maps of 2048^2 texels take a while to copy.
@@ -21,59 +21,6 @@ const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(500);
 const MOST_WAITING_EVENTS: usize = 256;
 /// How long a job that holds waits for a command before it looks at its stop flag.
 const PATIENCE: Duration = Duration::from_millis(50);
-
-/// Called after each event and snapshot, on the thread of the fit: it must return at once. A window repaints then.
-pub type Wake = Arc<dyn Fn() + Send + Sync>;
-
-/// What a job may be given beside its work.
-#[derive(Default)]
-pub struct JobOptions {
-    /// Called after each event and snapshot.
-    pub wake: Option<Wake>,
-    /// Threads of its own; the usual ones when not given. Results do not depend on it.
-    pub pool: Option<rayon::ThreadPool>,
-    /// Called before each step with the number of steps done; a seam for tests of faults.
-    #[doc(hidden)]
-    pub before_step: Option<Box<dyn FnMut(usize) + Send>>,
-}
-
-/// A running job.
-pub struct JobHandle {
-    /// Where commands go. [`JobHandle::stop`] is better for stopping: it does not wait for a step.
-    pub commands: Sender<Command>,
-    /// Where events come from.
-    pub events: Receiver<Event>,
-    /// The newest maps and light.
-    pub snapshot: Arc<Slot<Snapshot>>,
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl JobHandle {
-    /// Asks the job to end within a tile of pixels; it writes a checkpoint first.
-    pub fn stop(&self) {
-        self.stop.store(true, Ordering::Relaxed);
-        let _ = self.commands.send(Command::Stop);
-    }
-
-    /// A flag that stops the job when raised; for signal handlers.
-    pub fn stop_flag(&self) -> Arc<AtomicBool> {
-        Arc::clone(&self.stop)
-    }
-
-    /// Waits for the thread to end.
-    pub fn join(mut self) {
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
-    }
-}
-
-impl Drop for JobHandle {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-    }
-}
 
 /// Starts a job over a prepared scene. `fitter` may be new or resumed; results go to `folder`.
 ///

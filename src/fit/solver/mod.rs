@@ -10,7 +10,7 @@
 //! 4. [`light_step`]: the light from those rows, at least zero ([`non_negative`]), in wide and narrow hats
 //!    ([`light_shape`]), with a weak wish for smoothness. [`light_round`] is the round as a whole,
 //!    [`light_evidence`] says what each texel of the light is known by.
-//! 5. [`maps`]: block by block, then in tiles ([`tile`]) with the footprints of pixels, where the evidence decides which
+//! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`) with the footprints of pixels, where the evidence decides which
 //!    texels share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_prior`], [`lobe_widths`], [`lobe_families`]), then
 //!    [`mod@diffuse`]: all diffuse texels together ([`diffuse_system`]).
 //! 6. [`choice`]: views that took no part say what lobes, light between surfaces and the light's resolution bought.
@@ -34,6 +34,7 @@ pub mod light_shape;
 pub mod light_step;
 pub mod lobe_evidence;
 pub mod lobe_families;
+mod lobe_kind;
 pub mod lobe_prior;
 pub mod lobe_tree;
 pub mod lobe_widths;
@@ -48,6 +49,7 @@ pub mod settings;
 #[allow(clippy::module_inception)]
 pub mod solver;
 pub mod tile;
+mod tile_lobes;
 pub mod transport_check;
 
 #[cfg(test)]

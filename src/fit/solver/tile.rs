@@ -2,16 +2,12 @@
 //!
 //! Blocks book a pixel at the one texel it covers most. Here diffuse reflectance is solved with the footprints inside the
 //! tile, pixels are relieved of what they cover of the neighbours, of their diffuse reflectance and of what their lobes
-//! send, and what is left tells of the lobe of the one texel ([`super::lobe_tree`]).
+//! send, and what is left tells of the lobe of the one texel (`tile_lobes`).
 
 use super::block::PixelTerms;
-use super::cell_sums::System;
-use super::lobe_evidence::{LobeBelief, LobeSumsOfGroup};
+use super::lobe_evidence::LobeBelief;
 use super::lobe_prior::LobePrior;
-use super::lobe_tree::{TreeTexel, beliefs};
-use super::lobe_widths::{LOBE_WIDTHS, WidthStencil, weighed_log_widths, weighed_stencils};
-use super::round::{BlockWork, Round, log_widths};
-use std::time::Instant;
+use super::round::{BlockWork, Round};
 
 /// Texels along a tile's side.
 pub const TILE: usize = 32;
@@ -19,39 +15,27 @@ pub const TILE: usize = 32;
 const PASSES: usize = 2;
 /// Sweeps of Gauss and Seidel over the reflectances of a tile.
 const SWEEPS: usize = 8;
-/// What is believed of diffuse reflectance before looking: this standard deviation.
-const DIFFUSE_SPREAD: f64 = 0.35;
-/// Standard deviation of a texel's diffuse reflectance from that of the group that shares its lobe. With 0.2 dark texels
-/// went below zero in what was weighed, under lobes that are too bright (`toys`: specular .085, with 0.05 .080).
-const TEXEL_SPREAD: f64 = 0.05;
 /// Residuals of bright pixels are forgiven: half of the noise goes with the radiance.
 const RELATIVE_NOISE: f32 = 1.0;
 /// A pixel this many times further off than the median (squared) counts half.
 const TOLERANCE: f32 = 30.0;
 /// Least noise, relative to the mean of the photos.
 const LEAST_NOISE: f64 = 0.005;
-/// By how much a width that was not looked at counts as worse, per unit of its logarithm.
-const UNSEEN_WIDTH: f64 = 20.0;
-
-/// What no number of pixels tells better, since it is wrong in all of them: lobes between widths are interpolated, and
-/// light reaches pixels through a cache. Standard deviations of F0 relative to itself, of F0 relative to the diffuse
-/// reflectance under it, and of the logarithm of the width.
-const MODEL_ERROR: [f64; 3] = [0.05, 0.01, 0.05];
 
 /// A pixel of a tile.
 pub(super) struct TilePixel {
     pub(super) terms: PixelTerms,
     /// First and last but one width whose terms are set.
-    nodes: (usize, usize),
-    texel: usize,
+    pub(super) nodes: (usize, usize),
+    pub(super) texel: usize,
     pub(super) observation: u32,
     pub(super) clipped: bool,
     /// Where its taps lie.
-    taps: std::ops::Range<usize>,
+    pub(super) taps: std::ops::Range<usize>,
     /// What the lobes of the texels it shows send.
     pub(super) lobe: [f32; 3],
     /// How much more that is than if all of it had the lobe of its own texel.
-    beside: [f32; 3],
+    pub(super) beside: [f32; 3],
     /// Takes no part: it judges.
     pub(super) withheld: bool,
 }
@@ -72,9 +56,10 @@ pub struct Tile {
     /// Seconds of one processor that sums over pixels took, and the beliefs from them.
     pub seconds: [f64; 2],
     pub(super) pixels: Vec<TilePixel>,
-    taps: Vec<(u32, f32)>,
+    /// Texels of the tile that pixels show, and their weights.
+    pub(super) taps: Vec<(u32, f32)>,
     /// Place of each texel of the square in `texels`, or `u32::MAX`.
-    local: Vec<u32>,
+    pub(super) local: Vec<u32>,
     pub(super) noise: f64,
 }
 
@@ -183,31 +168,8 @@ impl Tile {
         self.taps = Vec::new();
     }
 
-    pub(super) fn set_lobes(&mut self) {
-        let widths = log_widths();
-        for pixel in &mut self.pixels {
-            let of_texel = |texel: usize| {
-                let mean = &self.lobes[texel].mean;
-                let stencil = WidthStencil::new(&widths, mean[3], pixel.nodes.0..pixel.nodes.1);
-                let of =
-                    |c: usize| mean[c] as f32 * stencil.of(&pixel.terms.base, c) + stencil.of(&pixel.terms.grazing, c);
-                [0, 1, 2].map(of)
-            };
-            let own = of_texel(pixel.texel);
-            let mut beside = [0.0f32; 3];
-            for &(texel, weight) in &self.taps[pixel.taps.clone()] {
-                if texel as usize != pixel.texel {
-                    let lobe = of_texel(texel as usize);
-                    (0..3).for_each(|c| beside[c] += weight * (lobe[c] - own[c]));
-                }
-            }
-            pixel.beside = beside;
-            pixel.lobe = [0, 1, 2].map(|c| own[c] + beside[c]);
-        }
-    }
-
     /// Mean reflectance under a pixel.
-    fn under(&self, pixel: &TilePixel, c: usize) -> f32 {
+    pub(super) fn under(&self, pixel: &TilePixel, c: usize) -> f32 {
         self.taps[pixel.taps.clone()].iter().map(|&(texel, weight)| weight * self.rho[texel as usize][c]).sum()
     }
 
@@ -290,74 +252,5 @@ impl Tile {
         // Each texel has taken a share of the pixels' freedom.
         let freedom = (count - self.texels.len() as f64).max(0.25 * count);
         self.noise = (sum / freedom.max(1e-9)).max(least);
-    }
-
-    pub(super) fn solve_lobes(&mut self, map_size: usize, independence: f64, prior: &LobePrior) {
-        let began = Instant::now();
-        let scale = independence / self.noise;
-        let count = self.texels.len();
-        let widths = weighed_log_widths();
-        let stencils = weighed_stencils();
-        let mut raw = vec![[[System::default(); 3]; LOBE_WIDTHS]; count];
-        for pixel in &self.pixels {
-            let weight = scale * f64::from(pixel.terms.weight);
-            if weight == 0.0 {
-                continue;
-            }
-            let own = &mut raw[pixel.texel];
-            for c in 0..3 {
-                let e = f64::from(pixel.terms.arriving[c]);
-                let neighbours = self.under(pixel, c) - self.rho[pixel.texel][c];
-                let beside = pixel.beside[c] + pixel.terms.arriving[c] * neighbours;
-                let radiance = f64::from(pixel.terms.radiance[c] - beside);
-                // A width that was not looked at is the narrowest that was, and worse.
-                for (sums, stencil) in own.iter_mut().zip(&stencils[pixel.nodes.0]) {
-                    let s = f64::from(stencil.of(&pixel.terms.base, c));
-                    let y = radiance - f64::from(stencil.of(&pixel.terms.grazing, c));
-                    sums[c].observe(weight, e, s, y);
-                }
-            }
-        }
-        let integrated = log_widths();
-        let first = self.pixels.iter().fold(vec![0usize; count], |mut first, pixel| {
-            first[pixel.texel] = first[pixel.texel].max(pixel.nodes.0);
-            first
-        });
-        let sums: Vec<LobeSumsOfGroup> = raw
-            .iter()
-            .zip(&first)
-            .map(|(raw, &first)| {
-                let worse = widths.map(|width| UNSEEN_WIDTH * (integrated[first] - width).max(0.0));
-                LobeSumsOfGroup::of_texel(raw, 1.0 / (TEXEL_SPREAD * TEXEL_SPREAD), &worse)
-            })
-            .collect();
-        let texels: Vec<TreeTexel> = self
-            .texels
-            .iter()
-            .zip(&self.rho)
-            .map(|(&texel, &colour)| TreeTexel {
-                row: (texel as usize / map_size % TILE) as u16,
-                column: (texel as usize % map_size % TILE) as u16,
-                colour,
-            })
-            .collect();
-        self.seconds[0] += began.elapsed().as_secs_f64();
-        let began = Instant::now();
-        (self.lobes, self.one_lobe) = beliefs(&texels, &sums, TILE, &widths, prior);
-        self.seconds[1] += began.elapsed().as_secs_f64();
-        for (LobeBelief { mean, square, .. }, rho) in self.lobes.iter_mut().zip(&self.rho) {
-            for c in 0..3 {
-                square[c] += (MODEL_ERROR[0] * mean[c]).powi(2) + (MODEL_ERROR[1] * f64::from(rho[c])).powi(2);
-            }
-            square[3] += MODEL_ERROR[2] * MODEL_ERROR[2];
-        }
-        let ridge = 1.0 / (DIFFUSE_SPREAD * DIFFUSE_SPREAD);
-        for (texel, lobe) in self.lobes.iter().enumerate() {
-            let node = widths.partition_point(|&width| width < lobe.mean[3]).min(LOBE_WIDTHS - 1);
-            self.variance[texel] = [0, 1, 2].map(|c| {
-                let System { ee, es, .. } = raw[texel][node][c];
-                (1.0 / (ee + ridge) + (es / (ee + ridge)).powi(2) * lobe.square[c]) as f32
-            });
-        }
     }
 }

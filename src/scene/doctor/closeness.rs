@@ -12,9 +12,9 @@ use crate::trace::{Bvh, Ray};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Share of what is seen beyond which thin walls are told: of sound meshes less than a thousandth is thin.
+/// Share of what is seen beyond which thin walls are told: of sound meshes up to 1.7 % is thin, of thin shells 36 %.
 const TOLD_THIN: f64 = 0.02;
-/// Share beyond which gaps are told: things that stand on a floor have a thousandth or two where they meet it.
+/// Share beyond which gaps are told: things that stand on a floor have two or three thousandths where they meet it.
 const TOLD_TOUCHING: f64 = 0.005;
 
 /// Pixels of a photo that were asked.

@@ -1,14 +1,14 @@
 //! What the window knows, without any widget.
 //!
-//! [`Model`] joins the parts: [`project`] is what is open, [`fit`] the job,
-//! [`known`] what the solver is sure of, [`edits`] what undo covers, [`lights`] the
-//! shelf, [`tasks`] work beside the window, [`log`] what was noticed, [`store`] what is remembered. [`opening`] and
-//! [`starting`] are how a folder becomes a project and a project a fit, [`viewing`] where the eye stands, [`dialogs`] what
-//! is asked in windows over the window. In object mode [`object_form`] is what is asked for, [`object`] the estimation,
-//! [`estimating`] how one becomes the other, [`materials`] the library. Panels read the model and queue acts; they change
-//! nothing but [`Edits`] directly.
+//! [`Model`] joins the parts: [`project`] is what is open, [`fit`] the job, [`known`] what the solver is sure of,
+//! [`edits`] what undo covers, [`lights`] the shelf, [`tasks`] work beside the window and [`done`] what it brings, [`log`]
+//! what was noticed, [`store`] what is remembered. [`opening`] and [`starting`] are how a folder becomes a project and a
+//! project a fit, [`viewing`] where the eye stands, [`dialogs`] what is asked in windows over the window. In object mode
+//! [`object_form`] is what is asked for, [`object`] the estimation, [`estimating`] how one becomes the other, [`materials`]
+//! the library. Panels read the model and queue acts; they change nothing but [`Edits`] directly.
 
 pub mod dialogs;
+pub mod done;
 pub mod edits;
 pub mod estimating;
 pub mod fit;
@@ -26,6 +26,7 @@ pub mod tasks;
 pub mod viewing;
 
 pub use dialogs::{Dialog, PickFor, SaveRequest, SaveWhat};
+pub use done::Done;
 pub use edits::Edits;
 pub use fit::{FitControl, FitStatus};
 pub use lights::LightName;
@@ -52,42 +53,6 @@ pub enum Workspace {
     Scene,
     /// Light and measured reflectance from photos of one object.
     Object,
-}
-
-/// What a task brings.
-pub enum Done {
-    /// A scene was read and checked.
-    SceneRead(Box<opening::SceneRead>),
-    /// The atlas and the tracer of a scene are made.
-    Prepared(Box<opening::PreparedScene>),
-    /// A run folder was read.
-    RunOpened(Box<opening::RunRead>),
-    /// A job was started.
-    FitStarted(Box<starting::Started>),
-    /// A light was read.
-    LightRead(Box<ShelfLight>),
-    /// A folder or file was chosen in the system's dialog; `None` when it was closed.
-    Picked(PickFor, Option<PathBuf>),
-    /// Files were saved.
-    Saved(Vec<PathBuf>),
-    /// The error of the photos was spread over the surface.
-    Layers(Box<crate::insight::surface_layers::SurfaceLayers>),
-    /// The stage's view under every light of the shelf.
-    Strip(Vec<(LightName, Arc<crate::image::RgbImage>)>),
-    /// Pictures under other lights were compared with the truth.
-    Entangled(Box<crate::job::entanglement::Entanglement>),
-    /// The estimated object under the lights of the shelf.
-    ObjectRelit(Vec<object::RelitObject>),
-    /// A result of object mode was read from its folder.
-    ObjectOpened(Box<crate::job::object::ReopenedObject>),
-    /// The result of an estimation was written to a folder.
-    ObjectSaved(PathBuf),
-    /// The library of materials with its thumbnails.
-    MaterialsDrawn(Arc<crate::job::materials::Materials>, Vec<crate::image::RgbImage>),
-    /// A measured table was opened.
-    MaterialOpened(materials::OpenedTile),
-    /// The chosen material.
-    MaterialShown(Box<crate::job::materials::MaterialShown>),
 }
 
 /// Switches of the stage that undo does not cover.

@@ -1,0 +1,42 @@
+//! What tasks beside the window bring back to it.
+
+use super::lights::ShelfLight;
+use super::{LightName, PickFor, materials, object, opening, starting};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// What a task brings.
+pub enum Done {
+    /// A scene was read and checked.
+    SceneRead(Box<opening::SceneRead>),
+    /// The atlas and the tracer of a scene are made.
+    Prepared(Box<opening::PreparedScene>),
+    /// A run folder was read.
+    RunOpened(Box<opening::RunRead>),
+    /// A job was started.
+    FitStarted(Box<starting::Started>),
+    /// A light was read.
+    LightRead(Box<ShelfLight>),
+    /// A folder or file was chosen in the system's dialog; `None` when it was closed.
+    Picked(PickFor, Option<PathBuf>),
+    /// Files were saved.
+    Saved(Vec<PathBuf>),
+    /// The error of the photos was spread over the surface.
+    Layers(Box<crate::insight::surface_layers::SurfaceLayers>),
+    /// The stage's view under every light of the shelf.
+    Strip(Vec<(LightName, Arc<crate::image::RgbImage>)>),
+    /// Pictures under other lights were compared with the truth.
+    Entangled(Box<crate::job::entanglement::Entanglement>),
+    /// The estimated object under the lights of the shelf.
+    ObjectRelit(Vec<object::RelitObject>),
+    /// A result of object mode was read from its folder.
+    ObjectOpened(Box<crate::job::object::ReopenedObject>),
+    /// The result of an estimation was written to a folder.
+    ObjectSaved(PathBuf),
+    /// The library of materials with its thumbnails.
+    MaterialsDrawn(Arc<crate::job::materials::Materials>, Vec<crate::image::RgbImage>),
+    /// A measured table was opened.
+    MaterialOpened(materials::OpenedTile),
+    /// The chosen material.
+    MaterialShown(Box<crate::job::materials::MaterialShown>),
+}
