@@ -222,7 +222,7 @@ pub(super) mod tests {
     use crate::fit::solver::observations::Observation;
     use crate::math::random::SequentialRandom;
     use crate::render::cached::ShadingPoint;
-    use crate::render::cached::points::{NO_POINT, PointTap};
+    use crate::render::cached::points::NO_POINT;
     use glam::Vec3;
 
     /// Pixels of two views on maps of `map_size`: each covers some texels side by side, some also one far away.
@@ -250,8 +250,9 @@ pub(super) mod tests {
                     pixel,
                     share: 1.0,
                     normal: Vec3::Z,
+                    normal_variance: 0.0,
                     to_viewer: Vec3::Z,
-                    points: PointTap { index: [0; 4], weight: [0.25; 4] },
+                    lobe_point: 0,
                     lobe_hits: [NO_POINT; 4],
                     first_texel,
                     texel_count: 4,

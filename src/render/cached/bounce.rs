@@ -114,7 +114,7 @@ pub(super) fn point_hit(
     if point.geometric_normal.dot(direction) >= 0.0 || point.shading_normal.dot(direction) >= 0.0 {
         return None;
     }
-    grid.tap(point.uv, point.shading_normal).map(|tap| tap.heaviest())
+    grid.tap(&point).map(|tap| tap.heaviest())
 }
 
 fn gather(offsets: &[u32], indices: &[u32], share: f32, values: &[[f32; 3]]) -> Vec<[f32; 3]> {

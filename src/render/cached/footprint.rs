@@ -13,7 +13,7 @@ mod pieces;
 
 use self::pieces::{Piece, corners_of_pixels, pieces_of_pixel};
 use super::bounce::point_hit;
-use super::points::{NO_POINT, PointTap, VisibilityGrid};
+use super::points::{NO_POINT, VisibilityGrid};
 use crate::math::frame::Frame;
 use crate::math::random::{SampleStream, StreamKey};
 use crate::render::Surface;
@@ -35,10 +35,12 @@ pub struct ShadingPoint {
     pub share: f32,
     /// Unit shading normal.
     pub normal: Vec3,
+    /// Variance of the normal over the piece, of both axes together, in squared radians.
+    pub normal_variance: f32,
     /// Unit direction towards the viewer.
     pub to_viewer: Vec3,
-    /// Points of the visibility grid around its middle: the heaviest serves the lobe.
-    pub points: PointTap,
+    /// The point of the visibility grid that covers most of it: it serves the lobe.
+    pub lobe_point: u32,
     /// Points that rays in its lobe meet, or [`NO_POINT`].
     pub lobe_hits: [u32; LOBE_RAYS],
     /// Where its texels begin in [`ViewFootprints::texels`].
@@ -172,19 +174,18 @@ impl ViewFootprints {
         if normal.dot(to_viewer) <= 1e-4 {
             return;
         }
-        let Some(points) = grid.tap(piece.uv / count, normal) else { return };
         let (first_texel, first_lit) = (self.texels.len() as u32, self.lit.len() as u32);
-        merge(piece.texels.clone(), &mut self.texels);
         let mut lit: Vec<(u32, f32)> = Vec::with_capacity(16);
-        for &uv in &piece.places {
-            if let Some(tap) = grid.tap(uv, normal) {
-                lit.extend(tap.index.into_iter().zip(tap.weight).filter(|&(_, weight)| weight > 0.0));
-            }
-        }
-        if lit.is_empty() {
-            lit.extend(points.index.into_iter().zip(points.weight).filter(|&(_, weight)| weight > 0.0));
+        for tap in piece.places.iter().filter_map(|place| grid.tap(place)) {
+            lit.extend(tap.index.into_iter().zip(tap.weight).filter(|&(_, weight)| weight > 0.0));
         }
         merge(lit, &mut self.lit);
+        let heavier = |best: (u32, f32), next: &(u32, f32)| if next.1 > best.1 { *next } else { best };
+        let (lobe_point, _) = self.lit[first_lit as usize..].iter().fold((NO_POINT, 0.0), heavier);
+        if lobe_point == NO_POINT {
+            return;
+        }
+        merge(piece.texels.clone(), &mut self.texels);
         let mut lobe_hits = [NO_POINT; LOBE_RAYS];
         if settings.lobe_rays {
             let mut stream = SampleStream::new(StreamKey::new(settings.seed, u32::MAX - 2, view, pixel), 0);
@@ -203,8 +204,9 @@ impl ViewFootprints {
             pixel,
             share: piece.share,
             normal,
+            normal_variance: piece.normal_variance(),
             to_viewer,
-            points,
+            lobe_point,
             lobe_hits,
             first_texel,
             texel_count: self.texels.len() as u32 - first_texel,

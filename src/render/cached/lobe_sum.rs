@@ -7,6 +7,9 @@
 //! Wide lobes are summed over the hats of the light, one value of the lobe a hat: no noise, and smooth in everything.
 //! A lobe narrower than a few texels is integrated over half vectors instead, at fixed places of equal probability in a
 //! frame that turns with the viewer ([`super::half_vector`]).
+//!
+//! A pixel on a curved surface sees many normals. To it the distribution of half vectors is that of the microfacets,
+//! convolved with that of the normals: a lobe that is wider by their variance ([`LobePlace::width_seen`]).
 
 use super::half_vector;
 use super::light_basis::{LightBasis, LightPlanes};
@@ -32,6 +35,28 @@ pub struct LobePlace<'a> {
     pub to_viewer: Vec3,
     /// Visible shares of the hats.
     pub shares: &'a [u8],
+    /// Variance of the normal over the footprint, of both axes together, in squared radians.
+    pub normal_variance: f32,
+}
+
+impl LobePlace<'_> {
+    /// The width of the lobe as the footprint sees it, for one of this microfacet width.
+    ///
+    /// Slopes of the normalised Blinn-Phong distribution have a variance of `a^2 / (1 - a^2)` over both axes (with the
+    /// exponent `2/a^2 - 2`, one over it along each); that of the normals is added. Widths up to 1 stay below it. After
+    /// Toksvig 2005 ("Mipmapping normal maps"), with the variance taken from the geometry in place of a map.
+    #[inline(always)]
+    pub fn width_seen(&self, width: f32) -> f32 {
+        let added = self.normal_variance * (1.0 - width * width).max(0.0);
+        ((width * width + added) / (1.0 + added)).sqrt()
+    }
+
+    /// Derivative of the logarithm of [`LobePlace::width_seen`] by that of the width.
+    #[inline(always)]
+    fn slope_of_width_seen(&self, width: f32) -> f32 {
+        let added = self.normal_variance * (1.0 - width * width).max(0.0);
+        width * width / ((width * width + added) * (1.0 + added))
+    }
 }
 
 /// Integrals of one lobe of one width, and their derivatives by the logarithm of the width.
@@ -62,12 +87,17 @@ impl LobeSums {
 
 /// The sums of a lobe at several widths, without derivatives. `sums` is as long as `widths`.
 pub fn lobe_sums(basis: &LightBasis, place: &LobePlace, light: &LightPlanes, widths: &[f32], sums: &mut [LobeSums]) {
-    let narrow = widths.partition_point(|&width| width < wide_from(basis));
+    let narrow = widths.partition_point(|&width| place.width_seen(width) < wide_from(basis));
     for (sum, &width) in sums.iter_mut().zip(&widths[..narrow]) {
+        let width = place.width_seen(width);
         *sum = half_vector::lobe_sums(basis, place, light, width, half_vector::place_count(basis, width));
     }
     for (sums, widths) in sums[narrow..].chunks_mut(MOST_AT_ONCE).zip(widths[narrow..].chunks(MOST_AT_ONCE)) {
-        wide_sums(basis, place, light, widths, sums);
+        let mut seen = [0.0; MOST_AT_ONCE];
+        for (seen, &width) in seen.iter_mut().zip(widths) {
+            *seen = place.width_seen(width);
+        }
+        wide_sums(basis, place, light, &seen[..widths.len()], sums);
     }
 }
 
@@ -76,24 +106,33 @@ pub fn lobe_sums(basis: &LightBasis, place: &LobePlace, light: &LightPlanes, wid
 /// Over hats the derivative is that of the sum. Over half vectors it is the difference of the sum at widths two per cent
 /// apart: the places move with the width, and between hats the sum bends.
 pub fn lobe_with_derivative(basis: &LightBasis, place: &LobePlace, light: &LightPlanes, width: f32) -> LobeSums {
-    let mut sums = [LobeSums::default()];
-    if width >= wide_from(basis) {
+    let (width, slope_of_width) = (place.width_seen(width), place.slope_of_width_seen(width));
+    let mut sum = if width >= wide_from(basis) {
+        let mut sums = [LobeSums::default()];
         wide_sums_with_derivative(basis, place, light, &[width], &mut sums);
-        return sums[0];
+        sums[0]
+    } else {
+        const STEP: f32 = 0.01;
+        let count = half_vector::place_count(basis, width);
+        let at = |width: f32| half_vector::lobe_sums(basis, place, light, width, count);
+        let (sum, below, above) = (at(width), at(width * (-STEP).exp()), at(width * STEP.exp()));
+        let slope = |above: f32, below: f32| (above - below) / (2.0 * STEP);
+        LobeSums {
+            d_base: std::array::from_fn(|c| slope(above.base[c], below.base[c])),
+            d_grazing: std::array::from_fn(|c| slope(above.grazing[c], below.grazing[c])),
+            d_hidden: std::array::from_fn(|k| slope(above.hidden[k], below.hidden[k])),
+            ..sum
+        }
+    };
+    for slope in sum.d_base.iter_mut().chain(&mut sum.d_grazing).chain(&mut sum.d_hidden) {
+        *slope *= slope_of_width;
     }
-    const STEP: f32 = 0.01;
-    let count = half_vector::place_count(basis, width);
-    let at = |width: f32| half_vector::lobe_sums(basis, place, light, width, count);
-    let (mut sum, below, above) = (at(width), at(width * (-STEP).exp()), at(width * STEP.exp()));
-    let slope = |above: f32, below: f32| (above - below) / (2.0 * STEP);
-    sum.d_base = std::array::from_fn(|c| slope(above.base[c], below.base[c]));
-    sum.d_grazing = std::array::from_fn(|c| slope(above.grazing[c], below.grazing[c]));
-    sum.d_hidden = std::array::from_fn(|k| slope(above.hidden[k], below.hidden[k]));
     sum
 }
 
 /// Adds the rows of `S0 - S5` and `S5`, times `scales`, to a row over the padded texels of the light.
 pub fn add_lobe_row(basis: &LightBasis, place: &LobePlace, width: f32, scales: [f32; 2], row: &mut [f32]) {
+    let width = place.width_seen(width);
     if width < wide_from(basis) {
         half_vector::add_lobe_row(basis, place, width, scales, row);
         return;
@@ -177,7 +216,7 @@ mod tests {
             [(Vec3::ZERO, "highlight", 0.025), (Vec3::new(0.2, 0.1, -0.3), "beside", 0.025)]
         {
             let mirrored = (normal * (2.0 * normal.dot(sun)) - sun + offset).normalize_or(Vec3::Y);
-            let place = LobePlace { normal, to_viewer: mirrored, shares: &shares };
+            let place = LobePlace { normal, to_viewer: mirrored, shares: &shares, normal_variance: 0.0 };
             for (index, width) in [0.01f32, 0.05, 0.1, 0.17, 0.24, 0.26, 0.4, 0.7, 1.0].into_iter().enumerate() {
                 let (base, grazing) = truth(&light, normal, mirrored, width);
                 if offset == Vec3::ZERO {
@@ -197,6 +236,46 @@ mod tests {
         }
     }
 
+    /// A pixel on a ball: its normals lie evenly in a square. Without the wider lobe the highlight would be 3 to 40 % too
+    /// bright.
+    #[test]
+    fn a_curved_footprint_sends_what_its_normals_send_on_average() {
+        let basis = LightBasis::new(64, 32);
+        let light = light_of(&basis, 2);
+        let shares = vec![255u8; basis.padded()];
+        let sun = basis.direction_of(8 * 64 + 20);
+        let normal = Vec3::new(0.1, 0.95, 0.2).normalize_or(Vec3::Y);
+        let to_viewer = normal * (2.0 * normal.dot(sun)) - sun;
+        let (across, along) = normal.any_orthonormal_pair();
+        const SIDE: usize = 12;
+        for (width, half_side) in [(0.1f32, 0.08f32), (0.2, 0.12), (0.4, 0.12), (1.0, 0.12)] {
+            let (mut mean, mut sum) = (0.0f64, Vec3::ZERO);
+            for index in 0..SIDE * SIDE {
+                let place = |k: usize| half_side * (2.0 * (k as f32 + 0.5) / SIDE as f32 - 1.0);
+                let tilted = normal + across * place(index % SIDE) + along * place(index / SIDE);
+                let tilted = tilted.normalize_or(Vec3::Y);
+                sum += tilted;
+                let place = LobePlace { normal: tilted, to_viewer, shares: &shares, normal_variance: 0.0 };
+                let mut sums = [LobeSums::default()];
+                lobe_sums(&basis, &place, &light, &[width], &mut sums);
+                mean += f64::from(sums[0].base[1]) / (SIDE * SIDE) as f64;
+            }
+            let normal_variance = 1.0 - (sum / (SIDE * SIDE) as f32).length_squared();
+            let of = |normal_variance: f32| {
+                let place = LobePlace { normal, to_viewer, shares: &shares, normal_variance };
+                let mut sums = [LobeSums::default()];
+                lobe_sums(&basis, &place, &light, &[width], &mut sums);
+                f64::from(sums[0].base[1]) / mean - 1.0
+            };
+            let (error, as_if_flat) = (of(normal_variance), of(0.0));
+            println!("width {width}: {error:+.4}, as if flat {as_if_flat:+.4}");
+            assert!(
+                error.abs() < 0.02 && error.abs() < 0.4 * as_if_flat.abs().max(0.01),
+                "{width}: {error} {as_if_flat}"
+            );
+        }
+    }
+
     #[test]
     fn versions_rows_and_derivatives_agree() {
         let basis = LightBasis::new(64, 32);
@@ -205,15 +284,17 @@ mod tests {
         let shares: Vec<u8> = (0..basis.padded()).map(|_| (random.next_number() * 255.0) as u8).collect();
         let normal = Vec3::new(0.3, 0.9, -0.1).normalize_or(Vec3::Y);
         let to_viewer = Vec3::new(-0.5, 0.6, 0.4).normalize_or(Vec3::Y);
-        let place = LobePlace { normal, to_viewer, shares: &shares };
+        let place = LobePlace { normal, to_viewer, shares: &shares, normal_variance: 0.004 };
         for width in [0.03f32, 0.2, 0.3, 0.55, 1.0] {
             let sums = lobe_with_derivative(&basis, &place, &light, width);
             let mut plain = [LobeSums::default()];
-            if width >= wide_from(&basis) {
-                sums_in::<Plain, true>(&basis, &place, &light, &[width], &mut plain);
+            let seen = place.width_seen(width);
+            if seen >= wide_from(&basis) {
+                sums_in::<Plain, true>(&basis, &place, &light, &[seen], &mut plain);
+                plain[0].d_base = plain[0].d_base.map(|slope| slope * place.slope_of_width_seen(width));
             } else {
-                let count = half_vector::place_count(&basis, width);
-                plain[0] = half_vector_kernel::sums_in::<Plain>(&basis, &place, &light, width, count);
+                let count = half_vector::place_count(&basis, seen);
+                plain[0] = half_vector_kernel::sums_in::<Plain>(&basis, &place, &light, seen, count);
                 // Its derivative is a difference of sums.
                 plain[0].d_base = sums.d_base;
             }

@@ -2,6 +2,7 @@
 
 use crate::math::frame::Frame;
 use crate::render::Surface;
+use crate::render::surface::SurfacePoint;
 use crate::trace::Hit;
 use glam::{DVec2, Vec2, Vec3};
 
@@ -26,6 +27,13 @@ impl VisibilityPoint {
         Frame::around(self.shading_normal)
     }
 }
+
+/// Least cosine between the normal of a point and that of the surface it serves.
+const FACING: f32 = 0.2;
+/// How far in texels a bilinear neighbour may lie from a place: points are moved onto their triangle, and charts stretch.
+const NEIGHBOUR_TEXELS: f32 = 4.0;
+/// How far in texels a point is looked for where no neighbour serves.
+const SEARCH_TEXELS: f32 = 6.0;
 
 /// Marks texels without a point.
 pub const NO_POINT: u32 = u32::MAX;
@@ -100,23 +108,31 @@ impl VisibilityGrid {
         VisibilityGrid { size, points, point_of_texel }
     }
 
-    /// The points around a texture coordinate with bilinear weights; those that face away from `normal` (another chart
-    /// in the gutter) are left out. `None` when no point is near.
-    pub fn tap(&self, uv: Vec2, normal: Vec3) -> Option<PointTap> {
-        let tap = crate::material::TextureTap::at(uv, 0, self.size, self.size);
+    /// The points around a place of the surface with bilinear weights. Those that face away from it, or lie farther away
+    /// than neighbours on the grid do, belong to another chart beyond the gutter and are left out. Where nothing is left,
+    /// as on charts so small that others have taken the texels around, the nearest point in the world of some texels
+    /// around. `None` when there is none.
+    pub fn tap(&self, place: &SurfacePoint) -> Option<PointTap> {
+        let tap = crate::material::TextureTap::at(place.uv, 0, self.size, self.size);
+        let reach = NEIGHBOUR_TEXELS / (place.uv_per_length * self.size as f32);
         let mut made = PointTap::default();
         let mut total = 0.0;
         for k in 0..4 {
-            let point = self.point_of_texel[tap.index[k] as usize];
-            if point == NO_POINT || self.points[point as usize].shading_normal.dot(normal) < 0.2 {
+            let index = self.point_of_texel[tap.index[k] as usize];
+            if index == NO_POINT {
                 continue;
             }
-            made.index[k] = point;
+            let point = &self.points[index as usize];
+            let facing = point.shading_normal.dot(place.shading_normal) >= FACING;
+            if !facing || point.position.distance_squared(place.position) > reach * reach {
+                continue;
+            }
+            made.index[k] = index;
             made.weight[k] = tap.weight[k];
             total += tap.weight[k];
         }
         if total <= 1e-4 {
-            return None;
+            return self.nearest(place);
         }
         made.weight = made.weight.map(|weight| weight / total);
         // A weight of zero names the heaviest point, so that every index is valid.
@@ -127,6 +143,30 @@ impl VisibilityGrid {
             }
         }
         Some(made)
+    }
+
+    /// Of the points within some texels that face the same way, the one nearest in the world.
+    fn nearest(&self, place: &SurfacePoint) -> Option<PointTap> {
+        let size = self.size as f32;
+        let around = |at: f32| {
+            let [low, high] = [at - SEARCH_TEXELS, at + SEARCH_TEXELS];
+            low.clamp(0.0, size - 1.0) as usize..=high.clamp(0.0, size - 1.0) as usize
+        };
+        let mut best = (f32::INFINITY, NO_POINT);
+        for row in around((1.0 - place.uv.y) * size) {
+            for column in around(place.uv.x * size) {
+                let index = self.point_of_texel[row * self.size + column];
+                if index == NO_POINT {
+                    continue;
+                }
+                let point = &self.points[index as usize];
+                let distance = point.position.distance_squared(place.position);
+                if point.shading_normal.dot(place.shading_normal) >= FACING && distance < best.0 {
+                    best = (distance, index);
+                }
+            }
+        }
+        (best.1 != NO_POINT).then(|| PointTap { index: [best.1; 4], weight: [1.0, 0.0, 0.0, 0.0] })
     }
 }
 

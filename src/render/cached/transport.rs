@@ -230,7 +230,8 @@ impl CachedTransport {
         LobePlace {
             normal: point.normal,
             to_viewer: point.to_viewer,
-            shares: self.visibility.of(point.points.heaviest() as usize),
+            shares: self.visibility.of(point.lobe_point as usize),
+            normal_variance: point.normal_variance,
         }
     }
 
@@ -239,7 +240,7 @@ impl CachedTransport {
     /// all rays miss it, and pictures of polished things two per cent too dark.
     #[inline]
     pub fn lobe_surroundings(&self, at: &PointLight, point: &ShadingPoint) -> [f32; 3] {
-        let mut sum = at.around[point.points.heaviest() as usize];
+        let mut sum = at.around[point.lobe_point as usize];
         let mut count = 1.0;
         for &hit in point.lobe_hits.iter().filter(|&&hit| hit != NO_POINT) {
             for channel in 0..3 {
@@ -334,7 +335,7 @@ fn lobe_albedo() -> Vec<[f32; 2]> {
                 // Equal steps of cos^2: the cosine's density.
                 let cosine = ((angle as f32 + 0.5) / ANGLES as f32).sqrt();
                 let to_viewer = Vec3::new((1.0 - cosine * cosine).sqrt(), cosine, 0.0);
-                let place = LobePlace { normal: Vec3::Y, to_viewer, shares: &shares };
+                let place = LobePlace { normal: Vec3::Y, to_viewer, shares: &shares, normal_variance: 0.0 };
                 let sums = half_vector::lobe_sums(&constant, &place, &light, width, 256);
                 sum[0] += sums.base[0] / ANGLES as f32;
                 sum[1] += sums.grazing[0] / ANGLES as f32;
