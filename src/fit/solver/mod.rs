@@ -1,7 +1,8 @@
 //! The deterministic solver: bundle adjustment for appearance.
 //!
 //! Geometry and cameras stay, so light reaches pixels through a cache without noise ([`crate::render::cached`]). Then:
-//! 1. [`scene`]: all that never changes. [`observations`]: pixels, sorted by the texel they show. [`plan`]: the surface as
+//! 1. [`scene`]: all that never changes. [`observations`]: pixels, sorted by the texel they show, of many
+//!    photographs no more than are asked (`sieve`). [`plan`]: the surface as
 //!    blocks of texels. [`estimate`]: what does change.
 //! 2. [`block`] (with `cell_sums`): under a known light, the reflectances of a block in closed form and its lobe's width by
 //!    looking at all.
@@ -46,6 +47,7 @@ pub mod report;
 pub mod round;
 pub mod scene;
 pub mod settings;
+mod sieve;
 #[allow(clippy::module_inception)]
 pub mod solver;
 pub mod tile;

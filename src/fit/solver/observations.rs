@@ -7,7 +7,6 @@
 use crate::fit::targets::Target;
 use crate::render::cached::ViewFootprints;
 use crate::scene::Scene;
-use rayon::prelude::*;
 
 /// A pixel and its texel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,14 +35,8 @@ pub struct Observations {
 }
 
 impl Observations {
-    /// Gathers the observations of photographs, in the order of `footprints`.
-    pub fn gather(scene: &Scene, targets: &[Target], footprints: &[ViewFootprints], map_size: usize) -> Self {
-        let per_view: Vec<Vec<Observation>> = targets
-            .par_iter()
-            .zip(footprints)
-            .enumerate()
-            .map(|(index, (target, footprints))| of_view(scene, target, index as u32, footprints))
-            .collect();
+    /// Sorts the observations of all views.
+    pub fn of_views(per_view: Vec<Vec<Observation>>, map_size: usize) -> Self {
         let texels = map_size * map_size;
         let mut of_texel = vec![0u32; texels + 1];
         for observation in per_view.iter().flatten() {

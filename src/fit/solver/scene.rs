@@ -3,6 +3,7 @@
 use super::observations::{Observation, Observations, of_view};
 use super::plan::{self, Block};
 use super::settings::SolverSettings;
+use super::sieve::Sieve;
 use crate::error::{Error, ErrorKind, Result};
 use crate::fit::targets::Target;
 use crate::math::sphere::{BilinearTap, tap_of_direction};
@@ -10,8 +11,11 @@ use crate::render::Surface;
 use crate::render::cached::{CachedSettings, CachedTransport, FootprintSettings, ViewFootprints};
 use crate::scene::{Background, PixelState, Scene};
 use glam::Vec2;
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+/// Most pixels of the held-out views together: beyond that each `n`-th is looked at.
+const MOST_HELD_OUT: usize = 4 << 20;
 /// Most background pixels that are used.
 const MOST_BACKGROUND: usize = 20_000;
 /// Sweeps in search of the light that explains all background pixels.
@@ -48,8 +52,10 @@ pub struct SolverScene {
     pub targets: Vec<Target>,
     /// The cache.
     pub transport: CachedTransport,
-    /// Footprints of the views.
+    /// Footprints of the views: those of the observations, no others.
     pub footprints: Vec<ViewFootprints>,
+    /// How they were traced.
+    pub first_hits: FootprintSettings,
     /// Pixels that show surface.
     pub observations: Observations,
     /// Pixels that show the light itself.
@@ -98,20 +104,40 @@ impl SolverScene {
             seed: settings.seed,
             ..FootprintSettings::default()
         };
-        let traced = |target: &Target| {
+        let traced = |target: &Target, sieve: Option<&Sieve>| {
             let (grid, view) = (&transport.grid, target.view as u32);
+            let wants = sieve.map(|sieve| move |pixel: u32, uv: Vec2| sieve.wants(pixel, uv));
+            let wants = wants.as_ref().map(|wants| wants as &(dyn Fn(u32, Vec2) -> bool + Sync));
             (!stop.load(Ordering::Relaxed))
-                .then(|| ViewFootprints::trace(surface, grid, &target.camera, view, &first_hits))
+                .then(|| ViewFootprints::trace_where(surface, grid, &target.camera, view, &first_hits, wants))
         };
-        let all = |targets: &[Target]| targets.iter().map(traced).collect::<Option<Vec<ViewFootprints>>>();
-        let (Some(footprints), Some(judged)) = (all(&targets), all(held_out)) else { return Ok(None) };
-        let observations = Observations::gather(scene, &targets, &footprints, settings.map_size);
+        let mut sieve = Sieve::new(settings.map_size);
+        let mut escaped = Vec::with_capacity(targets.len());
+        for (index, target) in targets.iter().enumerate() {
+            let Some(footprints) = traced(target, sieve.has_dropped().then_some(&sieve)) else { return Ok(None) };
+            escaped.push(wholly_escaped(&footprints));
+            let pixels = of_view(scene, target, index as u32, &footprints);
+            sieve.add(footprints, pixels);
+        }
+        let (footprints, pixels) = sieve.finish();
+        let observations = Observations::of_views(pixels, settings.map_size);
+        // Those that judge need not see more of a view than its share of these.
+        let pixels_of_held_out: usize = held_out.iter().map(Target::pixel_count).sum();
+        let step = pixels_of_held_out.div_ceil(MOST_HELD_OUT);
+        let mut judged = Vec::with_capacity(held_out.len());
+        for target in held_out {
+            let Some(mut footprints) = traced(target, None) else { return Ok(None) };
+            if step > 1 {
+                footprints.keep_every(step);
+            }
+            judged.push(footprints);
+        }
         if observations.list.is_empty() {
             return Err(Error::new(ErrorKind::InvalidScene, "no pixel of any view is evidence for the surface")
                 .remedy("check that the masks are not inverted or black, and that the cameras see the mesh"));
         }
         let background = if scene.background == Background::Environment && settings.use_background {
-            background_pixels(scene, &targets, &footprints, settings.light_size)
+            background_pixels(scene, &targets, &escaped, settings.light_size)
         } else {
             Vec::new()
         };
@@ -134,6 +160,7 @@ impl SolverScene {
             targets,
             transport,
             footprints,
+            first_hits,
             observations,
             background,
             gauge,
@@ -173,23 +200,35 @@ fn gauge(
     (row, photo.map(|mean| (mean / HELD_REFLECTANCE).max(1e-9)))
 }
 
+/// The pixels of a view that show nothing but background, as ranges: there are few of them.
+fn wholly_escaped(footprints: &ViewFootprints) -> Vec<Range<usize>> {
+    let mut ranges: Vec<Range<usize>> = Vec::new();
+    for (pixel, _) in footprints.escaped.iter().enumerate().filter(|(_, share)| **share >= 1.0) {
+        match ranges.last_mut() {
+            Some(last) if last.end == pixel => last.end += 1,
+            _ => ranges.push(pixel..pixel + 1),
+        }
+    }
+    ranges
+}
+
 /// Pixels that show nothing but background, thinned out evenly.
 fn background_pixels(
     scene: &Scene,
     targets: &[Target],
-    footprints: &[ViewFootprints],
+    escaped: &[Vec<Range<usize>>],
     (width, height): (usize, usize),
 ) -> Vec<BackgroundPixel> {
-    let total: usize = footprints.iter().map(|view| view.escaped.iter().filter(|&&share| share >= 1.0).count()).sum();
+    let total: usize = escaped.iter().flatten().map(Range::len).sum();
     let stride = total.div_ceil(MOST_BACKGROUND).max(1);
     let mut found = Vec::new();
     let mut seen = 0usize;
-    for (index, (target, footprints)) in targets.iter().zip(footprints).enumerate() {
+    for (index, (target, escaped)) in targets.iter().zip(escaped).enumerate() {
         // Without a mask every pixel is said to be surface, and rays decide.
         let has_mask = scene.views[target.view].states.pixels().iter().any(|state| state.is_background());
-        for (pixel, _) in footprints.escaped.iter().enumerate().filter(|(_, share)| **share >= 1.0) {
+        for pixel in escaped.iter().cloned().flatten() {
             seen += 1;
-            let (row, column) = (pixel / footprints.width, pixel % footprints.width);
+            let (row, column) = (pixel / target.camera.width, pixel % target.camera.width);
             let (radiance, state) = target.at(scene, pixel);
             let says_nothing = state == PixelState::Ignored || state.is_clipped() || (has_mask && state.is_surface());
             if !seen.is_multiple_of(stride) || says_nothing {

@@ -6,11 +6,13 @@
 use super::estimate::Estimate;
 use super::scene::SolverScene;
 use crate::material::texels::{PyramidWeights, TexelPyramid, texels_from_maps};
+use crate::render::cached::ViewFootprints;
 use crate::render::path::PathArena;
 use crate::render::picture::PictureSettings;
 use crate::render::progressive::PictureTracer;
 use crate::render::{Parameters, Surface};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Most views that are looked at.
@@ -57,12 +59,20 @@ impl SolverScene {
             ..PictureSettings::default()
         };
         let tracer = PictureTracer::new(surface, &parameters, settings);
-        let held_out = self.held_out.iter().map(|(target, footprints)| (target.view, target.camera, footprints));
-        let training =
-            self.targets.iter().zip(&self.footprints).map(|(target, made)| (target.view, target.camera, made));
+        let held_out = self.held_out.iter().map(|(target, footprints)| (target, Some(footprints)));
+        // Of views that are fitted to only the observations' footprints were kept.
+        let training = self.targets.iter().map(|target| (target, None));
         let all: Vec<_> = if self.held_out.is_empty() { training.collect() } else { held_out.collect() };
         let (mut sums, mut compared): (Sums, usize) = ([0.0; 4], 0);
-        for (view, camera, footprints) in all.iter().step_by(all.len().div_ceil(VIEWS).max(1)) {
+        for &(target, footprints) in all.iter().step_by(all.len().div_ceil(VIEWS).max(1)) {
+            let (view, camera) = (target.view as u32, &target.camera);
+            let footprints = match footprints {
+                Some(footprints) => Cow::Borrowed(footprints),
+                None => {
+                    Cow::Owned(ViewFootprints::trace(surface, &self.transport.grid, camera, view, &self.first_hits))
+                }
+            };
+            let footprints = footprints.as_ref();
             let picture = self.transport.picture(footprints, &estimate.texels, &planes, &at);
             let whole: Vec<usize> = (0..picture.len()).filter(|&pixel| footprints.escaped[pixel] == 0.0).collect();
             let chosen: Vec<usize> =
@@ -74,7 +84,7 @@ impl SolverScene {
                         return [0.0; 4];
                     }
                     let [first, second] =
-                        [0, 1].map(|pass| tracer.pixel(camera, *view as u32, pixel, SAMPLES, pass, arena).0.as_dvec3());
+                        [0, 1].map(|pass| tracer.pixel(camera, view, pixel, SAMPLES, pass, arena).0.as_dvec3());
                     let own = glam::Vec3::from_array(picture[pixel]).as_dvec3();
                     let mean = 0.5 * (first + second);
                     [(own - first).dot(own - second), first.dot(second), (own - mean).element_sum(), mean.element_sum()]

@@ -11,14 +11,14 @@
 
 mod pieces;
 
-use self::pieces::{Piece, corners_of_pixels, pieces_of_pixel};
+use self::pieces::{Piece, corners_of_pixels, pieces_of_pixel, uv_at_middle};
 use super::bounce::point_hit;
 use super::points::{NO_POINT, VisibilityGrid};
 use crate::math::frame::Frame;
 use crate::math::random::{SampleStream, StreamKey};
 use crate::render::Surface;
 use crate::scene::Camera;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 /// Rays of a shading point that look for other surface in its lobe.
@@ -67,7 +67,8 @@ pub struct ViewFootprints {
     /// Points of the visibility grid and their weights, shading point after shading point: diffuse light is averaged
     /// over the pixel, not taken at its middle, so that shadow edges are as soft as in a photo.
     pub lit: Vec<(u32, f32)>,
-    /// Share of each pixel that escapes to the background.
+    /// Share of each pixel that escapes to the background; NaN where a pixel was left out, empty where only some shading
+    /// points were kept.
     pub escaped: Vec<f32>,
 }
 
@@ -101,6 +102,19 @@ impl ViewFootprints {
         view: u32,
         settings: &FootprintSettings,
     ) -> Self {
+        Self::trace_where(surface, grid, camera, view, settings, None)
+    }
+
+    /// The same but for pixels that are not wanted, by their number and the texture coordinate that their middle shows:
+    /// those have no shading points.
+    pub fn trace_where(
+        surface: &Surface,
+        grid: &VisibilityGrid,
+        camera: &Camera,
+        view: u32,
+        settings: &FootprintSettings,
+        is_wanted: Option<&(dyn Fn(u32, Vec2) -> bool + Sync)>,
+    ) -> Self {
         let corners = corners_of_pixels(surface, camera);
         let rows: Vec<ViewFootprints> = (0..camera.height)
             .into_par_iter()
@@ -109,6 +123,13 @@ impl ViewFootprints {
                 let mut pieces = Vec::new();
                 for column in 0..camera.width {
                     let pixel = row * camera.width + column;
+                    let is_left_out = is_wanted.is_some_and(|is_wanted| {
+                        uv_at_middle(surface, camera, row, column).is_some_and(|uv| !is_wanted(pixel as u32, uv))
+                    });
+                    if is_left_out {
+                        made.escaped.push(0.0);
+                        continue;
+                    }
                     let first = row * (camera.width + 1) + column;
                     let around = [0, 1, camera.width + 1, camera.width + 2].map(|step| &corners[first + step]);
                     let escaped = pieces_of_pixel(surface, camera, row, column, settings, around, &mut pieces);
@@ -145,6 +166,35 @@ impl ViewFootprints {
     #[inline]
     pub fn lit_of(&self, point: &ShadingPoint) -> &[(u32, f32)] {
         &self.lit[point.first_lit as usize..(point.first_lit + point.lit_count) as usize]
+    }
+
+    /// Leaves out all shading points but these, which rise, and what is known of whole pixels.
+    pub fn keep_points(&mut self, kept: impl Iterator<Item = usize>) {
+        let mut made = ViewFootprints::empty(self.width, self.height);
+        for index in kept {
+            let point = &self.points[index];
+            let (first_texel, first_lit) = (made.texels.len() as u32, made.lit.len() as u32);
+            made.texels.extend_from_slice(self.texels_of(point));
+            made.lit.extend_from_slice(self.lit_of(point));
+            made.points.push(ShadingPoint { first_texel, first_lit, ..*point });
+        }
+        made.points.shrink_to_fit();
+        made.texels.shrink_to_fit();
+        made.lit.shrink_to_fit();
+        *self = made;
+    }
+
+    /// Leaves out one pixel after the other but each `step`-th.
+    pub fn keep_every(&mut self, step: usize) {
+        let stays = |pixel: usize| pixel.is_multiple_of(step.max(1));
+        let mut escaped = std::mem::take(&mut self.escaped);
+        let kept: Vec<usize> =
+            (0..self.points.len()).filter(|&index| stays(self.points[index].pixel as usize)).collect();
+        self.keep_points(kept.into_iter());
+        for (_, share) in escaped.iter_mut().enumerate().filter(|(pixel, _)| !stays(*pixel)) {
+            *share = f32::NAN;
+        }
+        self.escaped = escaped;
     }
 
     /// Bytes it takes.

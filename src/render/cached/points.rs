@@ -166,7 +166,7 @@ impl VisibilityGrid {
                 }
             }
         }
-        (best.1 != NO_POINT).then(|| PointTap { index: [best.1; 4], weight: [1.0, 0.0, 0.0, 0.0] })
+        (best.1 != NO_POINT).then_some(PointTap { index: [best.1; 4], weight: [1.0, 0.0, 0.0, 0.0] })
     }
 }
 

@@ -67,6 +67,14 @@ pub(super) fn corners_of_pixels(surface: &Surface, camera: &Camera) -> Vec<Seen>
         .collect()
 }
 
+/// Texture coordinate of the front of a surface that the middle of a pixel shows.
+pub(super) fn uv_at_middle(surface: &Surface, camera: &Camera, row: usize, column: usize) -> Option<Vec2> {
+    match look(surface, camera, Vec2::new(column as f32 + 0.5, row as f32 + 0.5)).0 {
+        Seen::Front { point, .. } => Some(point.uv),
+        Seen::Background | Seen::Back => None,
+    }
+}
+
 impl Piece {
     /// Variance of the normals, of both axes together, in squared radians. Places spread evenly have a little less
     /// variance than what lies between them.
