@@ -177,10 +177,14 @@ pub fn object(options: &ObjectOptions, json: bool) -> Result<()> {
         found.findings.iter().for_each(|finding| println!("{finding}"));
         let spread = split::SplitSpread::of(&found.candidates);
         println!(
-            "began as {}; picture within {:.3} in logarithms; {} starts explain it as well; {:.1} s: {}",
+            "began as {}; picture within {:.3} in logarithms; as well by {}; {:.1} s: {}",
             found.start,
             found.picture_log_rmse,
-            spread.starts.len(),
+            match spread.starts.len().saturating_sub(1) {
+                0 => "no other start".into(),
+                1 => "another start".into(),
+                others => format!("{others} other starts"),
+            },
             found.seconds,
             options.output.display()
         );

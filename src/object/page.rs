@@ -115,6 +115,7 @@ pub fn curve(rows: &[ObjectiveRow]) -> String {
 /// What was found, in figures.
 pub fn facts(estimate: &Estimate, model: &str, gauge: &Gauge, spread: &SplitSpread) -> String {
     let three = |values: [f64; 3]| values.map(significant).join(" · ");
+    let known = |spread: Option<f64>| spread.map_or("not known".into(), |spread| fixed(spread, 3));
     let mut rows = vec![
         ("model", model.to_string()),
         ("began as", estimate.start.clone()),
@@ -123,8 +124,8 @@ pub fn facts(estimate: &Estimate, model: &str, gauge: &Gauge, spread: &SplitSpre
         ("geometric mean of the light, R · G · B", three(gauge.light_mean)),
         ("largest directional albedo, R · G · B", three(gauge.largest_albedo)),
         ("starts that explain the photo as well", spread.starts.join(", ")),
-        ("their spread in the light (RMS, natural)", fixed(spread.light, 3)),
-        ("their spread in the reflectance (RMS, natural)", fixed(spread.reflectance, 3)),
+        ("their spread in the light (RMS, natural)", known(spread.light)),
+        ("their spread in the reflectance (RMS, natural)", known(spread.reflectance)),
     ];
     if let Some(seen) = &estimate.light_seen {
         rows.push(("directions the photos tell next to nothing of", format!("{:.0} %", 100.0 * seen.unseen_share)));

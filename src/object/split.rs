@@ -70,31 +70,27 @@ pub struct SplitSpread {
     /// Names of these starts, the best first.
     pub starts: Vec<String>,
     /// Root mean square over the sphere of the spread of the logarithm of light, its level per channel taken out;
-    /// natural units.
-    pub light: f64,
+    /// natural units. `None` where it is not known: fewer than two starts are as good, or the light is given.
+    pub light: Option<f64>,
     /// The same of the reflectance at the nodes.
-    pub reflectance: f64,
+    pub reflectance: Option<f64>,
 }
 
 impl SplitSpread {
-    /// The spread of the starts that were followed. Fewer than two that are as good give a spread of 0.
+    /// The spread of the starts that were followed. One start that is ahead of all others does not make the split sure: it
+    /// says nothing of how far light and reflectance may be off together.
     pub fn of(candidates: &[Candidate]) -> Self {
         let Some(best) = candidates.first() else { return SplitSpread::default() };
         let good: Vec<&Candidate> =
             candidates.iter().filter(|candidate| candidate.evidence <= best.evidence + AS_GOOD).collect();
         let starts = good.iter().map(|candidate| candidate.name.clone()).collect();
         let lights: Vec<&LogLight> = good.iter().filter_map(|candidate| candidate.light.as_ref()).collect();
-        let light = match lights.first() {
-            Some(first) => {
-                let weights = shares(first.width, first.height);
-                let maps: Vec<Vec<f64>> = lights
-                    .iter()
-                    .map(|light| light.channels.iter().flatten().map(|&log| f64::from(log)).collect())
-                    .collect();
-                spread(&maps, |index| f64::from(weights[index % weights.len()]), weights.len())
-            }
-            None => 0.0,
-        };
+        let light = lights.first().and_then(|first| {
+            let weights = shares(first.width, first.height);
+            let log = |light: &&LogLight| light.channels.iter().flatten().map(|&log| f64::from(log)).collect();
+            let maps: Vec<Vec<f64>> = lights.iter().map(log).collect();
+            spread(&maps, |index| f64::from(weights[index % weights.len()]), weights.len())
+        });
         let tables: Vec<Vec<f64>> = good
             .iter()
             .map(|candidate| {
@@ -108,10 +104,10 @@ impl SplitSpread {
     }
 }
 
-/// Root of the weighted mean variance between maps whose mean per channel was taken out.
-fn spread(maps: &[Vec<f64>], weight: impl Fn(usize) -> f64, channel: usize) -> f64 {
+/// Root of the weighted mean variance between maps whose mean per channel was taken out; `None` of fewer than two.
+fn spread(maps: &[Vec<f64>], weight: impl Fn(usize) -> f64, channel: usize) -> Option<f64> {
     if maps.len() < 2 || channel == 0 {
-        return 0.0;
+        return None;
     }
     let total: f64 = (0..channel).map(&weight).sum();
     let centred: Vec<Vec<f64>> = maps
@@ -134,7 +130,7 @@ fn spread(maps: &[Vec<f64>], weight: impl Fn(usize) -> f64, channel: usize) -> f
         })
         .sum::<f64>()
         / (total * (length / channel) as f64);
-    variance.sqrt()
+    Some(variance.sqrt())
 }
 
 #[cfg(test)]
@@ -167,8 +163,15 @@ mod tests {
             not_finite: 0,
         };
         let same = SplitSpread::of(&[candidate("a", 1.0, 0.0), candidate("b", 2.0, 0.0)]);
-        assert!(same.light < 1e-5 && same.reflectance < 1e-3 && same.starts.len() == 2);
+        assert!(same.light.unwrap() < 1e-5 && same.reflectance.unwrap() < 1e-3 && same.starts.len() == 2);
         let other = SplitSpread::of(&[candidate("a", 1.0, 0.0), candidate("b", 1.0, 1.0)]);
-        assert!((other.light - 0.5f64.sqrt() * 0.5).abs() < 0.01, "{}", other.light);
+        let light = other.light.unwrap();
+        assert!((light - 0.5f64.sqrt() * 0.5).abs() < 0.01, "{light}");
+        // One start alone says nothing of the spread, and a file says so.
+        let alone = SplitSpread::of(&[candidate("a", 1.0, 0.0)]);
+        assert_eq!((alone.starts.len(), alone.light, alone.reflectance), (1, None, None));
+        let written = serde_json::to_string(&alone).unwrap();
+        assert!(written.contains("\"light\":null"), "{written}");
+        assert_eq!(serde_json::from_str::<SplitSpread>(&written).unwrap(), alone);
     }
 }

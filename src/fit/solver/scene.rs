@@ -14,7 +14,7 @@ use glam::Vec2;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Most pixels of the held-out views together: beyond that each `n`-th is looked at.
+/// Most pixels of the held-out views together: beyond that one in so many is looked at.
 const MOST_HELD_OUT: usize = 4 << 20;
 /// Most background pixels that are used.
 const MOST_BACKGROUND: usize = 20_000;
@@ -128,7 +128,7 @@ impl SolverScene {
         for target in held_out {
             let Some(mut footprints) = traced(target, None) else { return Ok(None) };
             if step > 1 {
-                footprints.keep_every(step);
+                footprints.keep_one_in(step);
             }
             judged.push(footprints);
         }

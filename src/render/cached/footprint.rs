@@ -16,7 +16,7 @@ use self::pieces::{Piece, corners_of_pixels, pieces_of_pixel, uv_at_middle};
 use super::bounce::point_hit;
 use super::points::{NO_POINT, VisibilityGrid};
 use crate::math::frame::Frame;
-use crate::math::random::{SampleStream, StreamKey};
+use crate::math::random::{SampleStream, StreamKey, mix};
 use crate::render::Surface;
 use crate::scene::Camera;
 use glam::{Vec2, Vec3};
@@ -185,9 +185,9 @@ impl ViewFootprints {
         *self = made;
     }
 
-    /// Leaves out one pixel after the other but each `step`-th.
-    pub fn keep_every(&mut self, step: usize) {
-        let stays = |pixel: usize| pixel.is_multiple_of(step.max(1));
+    /// Leaves out all pixels but one in `step`, scattered evenly.
+    pub fn keep_one_in(&mut self, step: usize) {
+        let stays = |pixel: usize| mix(pixel as u64).is_multiple_of(step.max(1) as u64);
         let mut escaped = std::mem::take(&mut self.escaped);
         let kept: Vec<usize> =
             (0..self.points.len()).filter(|&index| stays(self.points[index].pixel as usize)).collect();

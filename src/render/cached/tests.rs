@@ -176,3 +176,58 @@ fn footprints_cover_pixels_with_weights_that_sum_to_one() {
     // Backs and the very rim are left out.
     assert!(whole as f64 > 0.97 * share.len() as f64, "{whole} of {}", share.len());
 }
+
+#[test]
+fn pixels_that_are_not_wanted_or_left_out_have_no_shading_points_and_others_keep_theirs() {
+    let small = small();
+    let grid = VisibilityGrid::new(&small.surface, 64);
+    let first_hits = FootprintSettings { map_size: 128, ..FootprintSettings::default() };
+    let camera = &small.scene.views[0].camera;
+    let all = ViewFootprints::trace(&small.surface, &grid, camera, 0, &first_hits);
+    let of_pixel = |footprints: &ViewFootprints, pixel: u32| {
+        let own = footprints.points.iter().filter(|point| point.pixel == pixel);
+        let lists = |point| (footprints.texels_of(point).to_vec(), footprints.lit_of(point).to_vec());
+        own.map(|point| (point.share, point.normal, lists(point))).collect::<Vec<_>>()
+    };
+    let wants = |pixel: u32, uv: glam::Vec2| pixel.is_multiple_of(3) && uv.x > 0.3;
+    let wanted = ViewFootprints::trace_where(&small.surface, &grid, camera, 0, &first_hits, Some(&wants));
+    let mut kept = all.clone();
+    kept.keep_one_in(4);
+    let (mut left_out, mut fewer) = (0, 0);
+    for pixel in 0..(camera.width * camera.height) as u32 {
+        let whole = of_pixel(&all, pixel);
+        let of_wanted = of_pixel(&wanted, pixel);
+        assert!(of_wanted.is_empty() || of_wanted == whole, "{pixel}");
+        left_out += usize::from(of_wanted.is_empty() && !whole.is_empty());
+        let of_kept = of_pixel(&kept, pixel);
+        let is_left_out = kept.escaped[pixel as usize].is_nan();
+        assert!(if is_left_out { of_kept.is_empty() } else { of_kept == whole }, "{pixel}");
+        fewer += usize::from(is_left_out);
+    }
+    let pixels = camera.width * camera.height;
+    println!("{left_out} and {fewer} of {pixels} pixels left out");
+    assert!(left_out > pixels / 3 && (pixels * 7 / 10..pixels * 8 / 10).contains(&fewer));
+}
+
+/// On a grid this coarse many charts have no point of their own.
+#[test]
+fn points_of_another_chart_never_light_a_place() {
+    let small = small();
+    let grid = VisibilityGrid::new(&small.surface, 32);
+    let (mut served, mut farthest) = (0usize, 0.0f32);
+    for row in 0..48 {
+        for column in 0..64 {
+            let ray = small.scene.views[0].camera.ray_through(glam::Vec2::new(column as f32 + 0.5, row as f32 + 0.5));
+            let Some(hit) = small.surface.closest(&ray) else { continue };
+            let place = small.surface.point(&hit);
+            let Some(tap) = grid.tap(&place) else { continue };
+            served += 1;
+            for (index, _) in tap.index.into_iter().zip(tap.weight).filter(|&(_, weight)| weight > 0.0) {
+                let away = grid.points[index as usize].position.distance(place.position);
+                farthest = farthest.max(away * place.uv_per_length * 32.0);
+            }
+        }
+    }
+    println!("{served} places served, the farthest by a point {farthest:.1} texels away");
+    assert!(served > 1000 && farthest < 8.0, "{served} {farthest}");
+}

@@ -23,17 +23,23 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
         ui.label(match spread.starts.len() {
             0 => "The starts were not followed to the end".into(),
             1 => "One start alone explains the photo; the others are at least 12 nats behind".into(),
-            count => format!(
-                "{count} starts explain the photo about as well: they differ by {:.2} in the logarithm of the light and \
-                 by {:.2} in that of the reflectance",
-                spread.light, spread.reflectance
-            ),
+            count => {
+                let of = |what: &str, spread: Option<f64>| {
+                    spread.map(|spread| format!("{spread:.2} in the logarithm of the {what}"))
+                };
+                let both = [of("light", spread.light), of("reflectance", spread.reflectance)];
+                let both = both.into_iter().flatten().collect::<Vec<_>>().join(" and by ");
+                format!("{count} starts explain the photo about as well: they differ by {both}")
+            }
         });
         let [red, green, blue] = gauge.largest_factor;
-        ui.label(RichText::new(format!(
-            "No photo tells the level: reflectance may be multiplied by up to {red:.1} (red), {green:.1} (green), \
+        ui.label(
+            RichText::new(format!(
+                "No photo tells the level: reflectance may be multiplied by up to {red:.1} (red), {green:.1} (green), \
              {blue:.1} (blue), and the light divided by it"
-        )).weak());
+            ))
+            .weak(),
+        );
         if !outcome.starts.is_empty() {
             heading(ui, "Starts that were followed");
             Grid::new("starts").striped(true).num_columns(4).spacing([18.0, 4.0]).show(ui, |ui| {
@@ -43,8 +49,9 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
                 ui.end_row();
                 for start in &outcome.starts {
                     ui.label(&start.name);
-                    ui.label(format!("{:.1}", start.nats_behind))
-                        .on_hover_text("Difference of the logarithm of the evidence to the best: likelihood under any light");
+                    ui.label(format!("{:.1}", start.nats_behind)).on_hover_text(
+                        "Difference of the logarithm of the evidence to the best: likelihood under any light",
+                    );
                     ui.label(format!("{:.4}", start.objective)).on_hover_text("At low resolution");
                     ui.label(match start.is_as_good {
                         true => RichText::new("as good").color(colours.good),
