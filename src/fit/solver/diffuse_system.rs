@@ -222,8 +222,6 @@ pub(super) mod tests {
     use crate::fit::solver::observations::Observation;
     use crate::math::random::SequentialRandom;
     use crate::render::cached::ShadingPoint;
-    use crate::render::cached::points::NO_POINT;
-    use glam::Vec3;
 
     /// Pixels of two views on maps of `map_size`: each covers some texels side by side, some also one far away.
     pub fn made_up(map_size: usize, pixels: usize) -> (Vec<ViewFootprints>, Observations, Vec<DiffuseRow>) {
@@ -246,19 +244,7 @@ pub(super) mod tests {
                 of_view.texels.extend([(first, 0.5), (first + 1, 0.2), (first + map_size as u32, 0.2)]);
                 let other = if pixel % 5 == 0 { (random.next_number() * texels as f32) as u32 } else { first };
                 of_view.texels.push((other.min(texels as u32 - 1), 0.1));
-                of_view.points.push(ShadingPoint {
-                    pixel,
-                    share: 1.0,
-                    normal: Vec3::Z,
-                    normal_variance: 0.0,
-                    to_viewer: Vec3::Z,
-                    lobe_point: 0,
-                    lobe_hits: [NO_POINT; 4],
-                    first_texel,
-                    texel_count: 4,
-                    first_lit: 0,
-                    lit_count: 0,
-                });
+                of_view.points.push(ShadingPoint::head_on(pixel, first_texel..first_texel + 4, 0..0));
                 list.push(Observation { view, point: pixel, texel: first, radiance: [0.0; 3], clipped: false });
             }
             footprints.push(of_view);

@@ -56,15 +56,9 @@ impl Sieve {
 
     /// Adds the next view: its footprints, of which those of pixels that stay are kept, and its pixels, in their order.
     pub fn add(&mut self, footprints: ViewFootprints, pixels: Vec<Observation>) {
-        self.views.push((footprints, pixels));
-        let (map_size, halvings) = (self.map_size, &self.halvings);
-        if let Some(view) = self.views.last_mut() {
-            drop_pixels(view, map_size, halvings);
-            for pixel in &view.1 {
-                self.counts[block_of(pixel.texel, map_size)] += 1;
-            }
-            self.held += view.1.len();
-        }
+        let mut view = (footprints, pixels);
+        self.held += sift(&mut view, self.map_size, &self.halvings, &mut self.counts);
+        self.views.push(view);
         self.raise();
         if 4 * self.stale > self.held {
             self.sweep();
@@ -113,15 +107,11 @@ impl Sieve {
 
     /// Drops what does not stay, and counts anew.
     fn sweep(&mut self) {
-        let (map_size, halvings) = (self.map_size, &self.halvings);
         self.counts.fill(0);
+        self.held = 0;
         for view in &mut self.views {
-            drop_pixels(view, map_size, halvings);
-            for pixel in &view.1 {
-                self.counts[block_of(pixel.texel, map_size)] += 1;
-            }
+            self.held += sift(view, self.map_size, &self.halvings, &mut self.counts);
         }
-        self.held = self.views.iter().map(|(_, pixels)| pixels.len()).sum();
         self.stale = 0;
     }
 }
@@ -136,19 +126,28 @@ fn stays(view: u32, pixel: u32, halvings: u8) -> bool {
     (mix(mix(u64::from(view)) ^ u64::from(pixel)) as u32).leading_zeros() >= u32::from(halvings)
 }
 
-fn drop_pixels((footprints, pixels): &mut (ViewFootprints, Vec<Observation>), map_size: usize, halvings: &[u8]) {
+/// Drops the pixels of a view that do not stay, and their footprints; counts the others, and returns how many they are.
+fn sift(
+    (footprints, pixels): &mut (ViewFootprints, Vec<Observation>),
+    map_size: usize,
+    halvings: &[u8],
+    counts: &mut [u32],
+) -> usize {
     pixels.retain(|pixel| {
         let place = footprints.points[pixel.point as usize].pixel;
-        stays(pixel.view, place, halvings[block_of(pixel.texel, map_size)])
+        let block = block_of(pixel.texel, map_size);
+        let stays = stays(pixel.view, place, halvings[block]);
+        counts[block] += u32::from(stays);
+        stays
     });
     pixels.shrink_to_fit();
-    if pixels.len() == footprints.points.len() {
-        return;
+    if pixels.len() != footprints.points.len() {
+        footprints.keep_points(pixels.iter().map(|pixel| pixel.point as usize));
+        for (point, pixel) in pixels.iter_mut().enumerate() {
+            pixel.point = point as u32;
+        }
     }
-    footprints.keep_points(pixels.iter().map(|pixel| pixel.point as usize));
-    for (point, pixel) in pixels.iter_mut().enumerate() {
-        pixel.point = point as u32;
-    }
+    pixels.len()
 }
 
 #[cfg(test)]
@@ -156,8 +155,6 @@ mod tests {
     use super::*;
     use crate::math::random::SequentialRandom;
     use crate::render::cached::ShadingPoint;
-    use crate::render::cached::points::NO_POINT;
-    use glam::Vec3;
 
     const SIZE: usize = 16;
 
@@ -167,19 +164,8 @@ mod tests {
         let (mut points, mut texels, mut seen) = (Vec::new(), Vec::new(), Vec::new());
         for pixel in 0..pixels {
             let texel = if pixel % 8 == 0 { random.below(SIZE * SIZE) } else { random.below(4) } as u32;
-            points.push(ShadingPoint {
-                pixel,
-                share: 1.0,
-                normal: Vec3::Z,
-                normal_variance: 0.0,
-                to_viewer: Vec3::Z,
-                lobe_point: 0,
-                lobe_hits: [NO_POINT; 4],
-                first_texel: texels.len() as u32,
-                texel_count: 1,
-                first_lit: pixel,
-                lit_count: 1,
-            });
+            let first = texels.len() as u32;
+            points.push(ShadingPoint::head_on(pixel, first..first + 1, pixel..pixel + 1));
             texels.push((texel, 1.0));
             let radiance = [pixel as f32; 3];
             seen.push(Observation { view: index, point: pixel, texel, radiance, clipped: false });

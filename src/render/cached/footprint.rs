@@ -21,6 +21,8 @@ use crate::render::Surface;
 use crate::scene::Camera;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
+#[cfg(test)]
+use std::ops::Range;
 
 /// Rays of a shading point that look for other surface in its lobe.
 pub const LOBE_RAYS: usize = 4;
@@ -52,6 +54,26 @@ pub struct ShadingPoint {
     pub first_lit: u32,
     /// Number of its points of the grid.
     pub lit_count: u32,
+}
+
+#[cfg(test)]
+impl ShadingPoint {
+    /// A whole pixel that looks straight at flat surface, with these of the view's texels and points of the grid.
+    pub(crate) fn head_on(pixel: u32, texels: Range<u32>, lit: Range<u32>) -> Self {
+        ShadingPoint {
+            pixel,
+            share: 1.0,
+            normal: Vec3::Z,
+            normal_variance: 0.0,
+            to_viewer: Vec3::Z,
+            lobe_point: 0,
+            lobe_hits: [NO_POINT; LOBE_RAYS],
+            first_texel: texels.start,
+            texel_count: texels.len() as u32,
+            first_lit: lit.start,
+            lit_count: lit.len() as u32,
+        }
+    }
 }
 
 /// The shading points of a view.
