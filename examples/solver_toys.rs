@@ -18,7 +18,7 @@ use patina::material::MaterialMaps;
 use patina::material::texels::{PyramidWeights, TexelPyramid, texels_from_maps};
 use patina::render::picture::{PictureSettings, render};
 use patina::render::{Parameters, Surface};
-use patina::scene::{ReadSettings, Scene, read};
+use patina::scene::{Background, ReadSettings, Scene, read};
 use patina::{Error, ErrorKind, Result};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -175,8 +175,9 @@ fn picture_error(
     let (mut sum, mut count) = (0.0, 0.0);
     for (view, picture) in pictures {
         let [first, second]: [Image<Vec3>; 2] = [11, 12].map(|seed| {
+            let background_visible = scene.background == Background::Environment;
             let settings =
-                PictureSettings { samples, max_bounces, background_visible: false, seed, ..PictureSettings::default() };
+                PictureSettings { samples, max_bounces, background_visible, seed, ..PictureSettings::default() };
             let stop = AtomicBool::new(false);
             render(surface, &scene.views[*view].camera, &parameters, *view as u32, &settings, &stop).radiance
         });

@@ -11,8 +11,8 @@
 //! 4. [`light_step`]: the light from those rows, at least zero ([`non_negative`]), in wide and narrow hats
 //!    ([`light_shape`]), with a weak wish for smoothness. [`light_round`] is the round as a whole,
 //!    [`light_evidence`] says what each texel of the light is known by.
-//! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`) with the footprints of pixels, where the evidence decides which
-//!    texels share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_prior`], [`lobe_widths`], [`lobe_families`]), then
+//! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`, `tile_reflectances`) with the footprints of pixels, where the evidence
+//!    decides which texels share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_prior`], [`lobe_widths`], [`lobe_families`]), then
 //!    [`mod@diffuse`]: all diffuse texels together ([`diffuse_system`]).
 //! 6. [`choice`]: views that took no part say what lobes, light between surfaces and the light's resolution bought.
 //! 7. [`solver`]: the steps in their order. A fit does them one by one, as [`crate::fit::Fitter`] does those of Adam: on
@@ -52,6 +52,7 @@ mod sieve;
 pub mod solver;
 pub mod tile;
 mod tile_lobes;
+mod tile_reflectances;
 pub mod transport_check;
 
 #[cfg(test)]

@@ -123,17 +123,17 @@ impl Tile {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::block::PixelTerms;
     use super::super::tile::TilePixel;
     use super::*;
     use crate::math::random::SequentialRandom;
 
     /// Diffuse reflectance, F0 and the logarithm of the width: a paint, and a metal beside it.
-    const TRUTH: [(f32, f64, f64); 2] = [(0.5, 0.05, -0.9), (0.05, 0.6, -0.5)];
+    pub const TRUTH: [(f32, f64, f64); 2] = [(0.5, 0.05, -0.9), (0.05, 0.6, -0.5)];
 
     /// Two texels, and pixels that show a share of the second: exact sums of what the two send.
-    fn tile(believed: [(f32, f64, f64); 2]) -> Tile {
+    pub fn tile(believed: [(f32, f64, f64); 2]) -> Tile {
         let widths = log_widths();
         let mut tile = Tile { texels: vec![0, 1], ..Tile::default() };
         for (rho, specular, log_width) in believed {
