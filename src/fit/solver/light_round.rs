@@ -3,6 +3,7 @@
 use super::block::BlockPrior;
 use super::eliminate::BlockRows;
 use super::estimate::Estimate;
+use super::light_colour::change_by_highlights;
 use super::light_evidence::{LightKnown, Precisions, evidence_shares};
 use super::light_shape::{LightShape, bright_texels};
 use super::light_step::{Gauge, LightPrior, NormalEquations, narrow_scales, solve_channel};
@@ -44,7 +45,8 @@ impl SolverScene {
         } else {
             let surface = equations.each_ref().map(NormalEquations::diagonal);
             self.add_background(&mut equations, &shape, &estimate.log_gains);
-            Some(self.solve_light(&equations, &surface, &shape, estimate, stop)?)
+            let held = self.held_light(estimate, &done, number);
+            Some(self.solve_light(&equations, &surface, (&shape, held), estimate, stop)?)
         };
         let gains = self.settings.exposure.then(|| gain_ratios(&round, &done, self.views.len()));
         let mut errors = ErrorSums::new(self.views.len());
@@ -162,12 +164,29 @@ impl SolverScene {
         }
     }
 
+    /// What the mean light on the surface is held to, per channel: grey surface at first, then as much light in all, of
+    /// the colour that highlights ask for.
+    fn held_light(&self, estimate: &Estimate, done: &Solved, number: usize) -> [f64; 3] {
+        let (row, grey) = &self.gauge;
+        if number < self.settings.coarse_rounds {
+            return *grey;
+        }
+        let now = [0, 1, 2].map(|c| -> f64 {
+            row.iter().zip(&estimate.light).map(|(&weight, light)| f64::from(weight) * f64::from(light[c])).sum()
+        });
+        let beside_grey = [0, 1, 2].map(|c| (now[c] / grey[c]).max(1e-3).ln());
+        let change = change_by_highlights(done.iter().map(|(_, work)| work), beside_grey, self.settings.independence);
+        let asked = [0, 1, 2].map(|c| (now[c] * change[c]).max(1e-9));
+        let factor = grey.iter().sum::<f64>() / asked.iter().sum::<f64>();
+        asked.map(|asked| asked * factor)
+    }
+
     /// The light, and what each of its texels is known by. `surface` are the diagonals before background was added.
     fn solve_light(
         &self,
         equations: &[NormalEquations; 3],
         surface: &[Vec<f64>; 3],
-        shape: &LightShape,
+        (shape, held): (&LightShape, [f64; 3]),
         estimate: &Estimate,
         stop: &AtomicBool,
     ) -> Option<(Vec<[f32; 3]>, LightKnown)> {
@@ -184,7 +203,7 @@ impl SolverScene {
             .into_par_iter()
             .map(|c| {
                 let mut x = before[c].clone();
-                let gauge = Gauge { row: &self.gauge.0, mean: self.gauge.1[c] };
+                let gauge = Gauge { row: &self.gauge.0, mean: held[c] };
                 let known = solve_channel(&equations[c], shape, &prior, &gauge, &narrow, &mut x);
                 let precisions = Precisions::new(&surface[c], &equations[c], known.belief, prior.independence);
                 (shape.expand(&x), precisions, known.scale_deviation)

@@ -29,6 +29,7 @@ pub mod diffuse;
 pub mod diffuse_system;
 pub mod eliminate;
 pub mod estimate;
+mod light_colour;
 pub mod light_evidence;
 pub mod light_round;
 pub mod light_shape;

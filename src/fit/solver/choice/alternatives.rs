@@ -8,7 +8,7 @@
 
 use super::super::block::MOST_NODES;
 use super::super::lobe_prior::LobePrior;
-use super::super::tile::{Highlights, Tile, forgiven, least_noise};
+use super::super::tile::{Tile, forgiven, least_noise};
 use super::apply::ChosenLobe;
 use super::student::StudentNoise;
 use super::{ALTERNATIVES, Alternative};
@@ -83,9 +83,8 @@ impl TileAlternatives {
         let mut again = |tile: &mut Tile, choice: Alternative| {
             let began = Instant::now();
             tile.rho.clone_from(&kept_tile.0);
-            let highlights = if choice == Alternative::Diffuse { Highlights::Known } else { Highlights::Unknown };
             tile.solve_diffuse();
-            tile.weigh(mean_radiance, highlights);
+            tile.weigh(mean_radiance);
             tile.solve_diffuse();
             made.rho[choice.index()] = tile.rho.clone();
             noise[choice.index()] = noise_of(tile, mean_radiance);
@@ -94,7 +93,7 @@ impl TileAlternatives {
         let began = Instant::now();
         if any_withheld {
             tile.solve_diffuse();
-            tile.weigh(mean_radiance, Highlights::Unknown);
+            tile.weigh(mean_radiance);
             tile.solve_lobes(map_size, independence, prior);
             tile.set_lobes();
             tile.solve_reflectances(independence);
