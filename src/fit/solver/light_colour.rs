@@ -2,8 +2,8 @@
 //!
 //! Nothing in diffuse surfaces tells a red light on white things from a white light on red ones, and the gauge begins by
 //! taking the mean of all surface for grey. But F0 of what is no metal is grey, so its highlights have the colour of the
-//! light (Klinker, Shafer and Kanade 1988; Lee 1986): where blocks find F0 less in red than in green, their light is as much too
-//! red.
+//! light (Klinker, Shafer and Kanade 1988; Lee 1986): where blocks find F0 less in red than in green, their light is as
+//! much too red.
 
 use super::cell_sums::System;
 use super::round::BlockWork;
@@ -63,12 +63,12 @@ fn specular_of(work: &BlockWork, c: usize, noise: f64) -> (f64, f64) {
         let own = f64::from(term.radiance[c] - stencil.of(&term.grazing, c)) - cell * e;
         sums.observe(f64::from(term.weight), e, f64::from(stencil.of(&term.base, c)), own);
     }
-    let System { ee, es, ss, ey, sy, .. } = sums;
-    let left = ss - es * es / ee.max(1e-30);
-    if left <= 1e-6 * ss {
+    // Diffuse reflectance is whatever it is; more than zero, since a block that no light reaches has sums of zero.
+    let System { ss, sy, .. } = sums.without_deviation(f64::MIN_POSITIVE);
+    if ss <= 1e-6 * sums.ss {
         return (0.0, 0.0);
     }
-    ((sy - es * ey / ee) / left, left / (noise * noise))
+    (sy / ss, ss / (noise * noise))
 }
 
 #[cfg(test)]
@@ -131,5 +131,15 @@ mod tests {
         let made = blocks(1, [0.05; 3], [1.1, 1.0, 0.95]);
         let change = change_by_highlights(made.iter(), [0.0; 3], 0.05);
         assert!(change.iter().all(|change| change.ln().abs() < 0.02), "{change:?}");
+    }
+
+    #[test]
+    fn a_block_that_no_light_reaches_leaves_the_light_finite() {
+        let mut made = blocks(10, [0.05; 3], [1.1, 1.0, 0.95]);
+        for term in made.iter_mut().flat_map(|work| &mut work.terms) {
+            term.arriving = [0.0; 3];
+        }
+        let change = change_by_highlights(made.iter(), [0.0; 3], 0.05);
+        assert!(change.iter().all(|change| change.is_finite() && (0.7..1.4).contains(change)), "{change:?}");
     }
 }

@@ -46,7 +46,7 @@ impl SolverScene {
             let surface = equations.each_ref().map(NormalEquations::diagonal);
             self.add_background(&mut equations, &shape, &estimate.log_gains);
             let held = self.held_light(estimate, &done, number);
-            Some(self.solve_light(&equations, &surface, (&shape, held), estimate, stop)?)
+            Some(self.solve_light(&equations, &surface, &shape, held, estimate, stop)?)
         };
         let gains = self.settings.exposure.then(|| gain_ratios(&round, &done, self.views.len()));
         let mut errors = ErrorSums::new(self.views.len());
@@ -186,7 +186,8 @@ impl SolverScene {
         &self,
         equations: &[NormalEquations; 3],
         surface: &[Vec<f64>; 3],
-        (shape, held): (&LightShape, [f64; 3]),
+        shape: &LightShape,
+        held: [f64; 3],
         estimate: &Estimate,
         stop: &AtomicBool,
     ) -> Option<(Vec<[f32; 3]>, LightKnown)> {

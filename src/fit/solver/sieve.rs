@@ -4,7 +4,8 @@
 //! other; each pixel draws a lot by its place alone, and a block that has too many asks for better lots from then on, by
 //! halves. What is left is an even sample of all views, whichever came first. Where no block has too many, as in scenes of
 //! some dozen photos, or where all pixels are few, all stay: diffuse reflectance is solved with all of them at the end.
-//! Small photos over coarse maps were thinned at first, which made diffuse maps of the hard cases worse by a tenth.
+//! Small photos over coarse maps were thinned at first, which made diffuse maps of the hard cases worse by 4 % in the mean,
+//! under the strongest sun by two fifths.
 
 use super::observations::Observation;
 use crate::math::random::mix;
@@ -41,10 +42,10 @@ pub struct Sieve {
 impl Sieve {
     /// A sieve over square maps of this many texels along a side.
     pub fn new(map_size: usize) -> Self {
-        Sieve::with_most(map_size, MOST_OF_BLOCK, (FREE, MOST))
+        Sieve::with_most(map_size, MOST_OF_BLOCK, FREE, MOST)
     }
 
-    fn with_most(map_size: usize, most_of_block: u32, (free, most): (usize, usize)) -> Self {
+    fn with_most(map_size: usize, most_of_block: u32, free: usize, most: usize) -> Self {
         let blocks = map_size.div_ceil(BLOCK).pow(2);
         Sieve {
             map_size,
@@ -182,9 +183,10 @@ mod tests {
     fn sifted(
         views: u32,
         most_of_block: u32,
-        most: (usize, usize),
+        free: usize,
+        most: usize,
     ) -> (Vec<ViewFootprints>, Vec<Vec<Observation>>, usize) {
-        let mut sieve = Sieve::with_most(SIZE, most_of_block, most);
+        let mut sieve = Sieve::with_most(SIZE, most_of_block, free, most);
         let mut largest = 0;
         for index in 0..views {
             let (footprints, pixels) = view(index, 400);
@@ -197,7 +199,7 @@ mod tests {
 
     #[test]
     fn blocks_with_few_pixels_keep_all_and_others_an_even_sample_of_all_views() {
-        let (footprints, pixels, largest) = sifted(200, 512, (0, usize::MAX));
+        let (footprints, pixels, largest) = sifted(200, 512, 0, usize::MAX);
         // Of 80,000 pixels 10,000 show any block: 625 each and 70,000 more the first.
         let mut counts = [0usize; 16];
         for pixel in pixels.iter().flatten() {
@@ -225,21 +227,21 @@ mod tests {
 
     #[test]
     fn all_stay_where_no_block_has_too_many() {
-        let (_, pixels, _) = sifted(1, 512, (0, usize::MAX));
+        let (_, pixels, _) = sifted(1, 512, 0, usize::MAX);
         assert_eq!(pixels[0], view(0, 400).1);
     }
 
     #[test]
     fn all_stay_where_all_together_are_few() {
-        let (_, pixels, _) = sifted(20, 512, (8000, usize::MAX));
+        let (_, pixels, _) = sifted(20, 512, 8000, usize::MAX);
         assert_eq!(pixels.iter().map(Vec::len).sum::<usize>(), 8000);
-        let (_, pixels, _) = sifted(20, 512, (7999, usize::MAX));
+        let (_, pixels, _) = sifted(20, 512, 7999, usize::MAX);
         assert!(pixels.iter().map(Vec::len).sum::<usize>() < 4000);
     }
 
     #[test]
     fn what_all_blocks_keep_is_bounded_too() {
-        let (_, pixels, largest) = sifted(200, 512, (0, 1000));
+        let (_, pixels, largest) = sifted(200, 512, 0, 1000);
         let kept: usize = pixels.iter().map(Vec::len).sum();
         assert!((200..=1000).contains(&kept) && largest < 2500, "{kept} {largest}");
     }
