@@ -220,7 +220,7 @@ impl Fitter {
 
     /// What fixes the scale between reflectance and light.
     pub fn gauge(&self) -> GaugeRule {
-        GaugeRule::of(self.scene.background, self.settings.background, self.settings.fixed_light)
+        GaugeRule::of(self.scene.background, self.settings.background, self.settings.fixed_light, self.settings.method)
     }
 
     /// The maps as they are, of the size of the stage.

@@ -4,7 +4,7 @@
 //! bounds of reflectance and a visible background each break the freedom a little or wholly. The rule that fixed it is
 //! named in every report, and scores are given raw and scale-aligned.
 
-use super::settings::BackgroundEvidence;
+use super::settings::{BackgroundEvidence, Method};
 use crate::render::Parameters;
 use crate::scene::Background;
 use glam::Vec3;
@@ -19,14 +19,18 @@ pub enum GaugeRule {
     FixedLight,
     /// The start: mean reflectance 0.5 in the mean light that explains the photographs.
     Start,
+    /// The start holds for the mean of the channels; how they differ is told by highlights, since F0 of what is no metal is
+    /// grey (Lee 1986).
+    StartAndHighlights,
 }
 
 impl GaugeRule {
     /// The rule that holds for a fit.
-    pub fn of(background: Background, evidence: BackgroundEvidence, fixed_light: bool) -> Self {
-        match (fixed_light, background, evidence) {
-            (true, _, _) => GaugeRule::FixedLight,
-            (false, Background::Environment, BackgroundEvidence::Use) => GaugeRule::Background,
+    pub fn of(background: Background, evidence: BackgroundEvidence, fixed_light: bool, method: Method) -> Self {
+        match (fixed_light, background, evidence, method) {
+            (true, _, _, _) => GaugeRule::FixedLight,
+            (false, Background::Environment, BackgroundEvidence::Use, _) => GaugeRule::Background,
+            (_, _, _, Method::Solver) => GaugeRule::StartAndHighlights,
             _ => GaugeRule::Start,
         }
     }
@@ -41,6 +45,11 @@ impl GaugeRule {
             GaugeRule::Start => {
                 "Nothing in the photographs fixes the scale between diffuse reflectance and light; it stays near the \
                  start, a mean reflectance of 0.5. Read the scale-aligned scores."
+            }
+            GaugeRule::StartAndHighlights => {
+                "Nothing in the photographs fixes the scale between diffuse reflectance and light; over the three channels \
+                 together it stays near the start, a mean reflectance of 0.5, and the light's colour is that of highlights \
+                 on what is no metal, as far as photos show some. Read the scale-aligned scores."
             }
         }
     }
@@ -68,4 +77,22 @@ pub fn move_scale(parameters: &mut Parameters<f32>, scale: Vec3) -> f64 {
         }
     }
     bounded as f64 / total.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rule_that_is_named_is_that_of_the_method() {
+        let open = |method| GaugeRule::of(Background::Black, BackgroundEvidence::Use, false, method);
+        assert_eq!((open(Method::Solver), open(Method::Paper)), (GaugeRule::StartAndHighlights, GaugeRule::Start));
+        for method in [Method::Solver, Method::Paper] {
+            let seen = |evidence| GaugeRule::of(Background::Environment, evidence, false, method);
+            assert_eq!(seen(BackgroundEvidence::Use), GaugeRule::Background);
+            assert_eq!(seen(BackgroundEvidence::Ignore), open(method));
+            let known = GaugeRule::of(Background::Environment, BackgroundEvidence::Use, true, method);
+            assert_eq!(known, GaugeRule::FixedLight);
+        }
+    }
 }
