@@ -5,7 +5,7 @@
 use glam::Vec3;
 use patina::image::Image;
 use patina::light::sky::{SkySettings, sun_and_sky};
-use patina::light::{Environment, EnvironmentSampler};
+use patina::light::{Environment, EnvironmentSampler, LightSample};
 use patina::math::random::SequentialRandom;
 use patina::math::statistics::Moments;
 use patina::math::{luminance, sphere};
@@ -86,7 +86,7 @@ fn samples_follow_the_density_by_a_chi_square_test() {
         let mut counts = vec![0usize; width * height];
         let mut random = SequentialRandom::new(5);
         for _ in 0..SAMPLES {
-            let (direction, _) = sampler.sample([random.next_number(), random.next_number()]).unwrap();
+            let direction = sampler.sample([random.next_number(), random.next_number()]).unwrap().direction;
             let (phi, theta) = sphere::angles_of_direction(direction);
             let column = (phi / std::f32::consts::TAU * width as f32) as usize;
             let row = (theta / std::f32::consts::PI * height as f32) as usize;
@@ -119,9 +119,14 @@ fn a_sample_is_a_unit_vector_with_the_density_that_is_told() {
         for index in 0..5_000 {
             let edge = |u: f32| [0.0, 0.999_999_94, u][(index % 50).min(2)];
             let u = [edge(random.next_number()), edge(random.next_number())];
-            let (direction, density) = sampler.sample(u).unwrap();
+            let LightSample { direction, density, angles } = sampler.sample(u).unwrap();
             assert!((direction.length() - 1.0).abs() < 1e-5, "{name}: {direction}");
             assert!(density.is_finite() && density > 0.0, "{name}: {density}");
+            let (phi, theta) = sphere::angles_of_direction(direction);
+            // Next to a pole phi says little; where it wraps it may lie on either side.
+            let turned = (phi - angles.0).abs().min(std::f32::consts::TAU - (phi - angles.0).abs());
+            let off = (turned * theta.sin()).hypot(theta - angles.1);
+            assert!(off < 1e-5, "{name} at {u:?}: {angles:?} for {phi}, {theta}");
             let told = sampler.pdf(direction);
             assert!((told / density - 1.0).abs() < 5e-3, "{name} at {u:?}: {told} against {density}");
         }
@@ -155,7 +160,8 @@ fn the_estimate_of_irradiance_is_unbiased() {
             let mut random = SequentialRandom::new(17);
             let mut moments = [Moments::default(); 3];
             for _ in 0..20_000 {
-                let (direction, density) = sampler.sample([random.next_number(), random.next_number()]).unwrap();
+                let LightSample { direction, density, .. } =
+                    sampler.sample([random.next_number(), random.next_number()]).unwrap();
                 let value = environment.radiance_towards(direction) * direction.dot(normal).max(0.0) / density;
                 (0..3).for_each(|channel| moments[channel].add(f64::from(value[channel])));
             }
@@ -180,7 +186,8 @@ fn a_small_sun_is_hit_almost_every_time() {
     let mut random = SequentialRandom::new(3);
     let moments: Moments = (0..20_000)
         .map(|_| {
-            let (direction, density) = sampler.sample([random.next_number(), random.next_number()]).unwrap();
+            let LightSample { direction, density, .. } =
+                sampler.sample([random.next_number(), random.next_number()]).unwrap();
             f64::from(environment.radiance_towards(direction).x / density)
         })
         .collect();
@@ -197,7 +204,7 @@ fn a_black_light_gives_no_sample_and_damaged_texels_count_as_black() {
     let mut damaged = Environment::constant(8, 4, Vec3::ONE);
     damaged.radiance[(1, 1)] = Vec3::new(f32::NAN, f32::INFINITY, -3.0);
     let sampler = EnvironmentSampler::new(&damaged);
-    assert!(sampler.sample([0.3, 0.7]).unwrap().1.is_finite() && sampler.pdf(Vec3::ZERO).is_finite());
+    assert!(sampler.sample([0.3, 0.7]).unwrap().density.is_finite() && sampler.pdf(Vec3::ZERO).is_finite());
     let huge = EnvironmentSampler::new(&Environment::constant(8, 4, Vec3::splat(1e38)));
     assert!((huge.pdf(Vec3::X) - 0.0796).abs() < 1e-3);
 }

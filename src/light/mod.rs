@@ -14,4 +14,4 @@ pub mod sampler;
 pub mod sky;
 
 pub use environment::Environment;
-pub use sampler::EnvironmentSampler;
+pub use sampler::{EnvironmentSampler, LightSample};

@@ -11,8 +11,9 @@
 //! has a density of nearly 0.
 
 use super::environment::Environment;
-use super::inversion::InversionTable;
+use super::inversion::InversionTables;
 use crate::image::Image;
+use crate::math::elementary::{atan2, sin_cos_of_turns};
 use crate::math::{luminance, sphere};
 use glam::Vec3;
 use std::f64::consts::{PI, TAU};
@@ -26,16 +27,63 @@ pub struct EnvironmentSampler {
     tables: Option<Tables>,
 }
 
+/// A direction towards the light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightSample {
+    /// The unit direction.
+    pub direction: Vec3,
+    /// Its density per steradian, above 0.
+    pub density: f32,
+    /// Its angles, see [`sphere::angles_of_direction`].
+    pub angles: (f32, f32),
+}
+
 #[derive(Clone, Debug)]
 struct Tables {
     /// Density per steradian at the corners of cells: one row more than cells, and as many columns, which wrap.
     density: Image<f32>,
-    /// The row of a cell.
-    rows: InversionTable,
-    /// The column of a cell in a row; all rows have light, because of the uniform share.
-    columns: Vec<InversionTable>,
-    /// Cosine of theta at the upper edge of each row of cells, and at the lower edge of the last.
-    cosines: Vec<f64>,
+    /// The row of a cell: one table.
+    rows: InversionTables,
+    /// The column of a cell, a table for each row; all rows have light, because of the uniform share.
+    columns: InversionTables,
+    /// Where each row of cells lies.
+    rings: Vec<Ring>,
+}
+
+/// Where a row of cells lies, told from the nearer pole: there the cosine of theta has lost the digits that its distance
+/// from 1 still has.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Ring {
+    /// 1 for the upper pole, -1 for the lower: the cosine of theta there.
+    pub pole: f32,
+    /// How far the cosine lies from that at the upper edge, and what is to be added to reach the lower edge.
+    pub from_pole: [f32; 2],
+}
+
+impl Ring {
+    /// Row `row` of `height`, an even number.
+    fn new(row: usize, height: usize) -> Self {
+        let is_upper = row < height / 2;
+        let from_pole = |edge: usize| {
+            let half_angle = 0.5 * PI * if is_upper { edge } else { height - edge } as f64 / height as f64;
+            2.0 * half_angle.sin().powi(2)
+        };
+        let top = from_pole(row);
+        Ring { pole: if is_upper { 1.0 } else { -1.0 }, from_pole: [top as f32, (from_pole(row + 1) - top) as f32] }
+    }
+}
+
+/// A cell of the table, and where in it a direction is drawn.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct LightCell {
+    /// Its column.
+    pub column: usize,
+    /// Numbers that are left to place the direction by, uniform in [0, 1): along phi, along theta.
+    pub rest: [f32; 2],
+    /// Density per steradian at its corners: upper left, upper right, lower left, lower right.
+    pub corners: [f32; 4],
+    /// Its row.
+    pub ring: Ring,
 }
 
 impl EnvironmentSampler {
@@ -44,22 +92,33 @@ impl EnvironmentSampler {
         EnvironmentSampler { tables: Tables::new(environment) }
     }
 
-    /// A unit direction towards the light and its density per steradian (above 0), from two numbers uniform in
-    /// [0, 1). Nothing when the environment is black.
-    pub fn sample(&self, u: [f32; 2]) -> Option<(Vec3, f32)> {
+    /// A direction towards the light, from two numbers uniform in [0, 1). Nothing when the environment is black.
+    #[inline]
+    pub fn sample(&self, u: [f32; 2]) -> Option<LightSample> {
         self.tables.as_ref().map(|tables| tables.sample(u))
     }
 
-    /// The density per steradian with which [`EnvironmentSampler::sample`] draws a direction; 0 when the environment
-    /// is black.
+    /// The density per steradian with which [`EnvironmentSampler::sample`] draws a unit direction; 0 when the
+    /// environment is black.
     pub fn pdf(&self, direction: Vec3) -> f32 {
-        let (phi, theta) = sphere::angles_of_direction(direction);
-        self.pdf_at_angles(phi, theta)
+        self.pdf_at_angles(direction, sphere::angles_of_direction(direction))
     }
 
-    /// [`EnvironmentSampler::pdf`] of a direction by its angles, see [`sphere::angles_of_direction`].
-    pub fn pdf_at_angles(&self, phi: f32, theta: f32) -> f32 {
-        self.tables.as_ref().map_or(0.0, |tables| tables.pdf(phi, theta))
+    /// [`EnvironmentSampler::pdf`] of a unit direction whose angles are known, see [`sphere::angles_of_direction`].
+    #[inline]
+    pub fn pdf_at_angles(&self, direction: Vec3, angles: (f32, f32)) -> f32 {
+        self.tables.as_ref().map_or(0.0, |tables| tables.pdf(direction, angles))
+    }
+
+    /// Columns of the table; nothing when the environment is black.
+    pub(crate) fn columns(&self) -> Option<usize> {
+        self.tables.as_ref().map(|tables| tables.density.width())
+    }
+
+    /// The cell that two numbers uniform in [0, 1) fall into: what [`EnvironmentSampler::sample`] looks up.
+    #[inline]
+    pub(crate) fn cell(&self, u: [f32; 2]) -> Option<LightCell> {
+        self.tables.as_ref().map(|tables| tables.cell(u))
     }
 
     /// Whether there is no light at all.
@@ -90,19 +149,16 @@ impl Tables {
         let uniform = UNIFORM_SHARE / (2.0 * TAU);
         let density = corners.map(|luminance| luminance / power * (1.0 - UNIFORM_SHARE) + uniform);
         let mut row_weights = Vec::with_capacity(height);
-        let mut columns = Vec::with_capacity(height);
+        let mut columns = InversionTables::new(width);
         for row in 0..height {
             let weights: Vec<f64> = (0..width).map(|column| cell_mean(&density, row, column)).collect();
             row_weights.push(weights.iter().sum::<f64>() * sphere::solid_angle_of_texel(row, width, height));
-            columns.push(InversionTable::new(&weights)?);
+            columns.push(&weights)?;
         }
-        let cosines = (0..=height).map(|row| (PI * row as f64 / height as f64).cos()).collect();
-        Some(Tables {
-            density: density.map(|&value| value as f32),
-            rows: InversionTable::new(&row_weights)?,
-            columns,
-            cosines,
-        })
+        let mut rows = InversionTables::new(height);
+        rows.push(&row_weights)?;
+        let rings = (0..height).map(|row| Ring::new(row, height)).collect();
+        Some(Tables { density: density.map(|&value| value as f32), rows, columns, rings })
     }
 
     /// Densities at the corners of a cell: upper left, upper right, lower left, lower right.
@@ -112,30 +168,41 @@ impl Tables {
         [density[(row, column)], density[(row, right)], density[(row + 1, column)], density[(row + 1, right)]]
     }
 
-    fn sample(&self, u: [f32; 2]) -> (Vec3, f32) {
-        let (row, rest_down) = self.rows.sample(u[1]);
-        let (column, rest_across) = self.columns[row].sample(u[0]);
-        let [upper_left, upper_right, lower_left, lower_right] = self.corners(row, column);
+    #[inline]
+    fn cell(&self, u: [f32; 2]) -> LightCell {
+        let (row, down) = self.rows.sample(0, u[1]);
+        let (column, across) = self.columns.sample(row, u[0]);
+        LightCell { column, rest: [across, down], corners: self.corners(row, column), ring: self.rings[row] }
+    }
+
+    fn sample(&self, u: [f32; 2]) -> LightSample {
+        let LightCell { column, rest: [rest_across, rest_down], corners, ring } = self.cell(u);
+        let [upper_left, upper_right, lower_left, lower_right] = corners;
         let down = sample_linear(rest_down, upper_left + upper_right, lower_left + lower_right);
         let (left, right) = (lerp(upper_left, lower_left, down), lerp(upper_right, lower_right, down));
         let across = sample_linear(rest_across, left, right);
-        // Near a pole 1 - cos(theta) is tiny: f64 keeps its digits.
-        let (top, bottom) = (self.cosines[row], self.cosines[row + 1]);
-        let cosine = top + (bottom - top) * f64::from(down);
-        let sine = ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt() as f32;
-        let phi = (TAU * (column as f64 + f64::from(across)) / self.density.width() as f64) as f32;
-        let (sin_phi, cos_phi) = phi.sin_cos();
-        (Vec3::new(sine * sin_phi, cosine as f32, -sine * cos_phi), lerp(left, right, across))
+        let from_pole = ring.from_pole[0] + ring.from_pole[1] * down;
+        let sine = (from_pole * (2.0 - from_pole)).max(0.0).sqrt();
+        let cosine = ring.pole * (1.0 - from_pole);
+        let turns = (column as f32 + across) / self.density.width() as f32;
+        let (sin_phi, cos_phi) = sin_cos_of_turns(turns);
+        LightSample {
+            direction: Vec3::new(sine * sin_phi, cosine, -sine * cos_phi),
+            density: lerp(left, right, across),
+            angles: (if turns < 1.0 { turns * std::f32::consts::TAU } else { 0.0 }, atan2(sine, cosine)),
+        }
     }
 
-    fn pdf(&self, phi: f32, theta: f32) -> f32 {
+    fn pdf(&self, direction: Vec3, (phi, theta): (f32, f32)) -> f32 {
         let (width, height) = (self.density.width(), self.density.height() - 1);
-        let x = f64::from(phi) / TAU * width as f64;
-        let y = f64::from(theta) / PI * height as f64;
+        let x = phi * (width as f32 / std::f32::consts::TAU);
+        let y = theta * (height as f32 / std::f32::consts::PI);
         let (column, row) = ((x as usize).min(width - 1), (y as usize).min(height - 1));
-        let across = ((x - column as f64) as f32).clamp(0.0, 1.0);
-        let (top, bottom) = (self.cosines[row], self.cosines[row + 1]);
-        let down = (((top - f64::from(theta).cos()) / (top - bottom)) as f32).clamp(0.0, 1.0);
+        let across = (x - column as f32).clamp(0.0, 1.0);
+        // The distance of the cosine from 1 or -1 is found from the sine, which has its digits there.
+        let Ring { pole, from_pole: [top, difference] } = self.rings[row];
+        let sine_squared = direction.x * direction.x + direction.z * direction.z;
+        let down = ((sine_squared / (1.0 + pole * direction.y) - top) / difference).clamp(0.0, 1.0);
         let [upper_left, upper_right, lower_left, lower_right] = self.corners(row, column);
         lerp(lerp(upper_left, lower_left, down), lerp(upper_right, lower_right, down), across)
     }

@@ -13,6 +13,7 @@
 //! `F0 = 0` still leaves a grazing lobe; a surface without one is drawn with a [`Material`] evaluated at
 //! `lobe_strength` 0.
 
+use crate::math::elementary::{ln_one_minus, one_minus_exp, sin_cos_of_turns};
 use crate::math::frame::{Frame, sample_cosine_hemisphere};
 use crate::math::luminance;
 use crate::math::real::Real;
@@ -51,6 +52,7 @@ pub struct LobeGeometry {
 impl LobeGeometry {
     /// The geometry of unit directions towards the light and towards the viewer about a unit normal.
     /// `None` below the horizon of the normal, where the lobe is zero.
+    #[inline]
     pub fn new(normal: Vec3, towards_light: Vec3, towards_viewer: Vec3) -> Option<Self> {
         let cos_in = normal.dot(towards_light);
         let cos_out = normal.dot(towards_viewer);
@@ -67,7 +69,7 @@ impl LobeGeometry {
         Some(LobeGeometry {
             cos_in: cos_in.min(1.0),
             cos_out: cos_out.min(1.0),
-            ln_cos_half: 0.5 * (-sin_squared).ln_1p(),
+            ln_cos_half: 0.5 * ln_one_minus(sin_squared),
             half_dot_out: (0.5 * length_squared.sqrt()).min(1.0),
         })
     }
@@ -172,7 +174,7 @@ impl Material<f32> {
     #[inline]
     pub fn sampler(&self, cos_out: f32, lobe_strength: f32) -> LobeSampler {
         if lobe_strength == 0.0 {
-            return LobeSampler { specular_share: 0.0, log_width: self.log_width, inverse_width_squared: 0.0 };
+            return LobeSampler { specular_share: 0.0, inverse_width_squared: 0.0 };
         }
         // By the luminance of both parts, kept off 0 and 1.
         let grazing = (1.0 - cos_out).clamp(0.0, 1.0).powi(5);
@@ -181,37 +183,42 @@ impl Material<f32> {
         let diffuse = luminance(Vec3::from_array(self.diffuse));
         LobeSampler {
             specular_share: (specular / (specular + diffuse).max(1e-6)).clamp(0.1, 0.9),
-            log_width: self.log_width,
             inverse_width_squared: (-2.0 * self.log_width).exp(),
         }
     }
 }
+
+/// The largest number below 1.
+const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 
 /// Draws directions towards the light in proportion to what a material sends to one viewer, nearly.
 #[derive(Clone, Copy, Debug)]
 pub struct LobeSampler {
     /// Probability of sampling the specular lobe.
     specular_share: f32,
-    log_width: f32,
     /// `1 / a^2`.
     inverse_width_squared: f32,
 }
 
 impl LobeSampler {
-    /// A direction towards the light for the unit direction towards the viewer; `None` when it falls below the horizon.
-    /// Its density is [`LobeSampler::density`].
-    pub fn sample(&self, frame: &Frame, towards_viewer: Vec3, choice: f32, u: [f32; 2]) -> Option<Vec3> {
-        let light = if choice < self.specular_share {
-            // Half vectors with density (e+2)/(2 pi) cos^(e+1): ln cos = a^2/2 ln u.
-            let width = self.log_width.exp();
-            let ln_cos = 0.5 * width * width * (1.0 - u[0]).max(1e-30).ln();
-            let (sin_phi, cos_phi) = (std::f32::consts::TAU * u[1]).sin_cos();
-            let sin = (-(2.0 * ln_cos).exp_m1()).max(0.0).sqrt();
-            let half = Vec3::new(sin * cos_phi, sin * sin_phi, ln_cos.exp());
+    /// A direction towards the light for the unit direction towards the viewer, from two numbers uniform in [0, 1);
+    /// `None` when it falls below the horizon. Its density is [`LobeSampler::density`].
+    ///
+    /// The first number chooses the lobe as well, and what is left of it is uniform again: evenly spread pairs stay so.
+    #[inline]
+    pub fn sample(&self, frame: &Frame, towards_viewer: Vec3, u: [f32; 2]) -> Option<Vec3> {
+        let share = self.specular_share;
+        let light = if u[0] < share {
+            // Half vectors with density (e+2)/(2 pi) cos^(e+1): ln cos = a^2/2 ln(1 - u).
+            let u = [(u[0] / share).min(BELOW_ONE), u[1]];
+            let sin_squared = one_minus_exp(ln_one_minus(u[0]) / self.inverse_width_squared);
+            let sin = sin_squared.sqrt();
+            let (sin_phi, cos_phi) = sin_cos_of_turns(u[1]);
+            let half = Vec3::new(sin * cos_phi, sin * sin_phi, (1.0 - sin_squared).sqrt());
             let viewer = frame.local_from_outer(towards_viewer);
             half * (2.0 * viewer.dot(half)) - viewer
         } else {
-            sample_cosine_hemisphere(u)
+            sample_cosine_hemisphere([((u[0] - share) / (1.0 - share)).min(BELOW_ONE), u[1]])
         };
         (light.z > 0.0).then(|| frame.outer_from_local(light))
     }

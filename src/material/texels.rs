@@ -7,6 +7,7 @@
 use super::lobe::{MIN_WIDTH, Material};
 use super::maps::MaterialMaps;
 use crate::image::Image;
+use crate::math::elementary;
 use crate::math::real::Real;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -57,15 +58,15 @@ impl TextureTap {
     /// The tap at a texture coordinate (v up) on a level of `width x height`; clamped at the border.
     #[inline]
     pub fn at(uv: Vec2, level: u32, width: usize, height: usize) -> Self {
-        let x = uv.x * width as f32 - 0.5;
-        let y = (1.0 - uv.y) * height as f32 - 0.5;
-        let (x_floor, y_floor) = (x.floor(), y.floor());
-        let (x_fraction, y_fraction) = (x - x_floor, y - y_floor);
-        // A float outside the integers saturates, NaN becomes 0: clamping makes any coordinate a valid texel.
-        let column = |x: f32| (x as i64).clamp(0, width as i64 - 1) as u32;
-        let row = |y: f32| (y as i64).clamp(0, height as i64 - 1) as u32 * width as u32;
-        let (left, right) = (column(x_floor), column(x_floor + 1.0));
-        let (upper, lower) = (row(y_floor), row(y_floor + 1.0));
+        // Clamping makes any coordinate a valid texel; the whole part of NaN is 0.
+        let x = (uv.x * width as f32 - 0.5).clamp(-1.0, width as f32);
+        let y = ((1.0 - uv.y) * height as f32 - 0.5).clamp(-1.0, height as f32);
+        let (x_floor, y_floor) = (elementary::floor(x), elementary::floor(y));
+        let (x_fraction, y_fraction) = (x - x_floor as f32, y - y_floor as f32);
+        let column = |x: i32| x.clamp(0, width as i32 - 1) as u32;
+        let row = |y: i32| y.clamp(0, height as i32 - 1) as u32 * width as u32;
+        let (left, right) = (column(x_floor), column(x_floor + 1));
+        let (upper, lower) = (row(y_floor), row(y_floor + 1));
         TextureTap {
             level,
             index: [upper + left, upper + right, lower + left, lower + right],

@@ -1,5 +1,6 @@
 //! An orthonormal frame around a direction.
 
+use super::elementary::sin_cos_of_turns;
 use glam::Vec3;
 
 /// A right-handed orthonormal frame; `normal` is the local z axis.
@@ -17,6 +18,7 @@ impl Frame {
     /// A frame around a unit normal, without a branch on its direction.
     ///
     /// Duff, Burgess, Christensen, Hery, Kensler, Liani and Villemin 2017, "Building an Orthonormal Basis, Revisited".
+    #[inline]
     pub fn around(normal: Vec3) -> Self {
         let sign = 1.0f32.copysign(normal.z);
         let a = -1.0 / (sign + normal.z);
@@ -29,20 +31,23 @@ impl Frame {
     }
 
     /// A vector given in this frame, in the outer space.
+    #[inline]
     pub fn outer_from_local(&self, local: Vec3) -> Vec3 {
         self.tangent * local.x + self.bitangent * local.y + self.normal * local.z
     }
 
     /// A vector of the outer space, in this frame.
+    #[inline]
     pub fn local_from_outer(&self, outer: Vec3) -> Vec3 {
         Vec3::new(outer.dot(self.tangent), outer.dot(self.bitangent), outer.dot(self.normal))
     }
 }
 
 /// A cosine-weighted direction about +z from two uniform numbers; its density is `z / pi`.
+#[inline]
 pub fn sample_cosine_hemisphere(u: [f32; 2]) -> Vec3 {
     let radius = u[0].sqrt();
-    let (sin, cos) = (std::f32::consts::TAU * u[1]).sin_cos();
+    let (sin, cos) = sin_cos_of_turns(u[1]);
     Vec3::new(radius * cos, radius * sin, (1.0 - u[0]).max(0.0).sqrt())
 }
 

@@ -20,7 +20,7 @@ impl StreamKey {
 }
 
 /// The random numbers of one sample: dimension after dimension.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct SampleStream {
     key: u64,
     sample: u32,
@@ -40,16 +40,44 @@ impl SampleStream {
 
     /// The next pair, uniform in [0, 1)^2.
     pub fn next_pair(&mut self) -> [f32; 2] {
+        let hash = self.next_hash();
+        scrambled_pair(self.sample, hash as u32, (hash >> 32) as u32)
+    }
+
+    /// What the next pair of all samples of the stream is scrambled by.
+    #[inline(always)]
+    fn next_hash(&mut self) -> u64 {
         let hash = mix(self.key ^ u64::from(self.dimension).wrapping_mul(0xd134_2543_de82_ef95));
         self.dimension += 1;
-        let (low, high) = (hash as u32, (hash >> 32) as u32);
-        // Shuffle the order of samples, then scramble each coordinate of the Sobol point. The first coordinate is the
-        // index with its bits reversed, the second is made with its bits reversed: that saves reversals.
-        let index = laine_karras(self.sample.reverse_bits(), low).reverse_bits();
-        let x = laine_karras(index, high).reverse_bits();
-        let y = laine_karras(sobol_second_reversed(index), low.rotate_left(16) ^ high).reverse_bits();
-        [unit_float(x), unit_float(y)]
+        hash
     }
+}
+
+/// [`SampleStream::next_pair`] of the first `count` streams, the first numbers of all and then the second ones. It runs on
+/// as many at a time as the function it is compiled into has instructions for.
+#[inline(always)]
+pub fn next_pairs<const N: usize>(streams: &mut [SampleStream; N], count: usize) -> [[f32; N]; 2] {
+    let (mut samples, mut low, mut high) = ([0; N], [0; N], [0; N]);
+    for (lane, stream) in streams[..count].iter_mut().enumerate() {
+        let hash = stream.next_hash();
+        (samples[lane], low[lane], high[lane]) = (stream.sample, hash as u32, (hash >> 32) as u32);
+    }
+    let mut numbers = [[0.0; N]; 2];
+    for lane in 0..N {
+        [numbers[0][lane], numbers[1][lane]] = scrambled_pair(samples[lane], low[lane], high[lane]);
+    }
+    numbers
+}
+
+/// Number `sample` of a Sobol sequence in the square whose order and coordinates are scrambled.
+#[inline(always)]
+fn scrambled_pair(sample: u32, low: u32, high: u32) -> [f32; 2] {
+    // Shuffle the order of samples, then scramble each coordinate of the Sobol point. The first coordinate is the index
+    // with its bits reversed, the second is made with its bits reversed: that saves reversals.
+    let index = laine_karras(sample.reverse_bits(), low).reverse_bits();
+    let x = laine_karras(index, high).reverse_bits();
+    let y = laine_karras(sobol_second_reversed(index), low.rotate_left(16) ^ high).reverse_bits();
+    [unit_float(x), unit_float(y)]
 }
 
 /// A number with the standard normal distribution from two uniform in [0, 1) (Box and Muller 1958).
@@ -58,6 +86,7 @@ pub fn normal_number([u, v]: [f32; 2]) -> f32 {
 }
 
 /// A number in [0, 1) from the upper 24 bits.
+#[inline(always)]
 fn unit_float(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
@@ -67,6 +96,7 @@ fn unit_float(bits: u32) -> f32 {
 /// Column `k` of its matrix is row `k` of Pascal's triangle modulo 2, where the bit `j` is set if all bits of `j` are
 /// among those of `k` (Lucas 1878). So bit `j` of the result is the parity of the index's bits at all places that contain
 /// `j`, which five butterflies add up.
+#[inline(always)]
 fn sobol_second_reversed(mut bits: u32) -> u32 {
     bits ^= bits >> 1 & 0x5555_5555;
     bits ^= bits >> 2 & 0x3333_3333;
@@ -77,6 +107,7 @@ fn sobol_second_reversed(mut bits: u32) -> u32 {
 
 /// A hash in which each bit depends on the bits below it only: between two bit reversals it is an Owen scrambling
 /// (Laine and Karras 2011, with the constants of Burley 2020, listing 3).
+#[inline(always)]
 fn laine_karras(value: u32, seed: u32) -> u32 {
     let mut bits = value.wrapping_add(seed);
     bits ^= bits.wrapping_mul(0x6c50_b47c);

@@ -2,14 +2,16 @@
 //!
 //! `theta = acos(d.y)` in [0, pi] grows downwards with the rows, `phi = atan2(d.x, -d.z) mod 2 pi` with the columns.
 
+use super::elementary;
 use glam::Vec3;
 use std::f32::consts::{PI, TAU};
 
-/// (phi, theta) of a direction of any length; phi in [0, 2 pi), theta in [0, pi].
+/// (phi, theta) of a direction whose length is from 1e-15 to 1e15; phi in [0, 2 pi), theta in [0, pi].
+#[inline]
 pub fn angles_of_direction(direction: Vec3) -> (f32, f32) {
-    let horizontal = direction.x.hypot(direction.z);
-    let theta = horizontal.atan2(direction.y);
-    let phi = direction.x.atan2(-direction.z);
+    let horizontal = (direction.x * direction.x + direction.z * direction.z).sqrt();
+    let theta = elementary::atan2(horizontal, direction.y);
+    let phi = elementary::atan2(direction.x, -direction.z);
     let phi = if phi < 0.0 { phi + TAU } else { phi };
     (if phi >= TAU { 0.0 } else { phi }, theta)
 }
@@ -59,12 +61,15 @@ pub fn tap_of_direction(direction: Vec3, width: usize, height: usize) -> Bilinea
 pub fn tap_of_angles(phi: f32, theta: f32, width: usize, height: usize) -> BilinearTap {
     let x = phi * (width as f32 / TAU) - 0.5;
     let y = theta * (height as f32 / PI) - 0.5;
-    let (x_floor, y_floor) = (x.floor(), y.floor());
-    let (x_fraction, y_fraction) = (x - x_floor, y - y_floor);
-    let column = |x: i32| x.rem_euclid(width as i32) as u32;
-    let row = |y: i32| y.clamp(0, height as i32 - 1) as u32 * width as u32;
-    let (left, right) = (column(x_floor as i32), column(x_floor as i32 + 1));
-    let (upper, lower) = (row(y_floor as i32), row(y_floor as i32 + 1));
+    let (x_floor, y_floor) = (elementary::floor(x), elementary::floor(y));
+    let (x_fraction, y_fraction) = (x - x_floor as f32, y - y_floor as f32);
+    let (width, height) = (width as i32, height as i32);
+    // From -1 to one less than the width; a division would take longer than all the rest.
+    let left = if x_floor < 0 { width - 1 } else { x_floor.min(width - 1) };
+    let right = if left + 1 == width { 0 } else { left + 1 };
+    let row = |y: i32| (y.clamp(0, height - 1) * width) as u32;
+    let (left, right) = (left as u32, right as u32);
+    let (upper, lower) = (row(y_floor), row(y_floor + 1));
     BilinearTap {
         index: [upper + left, upper + right, lower + left, lower + right],
         weight: [

@@ -7,6 +7,7 @@ mod chunk_gradient;
 
 use self::chunk_gradient::ChunkGradient;
 use super::first_hits::CameraRays;
+use super::packet::PathStart;
 use super::path::{PathArena, PathTracer};
 use super::sums::{Parameters, radiance, radiance_backward};
 use crate::math::random::{SampleStream, StreamKey};
@@ -234,11 +235,14 @@ pub fn estimate_pixel<R: Real>(
 pub fn trace_pixel(tracer: &PathTracer<'_>, rays: &CameraRays<'_>, pixel: usize, key: PassKey, arena: &mut PathArena) {
     arena.clear();
     let samples = rays.samples();
-    for sample in 0..samples {
-        let mut stream = key.stream(pixel, sample, samples);
-        let (ray, hit) = rays.at(pixel, sample, &mut stream);
-        tracer.trace(&ray, hit, &mut stream, arena);
-    }
+    tracer.trace(
+        (0..samples).map(|sample| {
+            let mut stream = key.stream(pixel, sample, samples);
+            let (ray, first_hit) = rays.at(pixel, sample, &mut stream);
+            PathStart { ray, first_hit, stream }
+        }),
+        arena,
+    );
 }
 
 /// The two estimates of a pixel whose paths are in `arena`.

@@ -13,7 +13,7 @@ use super::regions::{MeasuredMaterial, Regions};
 use super::sums::Parameters;
 use super::surface::{Surface, SurfacePoint};
 use crate::image::Image;
-use crate::light::EnvironmentSampler;
+use crate::light::{EnvironmentSampler, LightSample};
 use crate::material::{LobeGeometry, LobeSampler, Material};
 use crate::math::frame::Frame;
 use crate::math::random::SampleStream;
@@ -61,7 +61,7 @@ impl Vertex<'_> {
 
     fn sample(&self, choice: f32, numbers: [f32; 2]) -> Option<Vec3> {
         match &self.reflector {
-            Reflector::Maps(_, sampler) => sampler.sample(&self.frame, self.towards_viewer, choice, numbers),
+            Reflector::Maps(_, sampler) => sampler.sample(&self.frame, self.towards_viewer, numbers),
             Reflector::Measured(material) => {
                 material.sample(&self.frame, self.towards_viewer, [choice, numbers[0], numbers[1]])
             }
@@ -116,7 +116,7 @@ impl RegionTracer<'_> {
         for _ in 0..self.settings.max_bounces.min(MAX_BOUNCES) {
             let Some(vertex) = self.vertex(&ray, &hit) else { break };
             let drawn = self.light.sample(stream.next_pair());
-            if let Some((direction, density)) = drawn
+            if let Some(LightSample { direction, density, .. }) = drawn
                 && let Some((reflected, other)) = vertex.towards(direction)
                 && !self.surface.is_shadowed(&vertex.point, direction)
             {

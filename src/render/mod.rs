@@ -3,7 +3,8 @@
 //! Read in this order:
 //! 1. [`surface`]: from a ray to a point on the mesh.
 //! 2. [`path`]: a path is traced once, with a frozen sampling proposal, into a short record: which texels it reads,
-//!    which light texels it sees, with which weights. No radiance is computed there.
+//!    which light texels it sees, with which weights. No radiance is computed there. [`packet`] traces the paths of a
+//!    pixel side by side.
 //! 3. [`sums`]: radiance is a smooth function of the maps and the light over that record; its derivative stands beside
 //!    it. Both run in any [`Real`](crate::math::real::Real): `f32` to fit, `f64` to audit, dual numbers for
 //!    Hessian-vector products.
@@ -22,13 +23,16 @@ pub mod accumulate;
 pub mod cached;
 pub mod first_hits;
 pub mod measured_regions;
+pub mod packet;
 pub mod path;
 pub mod picture;
 pub mod progressive;
 pub mod regions;
 pub mod sums;
 pub mod surface;
+mod taps;
 
+pub use packet::PathStart;
 pub use path::{PathArena, PathSettings, PathTracer};
 pub use sums::Parameters;
 pub use surface::Surface;

@@ -10,14 +10,12 @@
 //! Shading normals: the lobe is zero unless light and viewer are above both the shading and the geometric horizon, so
 //! no light leaks through a surface at the terminator.
 
+use super::packet::Packet;
 use super::surface::{Surface, SurfacePoint};
 use crate::light::EnvironmentSampler;
 use crate::material::{LobeGeometry, TexelPyramid, TextureTap};
-use crate::math::frame::Frame;
-use crate::math::random::SampleStream;
-use crate::math::sphere::{BilinearTap, angles_of_direction, tap_of_angles, tap_of_direction};
-use crate::trace::{Hit, Ray};
-use glam::Vec3;
+use crate::math::sphere::{BilinearTap, tap_of_angles};
+use crate::trace::Ray;
 
 /// Longest path that is ever traced, in surface hits.
 pub const MAX_BOUNCES: usize = 16;
@@ -64,7 +62,7 @@ pub struct Bounce {
 }
 
 /// One surface hit of a path.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct PathVertex {
     /// The texels of the material.
     pub texture: TextureTap,
@@ -90,17 +88,31 @@ pub struct PathHead {
 /// Records of the paths of one pixel; its memory is used again and again.
 #[derive(Clone, Debug, Default)]
 pub struct PathArena {
-    /// Vertices of all paths, path after path.
-    pub vertices: Vec<PathVertex>,
+    /// Room for the vertices of all paths, path after path, each with as many as it may have.
+    pub(super) vertices: Vec<PathVertex>,
+    /// How much of that room is given away.
+    reserved: usize,
     /// The paths.
     pub paths: Vec<PathHead>,
+    /// Paths on their way.
+    pub(super) packet: Packet,
 }
 
 impl PathArena {
     /// Forgets all paths and keeps the memory.
     pub fn clear(&mut self) {
-        self.vertices.clear();
+        self.reserved = 0;
         self.paths.clear();
+    }
+
+    /// Room for so many vertices; where it begins.
+    pub(super) fn reserve(&mut self, count: usize) -> u32 {
+        let first = self.reserved;
+        self.reserved += count;
+        if self.reserved > self.vertices.len() {
+            self.vertices.resize(self.reserved, PathVertex::default());
+        }
+        first as u32
     }
 
     /// The vertices of a path.
@@ -109,7 +121,7 @@ impl PathArena {
     }
 }
 
-/// Traces paths over a surface with a frozen proposal.
+/// Traces paths over a surface with a frozen proposal: [`PathTracer::trace`].
 pub struct PathTracer<'a> {
     /// The surface.
     pub surface: &'a Surface,
@@ -124,95 +136,13 @@ pub struct PathTracer<'a> {
 }
 
 impl PathTracer<'_> {
-    /// Traces the path behind a camera ray whose first hit is known, and adds its record to the arena.
-    pub fn trace(&self, ray: &Ray, first_hit: Option<Hit>, stream: &mut SampleStream, arena: &mut PathArena) {
-        let first = arena.vertices.len() as u32;
-        let mut head = PathHead { first, count: 0, background: None, escaped: first_hit.is_none() };
-        match first_hit {
-            None if self.settings.background_visible => head.background = Some(self.light_tap(ray.direction)),
-            None => {}
-            Some(hit) => self.trace_from(ray, hit, stream, arena),
-        }
-        head.count = arena.vertices.len() as u32 - first;
-        arena.paths.push(head);
-    }
-
-    fn trace_from(&self, camera_ray: &Ray, first_hit: Hit, stream: &mut SampleStream, arena: &mut PathArena) {
-        let max_bounces = self.settings.max_bounces.min(MAX_BOUNCES);
-        let mut ray = *camera_ray;
-        let mut hit = first_hit;
-        for bounce_index in 0..max_bounces {
-            let towards_viewer = -ray.direction;
-            let point = if self.settings.two_sided {
-                self.surface.point_facing(&hit, towards_viewer)
-            } else {
-                self.surface.point(&hit)
-            };
-            if point.geometric_normal.dot(towards_viewer) <= 0.0 || point.shading_normal.dot(towards_viewer) <= 0.0 {
-                return;
-            }
-            let texture = self.proposal.tap(point.uv, self.mip_level(bounce_index, &point, &ray, hit.t));
-            let material = self.proposal.fetch(&texture);
-            let sampler = material.sampler(point.shading_normal.dot(towards_viewer), self.settings.lobe_strength);
-
-            // Draw a direction from the light and keep it if nothing is in the way.
-            let light_numbers = stream.next_pair();
-            let connection = self.light.sample(light_numbers).and_then(|(direction, density)| {
-                let geometry = self.geometry_above(&point, direction, towards_viewer)?;
-                if self.surface.is_shadowed(&point, direction) {
-                    return None;
-                }
-                let other = sampler.density(&geometry);
-                let weight = power_heuristic(density, other) / density;
-                Some(Connection { geometry, light: self.light_tap(direction), weight })
-            });
-
-            // Draw a direction from the lobe and follow it.
-            let choice = stream.next_number();
-            let lobe_numbers = stream.next_pair();
-            let frame = Frame::around(point.shading_normal);
-            let sampled = sampler
-                .sample(&frame, towards_viewer, choice, lobe_numbers)
-                .and_then(|direction| Some((direction, self.geometry_above(&point, direction, towards_viewer)?)));
-            let Some((direction, geometry)) = sampled else {
-                arena.vertices.push(PathVertex { texture, connection, bounce: None });
-                return;
-            };
-            let density = sampler.density(&geometry);
-            if !(density > 1e-9) {
-                arena.vertices.push(PathVertex { texture, connection, bounce: None });
-                return;
-            }
-            let next_ray = self.surface.ray_from(&point, direction);
-            let next_hit = self.surface.closest(&next_ray);
-            let escape = next_hit.is_none().then(|| {
-                let (phi, theta) = angles_of_direction(direction);
-                let (width, height) = self.environment_size;
-                let other = self.light.pdf_at_angles(phi, theta);
-                (tap_of_angles(phi, theta, width, height), power_heuristic(density, other))
-            });
-            let bounce = Bounce { geometry, inverse_density: 1.0 / density, escape };
-            arena.vertices.push(PathVertex { texture, connection, bounce: Some(bounce) });
-            let Some(next_hit) = next_hit else { return };
-            ray = next_ray;
-            hit = next_hit;
-        }
-    }
-
-    /// Geometry of the lobe, above both horizons.
-    fn geometry_above(&self, point: &SurfacePoint, direction: Vec3, towards_viewer: Vec3) -> Option<LobeGeometry> {
-        if point.geometric_normal.dot(direction) <= 0.0 {
-            return None;
-        }
-        LobeGeometry::new(point.shading_normal, direction, towards_viewer)
-    }
-
-    fn light_tap(&self, direction: Vec3) -> BilinearTap {
-        tap_of_direction(direction, self.environment_size.0, self.environment_size.1)
+    /// Where the environment is read in a direction of these angles.
+    pub(super) fn light_tap(&self, (phi, theta): (f32, f32)) -> BilinearTap {
+        tap_of_angles(phi, theta, self.environment_size.0, self.environment_size.1)
     }
 
     /// The level whose texels are about as large as the footprint of the ray's cone, by area (isotropic).
-    fn mip_level(&self, bounce_index: usize, point: &SurfacePoint, ray: &Ray, distance: f32) -> u32 {
+    pub(super) fn mip_level(&self, bounce_index: usize, point: &SurfacePoint, ray: &Ray, distance: f32) -> u32 {
         let cone =
             if bounce_index == 0 { self.settings.camera_cone_radians } else { self.settings.bounce_cone_radians };
         if cone <= 0.0 || self.proposal.levels.len() == 1 {
@@ -223,7 +153,8 @@ impl PathTracer<'_> {
         let width_in_world = cone * distance / cosine.sqrt();
         let base = &self.proposal.levels[0];
         let texels = width_in_world * point.uv_per_length * ((base.width * base.height) as f32).sqrt();
-        (texels.log2() + 0.5).clamp(0.0, 31.0) as u32
+        // The nearest whole logarithm to base 2 is the exponent of sqrt(2) times as much.
+        ((texels * std::f32::consts::SQRT_2).to_bits() >> 23).saturating_sub(127).min(31)
     }
 }
 

@@ -96,6 +96,7 @@ impl Surface {
     }
 
     /// The surface at a hit.
+    #[inline]
     pub fn point(&self, hit: &Hit) -> SurfacePoint {
         let Facet { vertices, geometric_normal, uv_per_length } = self.facets[hit.triangle as usize];
         let [a, b, c] = vertices.map(|vertex| self.corners[vertex as usize]);
@@ -112,6 +113,7 @@ impl Surface {
     }
 
     /// The surface at a hit, with both normals turned to the side of a direction that leaves it.
+    #[inline]
     pub fn point_facing(&self, hit: &Hit, direction: Vec3) -> SurfacePoint {
         let mut point = self.point(hit);
         if point.geometric_normal.dot(direction) < 0.0 {
@@ -127,6 +129,7 @@ impl Surface {
     }
 
     /// A ray that leaves the surface along a unit direction without meeting it again at its start.
+    #[inline]
     pub fn ray_from(&self, point: &SurfacePoint, direction: Vec3) -> Ray {
         let origin = self.bvh.offset_origin(point.position, point.geometric_normal, direction);
         Ray { origin, direction, t_max: f32::INFINITY }

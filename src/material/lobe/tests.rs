@@ -39,8 +39,8 @@ fn albedo(material: &Material<f32>, viewer: Vec3, count: usize) -> f64 {
     let mut random = SequentialRandom::new(9);
     let mut sum = 0.0;
     for _ in 0..count {
-        let (choice, u) = (random.next_number(), [random.next_number(), random.next_number()]);
-        if let Some(light) = sampler.sample(&frame, viewer, choice, u)
+        let u = [random.next_number(), random.next_number()];
+        if let Some(light) = sampler.sample(&frame, viewer, u)
             && let Some(geometry) = LobeGeometry::new(Vec3::Z, light, viewer)
         {
             sum += f64::from(material.reflect(&geometry, 1.0)[1] / sampler.density(&geometry));
@@ -105,7 +105,7 @@ fn every_derivative_matches_central_differences_in_f64() {
         } else {
             let frame = Frame::around(Vec3::Z);
             let u = [random.next_number(), random.next_number()];
-            match base.sampler(viewer.z, 1.0).sample(&frame, viewer, 0.0, u) {
+            match base.sampler(viewer.z, 1.0).sample(&frame, viewer, u) {
                 Some(light) => light,
                 None => continue,
             }
@@ -148,8 +148,8 @@ fn samples_follow_their_density() {
         let mut random = SequentialRandom::new(77);
         let mut observed = vec![0.0f64; rows * columns];
         for _ in 0..count {
-            let (choice, u) = (random.next_number(), [random.next_number(), random.next_number()]);
-            if let Some(light) = sampler.sample(&frame, viewer, choice, u) {
+            let u = [random.next_number(), random.next_number()];
+            if let Some(light) = sampler.sample(&frame, viewer, u) {
                 let phi = light.y.atan2(light.x).rem_euclid(std::f32::consts::TAU);
                 let row = ((light.z * rows as f32) as usize).min(rows - 1);
                 let column = ((phi / std::f32::consts::TAU * columns as f32) as usize).min(columns - 1);

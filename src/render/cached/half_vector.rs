@@ -10,7 +10,7 @@
 use super::half_vector_kernel::{row_in, sums_in};
 use super::light_basis::{LightBasis, LightPlanes};
 use super::lobe_sum::{LobePlace, LobeSums};
-use super::vector::{WIDEST, versions};
+use crate::math::vector::{WIDEST, versions};
 use std::f32::consts::TAU;
 use std::sync::OnceLock;
 

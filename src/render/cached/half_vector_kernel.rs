@@ -6,99 +6,11 @@
 use super::half_vector::{Places, place_count, places};
 use super::light_basis::{LightBasis, LightPlanes};
 use super::lobe_sum::{LobePlace, LobeSums};
-use super::vector::{Vector, WIDEST};
 use crate::math::frame::Frame;
+use crate::math::vector::elementary::exp_minus_one;
+use crate::math::vector::{Vector, WIDEST};
+use crate::render::taps::Taps;
 use glam::Vec4;
-use std::f32::consts::{FRAC_PI_2, PI, TAU};
-
-/// 2^23: added to a whole number below it, it leaves the number in the low bits.
-const WHOLE: f32 = 8_388_608.0;
-
-/// Where several directions read a light bilinearly.
-struct Taps {
-    /// The four texels around each: the number of a texel is in the low 23 bits.
-    texels: [[f32; WIDEST]; 4],
-    /// Their weights, which sum to 1.
-    weights: [[f32; WIDEST]; 4],
-}
-
-impl Taps {
-    const NONE: Taps = Taps { texels: [[WHOLE; WIDEST]; 4], weights: [[0.0; WIDEST]; 4] };
-
-    /// Number of the `k`-th texel of a direction.
-    #[inline(always)]
-    fn texel(&self, k: usize, lane: usize) -> usize {
-        (self.texels[k][lane].to_bits() & 0x007f_ffff) as usize
-    }
-
-    /// Where unit directions read a light of this size: [`crate::math::sphere::tap_of_direction`] of several.
-    #[inline(always)]
-    fn find<V: Vector>(&mut self, direction: [V; 3], width: usize, height: usize) {
-        let (zero, one, half) = (V::splat(0.0), V::splat(1.0), V::splat(0.5));
-        let columns = V::splat(width as f32);
-        let [x, y, z] = direction;
-        let level = z.mul_add(z, x.mul(x)).sqrt();
-        let column = angle(x, zero.sub(z)).mul_add(V::splat(width as f32 / TAU), zero.sub(half));
-        let row = angle(level, y).mul_add(V::splat(height as f32 / PI), zero.sub(half));
-        // The whole number below, or at whole numbers either neighbour: the fraction is then 0 or 1, which reads the same.
-        let (column_below, row_below) = (column.sub(half).round(), row.sub(half).round());
-        let (right_share, lower_share) = (column.sub(column_below), row.sub(row_below));
-        let left = zero.sub(column_below).where_positive(column_below.add(columns), column_below).max(zero);
-        let next = left.add(one);
-        let right = columns.sub(next).where_positive(next, zero);
-        let upper = row_below.max(zero).mul_add(columns, V::splat(WHOLE));
-        let lower = row_below.add(one).min(V::splat(height as f32 - 1.0)).mul_add(columns, V::splat(WHOLE));
-        let (left_share, upper_share) = (one.sub(right_share), one.sub(lower_share));
-        upper.add(left).store(&mut self.texels[0]);
-        upper.add(right).store(&mut self.texels[1]);
-        lower.add(left).store(&mut self.texels[2]);
-        lower.add(right).store(&mut self.texels[3]);
-        left_share.mul(upper_share).store(&mut self.weights[0]);
-        right_share.mul(upper_share).store(&mut self.weights[1]);
-        left_share.mul(lower_share).store(&mut self.weights[2]);
-        right_share.mul(lower_share).store(&mut self.weights[3]);
-    }
-}
-
-/// Angle of (x, y) in (-pi, pi], to 3e-7: Abramowitz and Stegun 1964, 4.4.49.
-#[inline(always)]
-fn angle<V: Vector>(y: V, x: V) -> V {
-    let zero = V::splat(0.0);
-    let (x_size, y_size) = (x.max(zero.sub(x)), y.max(zero.sub(y)));
-    let t = x_size.min(y_size).div(x_size.max(y_size).max(V::splat(1e-30)));
-    let t2 = t.mul(t);
-    let series = V::splat(0.002_866_225_7)
-        .mul_add(t2, V::splat(-0.016_165_737))
-        .mul_add(t2, V::splat(0.042_909_614))
-        .mul_add(t2, V::splat(-0.075_289_64))
-        .mul_add(t2, V::splat(0.106_562_64))
-        .mul_add(t2, V::splat(-0.142_089))
-        .mul_add(t2, V::splat(0.199_935_51))
-        .mul_add(t2, V::splat(-0.333_331_45));
-    let angle = series.mul(t2).mul_add(t, t);
-    let angle = y_size.sub(x_size).where_positive(V::splat(FRAC_PI_2).sub(angle), angle);
-    let angle = zero.sub(x).where_positive(V::splat(PI).sub(angle), angle);
-    zero.sub(y).where_positive(zero.sub(angle), angle)
-}
-
-/// `e^x - 1` for `x` in [-4, 0], with relative error below 1e-6.
-#[inline(always)]
-fn exp_minus_one<V: Vector>(x: V) -> V {
-    // e^2x - 1 = (e^x - 1) (e^x - 1 + 2), three times.
-    let t = x.mul(V::splat(0.125));
-    let series = V::splat(1.0 / 5040.0)
-        .mul_add(t, V::splat(1.0 / 720.0))
-        .mul_add(t, V::splat(1.0 / 120.0))
-        .mul_add(t, V::splat(1.0 / 24.0))
-        .mul_add(t, V::splat(1.0 / 6.0))
-        .mul_add(t, V::splat(0.5))
-        .mul_add(t, V::splat(1.0));
-    let eighth = series.mul(t);
-    let two = V::splat(2.0);
-    let quarter = eighth.mul(eighth.add(two));
-    let half = quarter.mul(quarter.add(two));
-    half.mul(half.add(two))
-}
 
 /// What all places of a lobe have in common.
 struct Lobe<V> {
@@ -186,7 +98,7 @@ impl<V: Vector> Lobe<V> {
         let grazing = squared.mul(squared).mul(rest).mul(value);
         value.sub(grazing).store(&mut next.base);
         grazing.store(&mut next.grazing);
-        next.taps.find(direction, basis.width, basis.height);
+        next.taps.find(direction, (basis.width, basis.height), 0);
         true
     }
 }
@@ -252,52 +164,6 @@ pub(super) fn row_in<V: Vector>(basis: &LightBasis, place: &LobePlace, width: f3
                 let texel = next.taps.texel(k, lane);
                 row[texel] += value * next.taps.weights[k][lane] * f32::from(shares[texel]);
             }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::vector::Plain;
-    use super::*;
-    use crate::math::random::SequentialRandom;
-    use crate::math::sphere::tap_of_direction;
-    use glam::Vec3;
-
-    #[test]
-    fn taps_of_several_directions_read_what_exact_ones_do() {
-        let mut random = SequentialRandom::new(5);
-        for (width, height) in [(64usize, 32usize), (1, 1), (2, 1), (5, 3)] {
-            let values: Vec<f32> = (0..width * height).map(|_| random.next_number()).collect();
-            let mut directions: Vec<Vec3> = (0..20_000)
-                .map(|_| Vec3::from_array([(); 3].map(|()| 2.0 * random.next_number() - 1.0)).normalize_or(Vec3::Y))
-                .collect();
-            directions.extend([Vec3::Y, Vec3::NEG_Y, Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::NEG_Z, Vec3::Y, Vec3::Y]);
-            for eight in directions.chunks_exact(Plain::LANES) {
-                let axis = |k: usize| Plain::load(&eight.iter().map(|direction| direction[k]).collect::<Vec<_>>());
-                let mut taps = Taps::NONE;
-                taps.find([axis(0), axis(1), axis(2)], width, height);
-                for (lane, &direction) in eight.iter().enumerate() {
-                    let tap = tap_of_direction(direction, width, height);
-                    let exact: f32 = (0..4).map(|k| values[tap.index[k] as usize] * tap.weight[k]).sum();
-                    let found: f32 = (0..4).map(|k| values[taps.texel(k, lane)] * taps.weights[k][lane]).sum();
-                    // At a pole any azimuth is as good.
-                    if direction.y.abs() < 1.0 {
-                        assert!((found - exact).abs() < 3e-5, "{width} {direction}: {found} {exact}");
-                    }
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn exponentials_near_zero_keep_their_digits() {
-        for step in 0..4000 {
-            let x = -4.0 * (step as f32 / 4000.0).powi(4) - 1e-9;
-            let mut found = [0.0; WIDEST];
-            exp_minus_one(Plain::splat(x)).store(&mut found);
-            let exact = f64::from(x).exp_m1();
-            assert!((f64::from(found[0]) / exact - 1.0).abs() < 1e-6, "{x}: {} {exact}", found[0]);
         }
     }
 }

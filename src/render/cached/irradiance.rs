@@ -3,7 +3,7 @@
 //! `E = 1/pi ∑_j share_j max(0, n . moment_j) L_j`: what a white Lambert surface sends back. It is linear in the light.
 
 use super::light_basis::LightBasis;
-use super::vector::{Vector, versions};
+use crate::math::vector::{Vector, versions};
 use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 
@@ -75,9 +75,9 @@ fn row_in<V: Vector>(basis: &LightBasis, normal: Vec3, shares: &[u8], scale: f32
 
 #[cfg(test)]
 mod tests {
-    use super::super::vector::Plain;
     use super::*;
     use crate::math::random::SequentialRandom;
+    use crate::math::vector::Plain;
 
     #[test]
     fn versions_agree_and_the_transpose_is_one() {

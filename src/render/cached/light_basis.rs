@@ -4,8 +4,8 @@
 //! hat are enough for both lobes to see one and the same light: its solid angle `∫ hat dω`, and its moment
 //! `∫ hat ω dω`, whose product with a normal is the hat's irradiance wherever it lies above the horizon.
 
-use super::vector::WIDEST;
 use crate::math::sphere::{direction_of_texel, solid_angle_of_texel, tap_of_direction};
+use crate::math::vector::WIDEST;
 use glam::{DVec3, Vec3, Vec4};
 
 /// Points along each side of a texel for the integrals.

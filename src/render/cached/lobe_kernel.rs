@@ -4,7 +4,7 @@
 
 use super::light_basis::{LightBasis, LightPlanes};
 use super::lobe_sum::{LobePlace, LobeSums};
-use super::vector::Vector;
+use crate::math::vector::Vector;
 use std::f32::consts::{LN_2, PI};
 
 /// Widths summed in one walk over the light.

@@ -14,7 +14,7 @@
 use super::half_vector;
 use super::light_basis::{LightBasis, LightPlanes};
 use super::lobe_kernel::{MOST_AT_ONCE, row_in, sums_in};
-use super::vector::versions;
+use crate::math::vector::versions;
 use glam::Vec3;
 
 /// Lobes of at least this microfacet width, for a light of 32 rows, are summed over hats. The standard deviation of
@@ -161,11 +161,11 @@ versions! {
 #[cfg(test)]
 mod tests {
     use super::super::half_vector_kernel;
-    use super::super::vector::Plain;
     use super::*;
     use crate::material::{LobeGeometry, Material};
     use crate::math::random::SequentialRandom;
     use crate::math::sphere::{direction_of_texel, solid_angle_of_texel};
+    use crate::math::vector::Plain;
 
     fn light_of(basis: &LightBasis, seed: u64) -> LightPlanes {
         let mut random = SequentialRandom::new(seed);

@@ -7,7 +7,8 @@
 //!    and `S5`, and their derivative by the width.
 //! 4. [`bounce`]: light between surfaces as a sparse matrix with its transpose.
 //! 5. [`footprint`]: what a camera sees, as shading points with lists of texels.
-//! 6. [`transport`]: all of it together, and the radiance it gives. [`vector`] holds the arithmetic of eight lanes.
+//! 6. [`transport`]: all of it together, and the radiance it gives. Sums run on several numbers at a time
+//!    ([`crate::math::vector`]).
 //!
 //! For fixed roughness the result is linear in the light; for fixed light and roughness it is linear in diffuse and
 //! specular reflectance. Nothing is random after the cache is traced, and nothing depends on the number of threads.
@@ -29,11 +30,6 @@ mod lobe_kernel;
 pub mod lobe_sum;
 pub mod points;
 pub mod transport;
-pub mod vector;
-#[cfg(target_arch = "aarch64")]
-mod vector_arm;
-#[cfg(target_arch = "x86_64")]
-mod vector_x86;
 pub mod visibility;
 
 #[cfg(test)]

@@ -126,8 +126,8 @@ fn reflectance(cos_out: f32, width: f32) -> Vec3 {
     let mut sum = Vec3::ZERO;
     for sample in 0..SAMPLES {
         let even = (sample as f32 + 0.5) / SAMPLES as f32;
-        let [choice, u] = [3, 2].map(|base| radical_inverse(sample + 1, base));
-        let Some(light) = sampler.sample(&frame, towards_viewer, choice, [even, u]) else { continue };
+        let u = radical_inverse(sample + 1, 2);
+        let Some(light) = sampler.sample(&frame, towards_viewer, [even, u]) else { continue };
         let Some(geometry) = LobeGeometry::new(Vec3::Z, light, towards_viewer) else { continue };
         let [low, high, _] = material.reflect(&geometry, 1.0);
         let density = sampler.density(&geometry);

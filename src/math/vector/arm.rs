@@ -1,6 +1,6 @@
 //! [`Vector`] with NEON, which every 64-bit Arm processor has.
 
-use super::vector::Vector;
+use super::Vector;
 use std::arch::aarch64::*;
 
 /// NEON, four numbers.

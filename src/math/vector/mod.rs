@@ -1,4 +1,4 @@
-//! Several numbers at a time: the few operations the cached sums need, in portable Rust, with AVX2 and FMA, with AVX-512,
+//! Several numbers at a time: the few operations that light is summed and paths are drawn with, in portable Rust, with AVX2 and FMA, with AVX-512,
 //! and with NEON.
 //!
 //! A kernel is written once, generic over [`Vector`], and compiled for each. The macro `versions` makes the function that
@@ -8,9 +8,15 @@
 //! and take them through memory.
 
 #[cfg(target_arch = "aarch64")]
-pub use super::vector_arm::Neon;
+mod arm;
+pub mod elementary;
 #[cfg(target_arch = "x86_64")]
-pub use super::vector_x86::{Avx2, Avx512};
+mod x86;
+
+#[cfg(target_arch = "aarch64")]
+pub use arm::Neon;
+#[cfg(target_arch = "x86_64")]
+pub use x86::{Avx2, Avx512};
 
 /// Numbers that the widest vector holds: slices are padded to whole ones.
 pub const WIDEST: usize = 16;
@@ -217,35 +223,35 @@ macro_rules! versions {
             {
                 #[target_feature(enable = "avx512f")]
                 fn avx512($($argument: $type),*) $(-> $result)? {
-                    $kernel::<$crate::render::cached::vector::Avx512 $(, $constant)?>($($argument),*)
+                    $kernel::<$crate::math::vector::Avx512 $(, $constant)?>($($argument),*)
                 }
                 #[target_feature(enable = "avx2,fma")]
                 fn avx2($($argument: $type),*) $(-> $result)? {
-                    $kernel::<$crate::render::cached::vector::Avx2 $(, $constant)?>($($argument),*)
+                    $kernel::<$crate::math::vector::Avx2 $(, $constant)?>($($argument),*)
                 }
-                if $crate::render::cached::vector::has_avx512() {
+                if $crate::math::vector::has_avx512() {
                     // SAFETY: the processor has what the function is compiled for.
                     return unsafe { avx512($($argument),*) };
                 }
-                if $crate::render::cached::vector::has_avx2() {
+                if $crate::math::vector::has_avx2() {
                     // SAFETY: as above.
                     return unsafe { avx2($($argument),*) };
                 }
-                $kernel::<$crate::render::cached::vector::Plain $(, $constant)?>($($argument),*)
+                $kernel::<$crate::math::vector::Plain $(, $constant)?>($($argument),*)
             }
             // Every processor of this kind has NEON.
             #[cfg(target_arch = "aarch64")]
             {
-                $kernel::<$crate::render::cached::vector::Neon $(, $constant)?>($($argument),*)
+                $kernel::<$crate::math::vector::Neon $(, $constant)?>($($argument),*)
             }
             #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
             {
-                $kernel::<$crate::render::cached::vector::Plain $(, $constant)?>($($argument),*)
+                $kernel::<$crate::math::vector::Plain $(, $constant)?>($($argument),*)
             }
         }
     )*};
 }
-pub(super) use versions;
+pub(crate) use versions;
 
 #[cfg(test)]
 mod tests;

@@ -1,9 +1,9 @@
 //! [`Vector`] with AVX2 and FMA, and with AVX-512.
 
-use super::vector::{MAGIC, Vector};
+use super::{MAGIC, Vector};
 use std::arch::x86_64::*;
 
-/// AVX2 with FMA. Only code that runs behind [`has_avx2`](super::vector::has_avx2) makes one.
+/// AVX2 with FMA. Only code that runs behind [`has_avx2`](super::has_avx2) makes one.
 #[derive(Clone, Copy, Debug)]
 pub struct Avx2(__m256);
 
@@ -101,7 +101,7 @@ impl Vector for Avx2 {
     }
 }
 
-/// AVX-512F. Only code that runs behind [`has_avx512`](super::vector::has_avx512) makes one.
+/// AVX-512F. Only code that runs behind [`has_avx512`](super::has_avx512) makes one.
 #[derive(Clone, Copy, Debug)]
 pub struct Avx512(__m512);
 
