@@ -40,16 +40,15 @@ impl SampleStream {
 
     /// The next pair, uniform in [0, 1)^2.
     pub fn next_pair(&mut self) -> [f32; 2] {
-        let hash = self.next_hash();
+        let hash = self.hash();
+        self.dimension += 1;
         scrambled_pair(self.sample, hash as u32, (hash >> 32) as u32)
     }
 
     /// What the next pair of all samples of the stream is scrambled by.
     #[inline(always)]
-    fn next_hash(&mut self) -> u64 {
-        let hash = mix(self.key ^ u64::from(self.dimension).wrapping_mul(0xd134_2543_de82_ef95));
-        self.dimension += 1;
-        hash
+    fn hash(&self) -> u64 {
+        mix(self.key ^ u64::from(self.dimension).wrapping_mul(0xd134_2543_de82_ef95))
     }
 }
 
@@ -58,8 +57,14 @@ impl SampleStream {
 #[inline(always)]
 pub fn next_pairs<const N: usize>(streams: &mut [SampleStream; N], count: usize) -> [[f32; N]; 2] {
     let (mut samples, mut low, mut high) = ([0; N], [0; N], [0; N]);
+    // Samples of a pixel have their hash in common.
+    let mut known = (SampleStream::default(), 0);
     for (lane, stream) in streams[..count].iter_mut().enumerate() {
-        let hash = stream.next_hash();
+        if lane == 0 || (known.0.key, known.0.dimension) != (stream.key, stream.dimension) {
+            known = (*stream, stream.hash());
+        }
+        let hash = known.1;
+        stream.dimension += 1;
         (samples[lane], low[lane], high[lane]) = (stream.sample, hash as u32, (hash >> 32) as u32);
     }
     let mut numbers = [[0.0; N]; 2];
@@ -166,6 +171,20 @@ impl SequentialRandom {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pairs_of_several_streams_are_those_of_each() {
+        let key = |pixel: u32| StreamKey::new(3, 1, 2, pixel);
+        let mut several: [SampleStream; 8] =
+            std::array::from_fn(|lane| SampleStream::new(key(lane as u32 / 3), 7 * lane as u32));
+        let mut single = several;
+        for count in [8, 5, 1] {
+            let pairs = next_pairs(&mut several, count);
+            for lane in 0..count {
+                assert_eq!([pairs[0][lane], pairs[1][lane]], single[lane].next_pair(), "stream {lane} of {count}");
+            }
+        }
+    }
 
     #[test]
     fn sixteen_samples_are_stratified_in_both_axes_and_in_four_by_four_cells() {

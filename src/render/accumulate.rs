@@ -7,7 +7,7 @@ mod chunk_gradient;
 
 use self::chunk_gradient::ChunkGradient;
 use super::first_hits::CameraRays;
-use super::packet::PathStart;
+use super::packet::{PACKET, PathStart, camera_pairs};
 use super::path::{PathArena, PathTracer};
 use super::sums::{Parameters, radiance, radiance_backward};
 use crate::math::random::{SampleStream, StreamKey};
@@ -105,14 +105,34 @@ impl PassKey {
 
     /// The stream of sample `sample` of `samples` at a pixel.
     pub fn stream(&self, pixel: usize, sample: usize, samples: usize) -> SampleStream {
+        let (second, number) = self.place(sample, samples);
+        SampleStream::new(self.key(pixel, second), number)
+    }
+
+    /// The streams of samples from `first` on, of `samples` at a pixel; those behind the last one are of no use.
+    fn streams(&self, pixel: usize, first: usize, samples: usize) -> [SampleStream; PACKET] {
+        let (mut key, mut key_is_second) = (self.key(pixel, false), false);
+        std::array::from_fn(|lane| {
+            let (second, number) = self.place(first + lane, samples);
+            if second != key_is_second {
+                (key, key_is_second) = (self.key(pixel, second), second);
+            }
+            SampleStream::new(key, number)
+        })
+    }
+
+    /// Whether a sample is of the second half, and its number in its sequence.
+    fn place(&self, sample: usize, samples: usize) -> (bool, u32) {
         let half = (samples / 2).max(1);
-        let (second, number) = match self.sequence {
-            Sequence::Halves if sample >= half && samples > 1 => (1, sample - half),
-            Sequence::Halves => (0, sample),
-            Sequence::Whole { first } => (0, first as usize + sample),
-        };
-        let key = StreamKey::new(self.seed ^ (second << 62), self.step, self.view, pixel as u32);
-        SampleStream::new(key, number as u32)
+        match self.sequence {
+            Sequence::Halves if sample >= half && samples > 1 => (true, (sample - half) as u32),
+            Sequence::Halves => (false, sample as u32),
+            Sequence::Whole { first } => (false, first + sample as u32),
+        }
+    }
+
+    fn key(&self, pixel: usize, second: bool) -> StreamKey {
+        StreamKey::new(self.seed ^ (u64::from(second) << 62), self.step, self.view, pixel as u32)
     }
 }
 
@@ -235,14 +255,16 @@ pub fn estimate_pixel<R: Real>(
 pub fn trace_pixel(tracer: &PathTracer<'_>, rays: &CameraRays<'_>, pixel: usize, key: PassKey, arena: &mut PathArena) {
     arena.clear();
     let samples = rays.samples();
-    tracer.trace(
-        (0..samples).map(|sample| {
-            let mut stream = key.stream(pixel, sample, samples);
-            let (ray, first_hit) = rays.at(pixel, sample, &mut stream);
-            PathStart { ray, first_hit, stream }
-        }),
-        arena,
-    );
+    for first in (0..samples).step_by(PACKET) {
+        let count = PACKET.min(samples - first);
+        let mut streams = key.streams(pixel, first, samples);
+        let numbers = camera_pairs(&mut streams, count);
+        let starts = (0..count).map(|lane| {
+            let (ray, first_hit) = rays.at(pixel, first + lane, [numbers[0][lane], numbers[1][lane]]);
+            PathStart { ray, first_hit, stream: streams[lane] }
+        });
+        tracer.trace(starts, arena);
+    }
 }
 
 /// The two estimates of a pixel whose paths are in `arena`.

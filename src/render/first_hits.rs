@@ -134,11 +134,10 @@ impl<'a> CameraRays<'a> {
         self.samples
     }
 
-    /// The ray of a sample and its first hit. Takes the first pair of numbers from the stream in any case, so that the
-    /// rest of the path is the same with and without cached hits.
+    /// The ray of a sample and its first hit. `numbers` is the first pair of the sample's stream, with cached hits as
+    /// well, so that the rest of the path is the same.
     #[inline]
-    pub fn at(&self, pixel: usize, sample: usize, stream: &mut SampleStream) -> (Ray, Option<Hit>) {
-        let numbers = stream.next_pair();
+    pub fn at(&self, pixel: usize, sample: usize, numbers: [f32; 2]) -> (Ray, Option<Hit>) {
         match self.cached {
             Some(cached) => {
                 let place = sample % cached.places;

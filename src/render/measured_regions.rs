@@ -1,13 +1,13 @@
 //! Pictures of a surface of which regions have measured reflectance.
 //!
 //! The walk is that of [`super::path`], with the same random numbers for the same decisions: one direction from the
-//! light and one from the material at each vertex, joined by the power heuristic. A region draws its directions from
+//! light and one from the material at each vertex, joined by the balance heuristic. A region draws its directions from
 //! its table ([`super::regions`]). Where no region is met the picture is that of [`super::picture`] up to rounding.
 //! Nothing is fitted to such pictures, so radiance is added up on the way and no record is kept.
 
 use super::accumulate::PassKey;
 use super::first_hits::CameraRays;
-use super::path::{MAX_BOUNCES, power_heuristic};
+use super::path::{MAX_BOUNCES, balance_heuristic};
 use super::picture::{Picture, PictureSettings};
 use super::regions::{MeasuredMaterial, Regions};
 use super::sums::Parameters;
@@ -120,7 +120,7 @@ impl RegionTracer<'_> {
                 && let Some((reflected, other)) = vertex.towards(direction)
                 && !self.surface.is_shadowed(&vertex.point, direction)
             {
-                let weight = power_heuristic(density, other) / density;
+                let weight = balance_heuristic(density, other) / density;
                 sum += throughput * reflected * self.radiance_of_light(direction) * weight;
             }
             let choice = stream.next_number();
@@ -135,7 +135,7 @@ impl RegionTracer<'_> {
             match self.surface.closest(&next) {
                 Some(met) => (ray, hit) = (next, met),
                 None => {
-                    let weight = power_heuristic(density, self.light.pdf(direction));
+                    let weight = balance_heuristic(density, self.light.pdf(direction));
                     sum += throughput * self.radiance_of_light(direction) * weight;
                     break;
                 }
@@ -172,7 +172,7 @@ pub fn render_regions(
                 let mut sum = Vec3::ZERO;
                 for sample in 0..rays.samples() {
                     let mut stream = key.stream(pixel, sample, rays.samples());
-                    let (ray, hit) = rays.at(pixel, sample, &mut stream);
+                    let (ray, hit) = rays.at(pixel, sample, stream.next_pair());
                     escaped += usize::from(hit.is_none());
                     sum += tracer.radiance(&ray, hit, &mut stream);
                 }

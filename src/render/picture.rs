@@ -161,7 +161,7 @@ pub fn layers(surface: &Surface, camera: &Camera, parameters: &Parameters<f32>, 
             let mut sum = Pixel::default();
             for sample in 0..samples {
                 let mut stream = SampleStream::new(StreamKey::new(0, 0, 0, pixel as u32), sample as u32);
-                let (ray, Some(hit)) = rays.at(pixel, sample, &mut stream) else { continue };
+                let (ray, Some(hit)) = rays.at(pixel, sample, stream.next_pair()) else { continue };
                 let point = surface.point(&hit);
                 if point.geometric_normal.dot(ray.direction) >= 0.0 {
                     continue;

@@ -118,6 +118,9 @@ impl Default for Proposals {
 }
 
 versions! {
+    /// The next pair of random numbers of each of the first `count` streams: the first numbers of all, then the second.
+    pub fn camera_pairs(streams: &mut [SampleStream; WIDEST], count: usize) -> [Lanes; 2] = pairs_in;
+
     /// Draws both directions of each path. `environment_size` is width and height of the environment in texels.
     pub(super) fn propose(
         arrivals: &mut Arrivals,
@@ -129,7 +132,12 @@ versions! {
 }
 
 #[inline(always)]
-fn propose_in<V: Vector>(
+fn pairs_in<V: Vector>(streams: &mut [SampleStream; WIDEST], count: usize) -> [Lanes; 2] {
+    next_pairs(streams, count)
+}
+
+#[inline(always)]
+pub(super) fn propose_in<V: Vector>(
     arrivals: &mut Arrivals,
     light: &EnvironmentSampler,
     environment_size: (usize, usize),

@@ -11,8 +11,9 @@ mod kernel;
 #[cfg(test)]
 mod tests;
 
+pub use self::kernel::camera_pairs;
 use self::kernel::{Arrivals, Directions, Proposals, propose};
-use super::path::{Bounce, Connection, MAX_BOUNCES, PathArena, PathHead, PathTracer, PathVertex, power_heuristic};
+use super::path::{Bounce, Connection, MAX_BOUNCES, PathArena, PathHead, PathTracer, PathVertex, balance_heuristic};
 use super::surface::SurfacePoint;
 use crate::material::{LobeGeometry, TextureTap};
 use crate::math::luminance;
@@ -120,7 +121,6 @@ impl PathTracer<'_> {
                 continue;
             }
             let texture = self.proposal.tap(point.uv, self.mip_level(bounce_index, &point, &ray, hit.t));
-            let material = self.proposal.fetch(&texture);
             let lane = places.len();
             places.push(Place { path, point, texture });
             arrivals.streams[lane] = stream;
@@ -129,6 +129,10 @@ impl PathTracer<'_> {
                 arrivals.geometric_normal[axis][lane] = point.geometric_normal[axis];
                 arrivals.to_viewer[axis][lane] = to_viewer[axis];
             }
+        }
+        // Apart, so that the processor waits for the texels of several paths at once.
+        for (lane, place) in places.iter().enumerate() {
+            let material = self.proposal.fetch(&place.texture);
             arrivals.specular[lane] = luminance(Vec3::from_array(material.specular));
             arrivals.diffuse[lane] = luminance(Vec3::from_array(material.diffuse));
             arrivals.log_width[lane] = material.log_width;
@@ -149,7 +153,7 @@ impl PathTracer<'_> {
                 continue;
             }
             let density = proposals.light_density[lane];
-            let weight = power_heuristic(density, directions.lobe_density[lane]) / density;
+            let weight = balance_heuristic(density, directions.lobe_density[lane]) / density;
             let geometry = directions.geometry(lane, proposals.cos_out[lane]);
             connections[lane] = Some(Connection { geometry, light: directions.taps.tap(lane), weight });
         }
@@ -175,7 +179,7 @@ impl PathTracer<'_> {
                         let phi = proposals.phi[lane];
                         let phi = if phi < 0.0 { phi + TAU } else { phi };
                         let other = self.light.pdf_at_angles(direction, (phi, proposals.theta[lane]));
-                        Some((directions.taps.tap(lane), power_heuristic(density, other)))
+                        Some((directions.taps.tap(lane), balance_heuristic(density, other)))
                     }
                 };
                 let geometry = directions.geometry(lane, proposals.cos_out[lane]);
