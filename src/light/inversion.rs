@@ -60,7 +60,7 @@ impl InversionTables {
         let (guide, cumulative) = self.numbers[table * stride..(table + 1) * stride].split_at(self.count);
         // A number of 24 bits, exactly.
         let place = (u * 16_777_216.0).clamp(0.0, 16_777_215.0) as u32;
-        let part = (u64::from(place) * self.count as u64 >> 24) as usize;
+        let part = ((u64::from(place) * self.count as u64) >> 24) as usize;
         let place = place << 8;
         let mut entry = guide[part] as usize;
         while cumulative[entry + 1] <= place {

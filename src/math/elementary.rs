@@ -18,7 +18,7 @@ pub fn atan2(y: f32, x: f32) -> f32 {
     let s2 = s * s;
     let s4 = s2 * s2;
     let low = (-0.333_331_53 + 0.199_937_73 * s) + (-0.142_110_55 + 0.106_660_03 * s) * s2;
-    let high = (-0.075_522_106 + 0.043_211_815 * s) + (-0.016_367_898 + 0.002_920_684_5 * s) * s2;
+    let high = (-0.075_522_11 + 0.043_211_815 * s) + (-0.016_367_898 + 0.002_920_684_5 * s) * s2;
     let angle = t + t * s * (low + high * s4);
     let angle = if y_size > x_size { FRAC_PI_2 - angle } else { angle };
     let angle = if x.is_sign_negative() { PI - angle } else { angle };
@@ -33,7 +33,7 @@ pub fn sin_cos_of_turns(turns: f32) -> (f32, f32) {
     let whole = (quarters + ROUNDING) - ROUNDING;
     let x = quarters - whole;
     let s = x * x;
-    let sin = x * ((1.570_796_3 - 0.645_963_46 * s) + (0.079_680_03 - 0.004_601_657_7 * s) * (s * s));
+    let sin = x * ((FRAC_PI_2 - 0.645_963_46 * s) + (0.079_680_03 - 0.004_601_658 * s) * (s * s));
     let cos = 1.0 + s * ((-1.233_700_6 + 0.253_669_25 * s) + (-0.020_860_29 + 0.000_904_021_6 * s) * (s * s));
     let quarter = whole as i32;
     let (sin, cos) = if quarter & 1 == 0 { (sin, cos) } else { (cos, sin) };

@@ -59,10 +59,12 @@ impl Vertex<'_> {
         })
     }
 
-    fn sample(&self, choice: f32, numbers: [f32; 2]) -> Option<Vec3> {
+    fn sample(&self, stream: &mut SampleStream) -> Option<Vec3> {
+        let numbers = stream.next_pair();
         match &self.reflector {
             Reflector::Maps(_, sampler) => sampler.sample(&self.frame, self.towards_viewer, numbers),
             Reflector::Measured(material) => {
+                let choice = stream.next_number();
                 material.sample(&self.frame, self.towards_viewer, [choice, numbers[0], numbers[1]])
             }
         }
@@ -123,9 +125,7 @@ impl RegionTracer<'_> {
                 let weight = balance_heuristic(density, other) / density;
                 sum += throughput * reflected * self.radiance_of_light(direction) * weight;
             }
-            let choice = stream.next_number();
-            let numbers = stream.next_pair();
-            let Some(direction) = vertex.sample(choice, numbers) else { break };
+            let Some(direction) = vertex.sample(stream) else { break };
             let Some((reflected, density)) = vertex.towards(direction) else { break };
             if !(density > 1e-9) {
                 break;

@@ -1,7 +1,7 @@
 //! Angles, sines, logarithms and exponentials of several numbers, good to a few units in the last place.
 
 use super::Vector;
-use std::f32::consts::{FRAC_PI_2, LN_2, LOG2_E, PI};
+use std::f32::consts::{FRAC_PI_2, LN_2, LOG2_E, PI, TAU};
 
 /// Angle of (x, y) in (-pi, pi], to 3e-7: Abramowitz and Stegun 1964, 4.4.49.
 #[inline(always)]
@@ -78,8 +78,8 @@ pub fn sine_of_turns<V: Vector>(turns: V) -> V {
     V::splat(39.710_913)
         .mul_add(t2, V::splat(-76.574_99))
         .mul_add(t2, V::splat(81.602_23))
-        .mul_add(t2, V::splat(-41.341_677))
-        .mul_add(t2, V::splat(6.283_185_3))
+        .mul_add(t2, V::splat(-41.341_68))
+        .mul_add(t2, V::splat(TAU))
         .mul(turns)
 }
 

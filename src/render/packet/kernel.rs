@@ -133,6 +133,8 @@ versions! {
 
 #[inline(always)]
 fn pairs_in<V: Vector>(streams: &mut [SampleStream; WIDEST], count: usize) -> [Lanes; 2] {
+    // Integers, which the compiler makes vectors of.
+    const { assert!(WIDEST.is_multiple_of(V::LANES)) };
     next_pairs(streams, count)
 }
 
