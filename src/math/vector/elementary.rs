@@ -83,6 +83,17 @@ pub fn sine_of_turns<V: Vector>(turns: V) -> V {
         .mul(turns)
 }
 
+/// Sine and cosine of angles in [0, 1] turns.
+#[inline(always)]
+pub fn sine_and_cosine_of_turns<V: Vector>(turns: V) -> (V, V) {
+    let (zero, quarter, half) = (V::splat(0.0), V::splat(0.25), V::splat(0.5));
+    // Half a turn back both change their sign, and what is left lies half a turn to either side.
+    let x = turns.sub(half);
+    let size = x.max(zero.sub(x));
+    let sine = sine_of_turns(size.min(half.sub(size)));
+    (x.where_positive(zero.sub(sine), sine), sine_of_turns(size.sub(quarter)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::{Plain, WIDEST};
@@ -126,6 +137,15 @@ mod tests {
             let turns = step as f32 / 4000.0;
             let exact = (std::f64::consts::TAU * f64::from(turns)).sin();
             assert!((of(sine_of_turns, turns) - exact).abs() < 2e-7, "{turns}");
+        }
+        for step in 0..=4000 {
+            let turns = step as f32 / 4000.0;
+            let (sine, cosine) = (std::f64::consts::TAU * f64::from(turns)).sin_cos();
+            let off = [
+                of(|turns| sine_and_cosine_of_turns(turns).0, turns) - sine,
+                of(|turns| sine_and_cosine_of_turns(turns).1, turns) - cosine,
+            ];
+            assert!(off[0].abs() < 4e-7 && off[1].abs() < 4e-7, "{turns}: {off:?}");
         }
     }
 }

@@ -5,17 +5,18 @@
 //! [`LobeGeometry::new`](crate::material::LobeGeometry) and [`tap_of_direction`](crate::math::sphere::tap_of_direction) say
 //! for one; the tests of this folder hold it against them.
 
+use super::light_cells::LightCells;
 use crate::light::EnvironmentSampler;
 use crate::math::random::{SampleStream, next_pairs};
-use crate::math::vector::elementary::{angle, ln_one_minus, one_minus_exp, sine_of_turns};
+use crate::math::vector::elementary::{angle, ln_one_minus, one_minus_exp, sine_and_cosine_of_turns};
 use crate::math::vector::{Vector, WIDEST, versions};
 use crate::render::taps::Taps;
-use std::f32::consts::{LOG2_E, PI, TAU};
+use std::f32::consts::{LOG2_E, PI};
 
 /// One number of each path.
 pub(super) type Lanes = [f32; WIDEST];
 /// No number of any path.
-const NONE: Lanes = [0.0; WIDEST];
+pub(super) const NONE: Lanes = [0.0; WIDEST];
 
 /// Where paths have met the surface.
 #[derive(Clone, Debug)]
@@ -170,103 +171,6 @@ pub(super) fn propose_in<V: Vector>(
         theta.store(&mut proposals.theta[at..]);
         proposals.of_lobe.taps.find_at_angles(phi, theta, environment_size, at);
     }
-}
-
-/// Cells of the light's table, one a path; see [`crate::light::sampler::LightCell`].
-struct LightCells {
-    rest: [Lanes; 2],
-    corners: [Lanes; 4],
-    column: Lanes,
-    from_pole: [Lanes; 2],
-    pole: Lanes,
-    columns: f32,
-}
-
-/// Directions towards the light.
-struct Drawn<V> {
-    direction: [V; 3],
-    density: V,
-    phi: V,
-    theta: V,
-}
-
-impl LightCells {
-    const NONE: LightCells = LightCells {
-        rest: [NONE; 2],
-        corners: [NONE; 4],
-        column: NONE,
-        from_pole: [NONE; 2],
-        pole: NONE,
-        columns: 1.0,
-    };
-
-    /// Looks up the cells that pairs of random numbers fall into; false where there is no light.
-    #[inline(always)]
-    fn find(&mut self, light: &EnvironmentSampler, numbers: &[Lanes; 2], count: usize) -> bool {
-        let Some(columns) = light.columns() else { return false };
-        self.columns = columns as f32;
-        for lane in 0..count {
-            let Some(cell) = light.cell([numbers[0][lane], numbers[1][lane]]) else { return false };
-            for k in 0..2 {
-                self.rest[k][lane] = cell.rest[k];
-                self.from_pole[k][lane] = cell.ring.from_pole[k];
-            }
-            for k in 0..4 {
-                self.corners[k][lane] = cell.corners[k];
-            }
-            self.column[lane] = cell.column as f32;
-            self.pole[lane] = cell.ring.pole;
-        }
-        true
-    }
-
-    /// See [`EnvironmentSampler::sample`].
-    #[inline(always)]
-    fn draw<V: Vector>(&self, at: usize) -> Drawn<V> {
-        let (zero, one) = (V::splat(0.0), V::splat(1.0));
-        let [upper_left, upper_right, lower_left, lower_right] = [
-            V::load(&self.corners[0][at..]),
-            V::load(&self.corners[1][at..]),
-            V::load(&self.corners[2][at..]),
-            V::load(&self.corners[3][at..]),
-        ];
-        let down =
-            sample_linear(V::load(&self.rest[1][at..]), upper_left.add(upper_right), lower_left.add(lower_right));
-        let left = lower_left.sub(upper_left).mul_add(down, upper_left);
-        let right = lower_right.sub(upper_right).mul_add(down, upper_right);
-        let across = sample_linear(V::load(&self.rest[0][at..]), left, right);
-        let below_one = V::load(&self.from_pole[1][at..]).mul_add(down, V::load(&self.from_pole[0][at..]));
-        let sine = below_one.mul(V::splat(2.0).sub(below_one)).max(zero).sqrt();
-        let cosine = V::load(&self.pole[at..]).mul(one.sub(below_one));
-        let turns = V::load(&self.column[at..]).add(across).mul(V::splat(1.0 / self.columns));
-        let (sin_phi, cos_phi) = sine_and_cosine_of_turns(turns);
-        Drawn {
-            direction: [sine.mul(sin_phi), cosine, zero.sub(sine.mul(cos_phi))],
-            density: right.sub(left).mul_add(across, left),
-            phi: turns.mul(V::splat(TAU)),
-            theta: angle(sine, cosine),
-        }
-    }
-}
-
-/// Numbers in [0, 1] with a density linear from `first` to `last`, which are not both 0: see
-/// [`crate::light::sampler`].
-#[inline(always)]
-fn sample_linear<V: Vector>(u: V, first: V, last: V) -> V {
-    let squared = first.mul(first);
-    let root = last.mul(last).sub(squared).mul_add(u, squared).max(V::splat(0.0)).sqrt();
-    u.mul(first.add(last)).div(first.add(root)).min(V::splat(1.0))
-}
-
-/// Sine and cosine of angles in [0, 1] turns.
-#[inline(always)]
-fn sine_and_cosine_of_turns<V: Vector>(turns: V) -> (V, V) {
-    let (zero, quarter, half) = (V::splat(0.0), V::splat(0.25), V::splat(0.5));
-    // Half a turn back both change their sign, and what is left lies half a turn to either side.
-    let x = turns.sub(half);
-    let size = x.max(zero.sub(x));
-    let sine = sine_of_turns(size.min(half.sub(size)));
-    (x.where_positive(zero.sub(sine), sine), sine_of_turns(size.sub(quarter)))
 }
 
 /// The surface under several paths, and the sampler of its lobe.
