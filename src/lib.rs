@@ -39,7 +39,7 @@
 //! * **Names**: transforms are `target_from_source`; `d_x` is the derivative of the loss by `x`, of the shape of `x`.
 //! * **Roughness**: maps and files hold `r = a^2`, with `a` the microfacet width; inside, `log a` is what moves.
 //! * **Random numbers** are a pure function of (seed, step, view, pixel, sample, dimension), sums are reduced in a
-//!   fixed order: same seed, same bits, whatever the thread count.
+//!   fixed order: same seed, same bits, whatever the thread count. Processors with other vectors round otherwise.
 //!
 //! # A fit in twenty lines
 //! ```

@@ -80,13 +80,20 @@ struct Agreement {
     outliers: f64,
     /// Blocks times channels.
     values: usize,
+    /// Sum of the squared differences over what the noise of both makes of it: above 1 where pictures differ in what
+    /// blocks do not show, by half a pixel for example.
+    scatter: f64,
 }
+
+/// Standard deviation of a pixel of 16 of the reference's paths over the mean of the picture, by `patina bench tracer`.
+const NOISE_OF_REFERENCE: f64 = 0.266;
 
 /// Side of a block in pixels.
 const BLOCK: usize = 8;
 
 /// Compares where the reference has light.
-fn compare(picture: &Picture, reference: &RgbImage) -> Agreement {
+fn compare(picture: &Picture, reference: &RgbImage, reference_samples: usize) -> Agreement {
+    assert!(reference.width().is_multiple_of(BLOCK) && reference.height().is_multiple_of(BLOCK));
     let (mut z, mut z_squared, mut outliers) = (Moments::default(), Moments::default(), 0usize);
     let (mut difference, mut total, mut variances) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
     for block in 0..(reference.width() / BLOCK) * (reference.height() / BLOCK) {
@@ -111,6 +118,18 @@ fn compare(picture: &Picture, reference: &RgbImage) -> Agreement {
             }
         }
     }
+    let own_variance: DVec3 = picture.variance.as_ref().unwrap().pixels().iter().map(|v| v.as_dvec3()).sum();
+    let squares: f64 = picture
+        .radiance
+        .pixels()
+        .iter()
+        .zip(reference.pixels())
+        .map(|(own, theirs)| (own.as_dvec3() - theirs.as_dvec3()).length_squared())
+        .sum();
+    let values = 3.0 * reference.pixels().len() as f64;
+    let noise_of_reference =
+        NOISE_OF_REFERENCE * total.element_sum() / values * (16.0 / reference_samples as f64).sqrt();
+    let expected = own_variance.element_sum() + values * noise_of_reference * noise_of_reference;
     // Channels move together: their standard deviations are added, not their variances.
     let bias_error = (variances.x.sqrt() + variances.y.sqrt() + variances.z.sqrt()) / total.element_sum();
     Agreement {
@@ -120,6 +139,7 @@ fn compare(picture: &Picture, reference: &RgbImage) -> Agreement {
         mean_z_squared: z_squared.mean,
         outliers: outliers as f64 / z.count.max(1) as f64,
         values: z.count as usize,
+        scatter: squares / expected,
     }
 }
 
@@ -154,7 +174,7 @@ fn agree_with_mitsuba(views: &[usize], groups: usize) {
         .collect();
     assert!(!views.is_empty());
     let groups: usize = std::env::var("PATINA_TOYS_GROUPS").map_or(groups, |groups| groups.parse().unwrap());
-    for (sub, max_bounces) in [("views_d2", 1), ("views", 3)] {
+    for (sub, max_bounces, reference_samples) in [("views_d2", 1, 256), ("views", 3, 1024)] {
         for &view in &views {
             let picture_settings = PictureSettings {
                 samples: SAMPLES,
@@ -168,7 +188,7 @@ fn agree_with_mitsuba(views: &[usize], groups: usize) {
             let stop = AtomicBool::new(false);
             let picture = render(&surface, &camera, &parameters, view as u32, &picture_settings, &stop);
             let reference = references(&folder, sub, &scene, view);
-            let own = compare(&picture, &reference);
+            let own = compare(&picture, &reference, reference_samples);
             println!("{sub} view {view}: {own:?}");
             assert_eq!(picture.non_finite_pixels, 0);
             assert!(own.values > 1000, "{sub} view {view}: {own:?}");
@@ -177,6 +197,7 @@ fn agree_with_mitsuba(views: &[usize], groups: usize) {
             // A wrong renderer leaves shifted means; channels of a block move together.
             assert!(own.mean_z.abs() < 0.1 && own.outliers < 0.002, "{sub} view {view}: {own:?}");
             assert!(own.mean_z_squared < 1.2, "{sub} view {view}: {own:?}");
+            assert!(own.scatter < 1.15, "{sub} view {view}: {own:?}");
         }
     }
 }

@@ -86,12 +86,12 @@ impl Environment {
         self.radiance.height()
     }
 
-    /// The four texels and weights that make up the radiance in a direction of any length.
+    /// The four texels and weights that make up the radiance in a direction, whose length is from 1e-15 to 1e15.
     pub fn tap(&self, direction: Vec3) -> BilinearTap {
         sphere::tap_of_direction(direction, self.width(), self.height())
     }
 
-    /// Radiance that arrives from a direction of any length, bilinear in (phi, theta).
+    /// Radiance that arrives from a direction, see [`Environment::tap`], bilinear in (phi, theta).
     pub fn radiance_towards(&self, direction: Vec3) -> Vec3 {
         radiance_of_tap(self.radiance.pixels(), &self.tap(direction))
     }

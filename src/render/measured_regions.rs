@@ -7,6 +7,7 @@
 
 use super::accumulate::PassKey;
 use super::first_hits::CameraRays;
+use super::packet::LEAST_DENSITY;
 use super::path::{MAX_BOUNCES, balance_heuristic};
 use super::picture::{Picture, PictureSettings};
 use super::regions::{MeasuredMaterial, Regions};
@@ -118,7 +119,7 @@ impl RegionTracer<'_> {
         for _ in 0..self.settings.max_bounces.min(MAX_BOUNCES) {
             let Some(vertex) = self.vertex(&ray, &hit) else { break };
             let drawn = self.light.sample(stream.next_pair());
-            if let Some(LightSample { direction, density, .. }) = drawn
+            if let Some(LightSample { direction, density }) = drawn
                 && let Some((reflected, other)) = vertex.towards(direction)
                 && !self.surface.is_shadowed(&vertex.point, direction)
             {
@@ -127,7 +128,7 @@ impl RegionTracer<'_> {
             }
             let Some(direction) = vertex.sample(stream) else { break };
             let Some((reflected, density)) = vertex.towards(direction) else { break };
-            if !(density > 1e-9) {
+            if !(density > LEAST_DENSITY) {
                 break;
             }
             throughput *= reflected / density;

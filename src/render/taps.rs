@@ -11,20 +11,24 @@ const WHOLE: f32 = 8_388_608.0;
 /// Where several directions read a light bilinearly.
 #[derive(Clone, Debug)]
 pub(super) struct Taps {
-    /// The four texels around each: the number of a texel is in the low 23 bits.
-    texels: [[f32; WIDEST]; 4],
+    /// The two rows and then the two columns around each: their number is in the low 23 bits.
+    rows_and_columns: [[f32; WIDEST]; 4],
+    /// Texels in a row.
+    width: usize,
     /// Their weights, which sum to 1.
     pub weights: [[f32; WIDEST]; 4],
 }
 
 impl Taps {
     /// No directions.
-    pub const NONE: Taps = Taps { texels: [[WHOLE; WIDEST]; 4], weights: [[0.0; WIDEST]; 4] };
+    pub const NONE: Taps = Taps { rows_and_columns: [[WHOLE; WIDEST]; 4], width: 1, weights: [[0.0; WIDEST]; 4] };
 
     /// Number of the `k`-th texel of a direction.
     #[inline(always)]
     pub fn texel(&self, k: usize, lane: usize) -> usize {
-        (self.texels[k][lane].to_bits() & 0x007f_ffff) as usize
+        // Not as one float: a large light has more texels than a float has digits.
+        let number = |list: usize| (self.rows_and_columns[list][lane].to_bits() & 0x007f_ffff) as usize;
+        number(k / 2) * self.width + number(2 + k % 2)
     }
 
     /// The tap of one direction.
@@ -59,13 +63,14 @@ impl Taps {
         let left = zero.sub(column_below).where_positive(column_below.add(columns), column_below).max(zero);
         let next = left.add(one);
         let right = columns.sub(next).where_positive(next, zero);
-        let upper = row_below.max(zero).mul_add(columns, V::splat(WHOLE));
-        let lower = row_below.add(one).min(V::splat(height as f32 - 1.0)).mul_add(columns, V::splat(WHOLE));
+        let (upper, lower) = (row_below.max(zero), row_below.add(one).min(V::splat(height as f32 - 1.0)));
         let (left_share, upper_share) = (one.sub(right_share), one.sub(lower_share));
-        upper.add(left).store(&mut self.texels[0][at..]);
-        upper.add(right).store(&mut self.texels[1][at..]);
-        lower.add(left).store(&mut self.texels[2][at..]);
-        lower.add(right).store(&mut self.texels[3][at..]);
+        let whole = V::splat(WHOLE);
+        self.width = width;
+        upper.add(whole).store(&mut self.rows_and_columns[0][at..]);
+        lower.add(whole).store(&mut self.rows_and_columns[1][at..]);
+        left.add(whole).store(&mut self.rows_and_columns[2][at..]);
+        right.add(whole).store(&mut self.rows_and_columns[3][at..]);
         left_share.mul(upper_share).store(&mut self.weights[0][at..]);
         right_share.mul(upper_share).store(&mut self.weights[1][at..]);
         left_share.mul(lower_share).store(&mut self.weights[2][at..]);
@@ -103,6 +108,25 @@ mod tests {
                         assert!((found - exact).abs() < 3e-5, "{width} {direction}: {found} {exact}");
                     }
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn taps_of_angles_read_large_small_and_odd_lights_up_to_a_whole_turn() {
+        use crate::math::sphere::tap_of_angles;
+        for (width, height) in [(7usize, 5usize), (1, 1), (16_384, 8192)] {
+            let value = |texel: usize| ((texel / width) as f32 * 0.37).sin() + ((texel % width) as f32 * 0.11).cos();
+            let mut taps = Taps::NONE;
+            for step in 0..=600 {
+                let phi = -PI + 3.0 * PI * step as f32 / 600.0;
+                let theta = PI * ((step * 37) % 601) as f32 / 600.0;
+                taps.find_at_angles(Plain::splat(phi), Plain::splat(theta), (width, height), 0);
+                let exact = tap_of_angles(phi.rem_euclid(TAU), theta, width, height);
+                let exact: f32 = (0..4).map(|k| value(exact.index[k] as usize) * exact.weight[k]).sum();
+                let found: f32 = (0..4).map(|k| value(taps.texel(k, 3)) * taps.weights[k][3]).sum();
+                // An angle is rounded to a few thousandths of the smallest texel.
+                assert!((found - exact).abs() < 5e-3, "{width} at {phi}, {theta}: {found} {exact}");
             }
         }
     }

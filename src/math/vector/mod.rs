@@ -1,5 +1,5 @@
-//! Several numbers at a time: the few operations that light is summed and paths are drawn with, in portable Rust, with AVX2 and FMA, with AVX-512,
-//! and with NEON.
+//! Several numbers at a time: the few operations that light is summed and paths are drawn with, in portable Rust, with
+//! AVX2 and FMA, with AVX-512, and with NEON.
 //!
 //! A kernel is written once, generic over [`Vector`], and compiled for each. The macro `versions` makes the function that
 //! decides at run time which one runs; tests compare them.

@@ -201,7 +201,8 @@ impl<V: Vector> Surface<V> {
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
         let normal = load_three::<V>(&arrivals.normal, at);
         let to_viewer = load_three::<V>(&arrivals.to_viewer, at);
-        let cos_out = dot(normal, to_viewer).min(one);
+        // Above 0 as was asked before, but for rounding.
+        let cos_out = dot(normal, to_viewer).min(one).max(V::splat(1e-7));
         let rest = one.sub(cos_out).max(zero);
         let squared = rest.mul(rest);
         let grazing = squared.mul(squared).mul(rest);

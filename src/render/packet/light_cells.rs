@@ -22,7 +22,7 @@ pub(super) struct Drawn<V> {
     pub direction: [V; 3],
     /// Density per steradian.
     pub density: V,
-    /// Angles, as of [`angles_of_direction`](crate::math::sphere::angles_of_direction).
+    /// Angles, as of [`angles_of_direction`](crate::math::sphere::angles_of_direction), but phi up to a whole turn.
     pub phi: V,
     /// See there.
     pub theta: V,
@@ -74,9 +74,9 @@ impl LightCells {
         let left = lower_left.sub(upper_left).mul_add(down, upper_left);
         let right = lower_right.sub(upper_right).mul_add(down, upper_right);
         let across = sample_linear(V::load(&self.rest[0][at..]), left, right);
-        let below_one = V::load(&self.from_pole[1][at..]).mul_add(down, V::load(&self.from_pole[0][at..]));
-        let sine = below_one.mul(V::splat(2.0).sub(below_one)).max(zero).sqrt();
-        let cosine = V::load(&self.pole[at..]).mul(one.sub(below_one));
+        let distance = V::load(&self.from_pole[1][at..]).mul_add(down, V::load(&self.from_pole[0][at..]));
+        let sine = distance.mul(V::splat(2.0).sub(distance)).max(zero).sqrt();
+        let cosine = V::load(&self.pole[at..]).mul(one.sub(distance));
         let turns = V::load(&self.column[at..]).add(across).mul(V::splat(1.0 / self.columns));
         let (sin_phi, cos_phi) = sine_and_cosine_of_turns(turns);
         Drawn {
@@ -94,5 +94,5 @@ impl LightCells {
 fn sample_linear<V: Vector>(u: V, first: V, last: V) -> V {
     let squared = first.mul(first);
     let root = last.mul(last).sub(squared).mul_add(u, squared).max(V::splat(0.0)).sqrt();
-    u.mul(first.add(last)).div(first.add(root)).min(V::splat(1.0))
+    u.mul(first.add(last)).div(first.add(root).max(V::splat(1e-30))).min(V::splat(1.0))
 }

@@ -29,7 +29,7 @@ use std::f32::consts::TAU;
 pub const PACKET: usize = WIDEST;
 
 /// Directions whose density from the lobe's sampler is lower are not followed: their weight would be noise.
-const LEAST_DENSITY: f32 = 1e-9;
+pub(super) const LEAST_DENSITY: f32 = 1e-9;
 
 /// A path before it begins.
 #[derive(Clone, Copy, Debug)]
