@@ -21,7 +21,6 @@
 use super::environment::Environment;
 use super::inversion::InversionTables;
 use crate::image::Image;
-use crate::math::elementary::sin_cos_of_turns;
 use crate::math::{luminance, sphere};
 use glam::Vec3;
 use std::f64::consts::{PI, TAU};
@@ -47,8 +46,9 @@ pub struct LightSample {
     pub density: f32,
 }
 
+/// What directions are looked up in.
 #[derive(Clone, Debug)]
-struct Tables {
+pub(crate) struct Tables {
     /// Density per steradian at the corners of cells: one row more than cells, and as many columns, which wrap.
     density: Image<f32>,
     /// The row of a cell: one table.
@@ -119,15 +119,9 @@ impl EnvironmentSampler {
         self.tables.as_ref().map_or(0.0, |tables| tables.pdf(direction, angles))
     }
 
-    /// Columns of the table; nothing when the environment is black.
-    pub(crate) fn columns(&self) -> Option<usize> {
-        self.tables.as_ref().map(|tables| tables.density.width())
-    }
-
-    /// The cell that two numbers uniform in [0, 1) fall into: what [`EnvironmentSampler::sample`] looks up.
-    #[inline]
-    pub(crate) fn cell(&self, u: [f32; 2]) -> Option<LightCell> {
-        self.tables.as_ref().map(|tables| tables.cell(u))
+    /// What directions are looked up in; nothing when the environment is black.
+    pub(crate) fn tables(&self) -> Option<&Tables> {
+        self.tables.as_ref()
     }
 
     /// Whether there is no light at all.
@@ -171,8 +165,14 @@ impl Tables {
         [density[(row, column)], density[(row, right)], density[(row + 1, column)], density[(row + 1, right)]]
     }
 
+    /// Columns of cells.
+    pub(crate) fn columns(&self) -> usize {
+        self.density.width()
+    }
+
+    /// The cell that two numbers uniform in [0, 1) fall into.
     #[inline]
-    fn cell(&self, u: [f32; 2]) -> LightCell {
+    pub(crate) fn cell(&self, u: [f32; 2]) -> LightCell {
         let (row, down) = self.rows.sample(0, u[1]);
         let (column, across) = self.columns.sample(row, u[0]);
         LightCell { column, rest: [across, down], corners: self.corners(row, column), ring: self.rings[row] }
@@ -188,7 +188,7 @@ impl Tables {
         let sine = (from_pole * (2.0 - from_pole)).max(0.0).sqrt();
         let cosine = ring.pole * (1.0 - from_pole);
         let turns = (column as f32 + across) / self.density.width() as f32;
-        let (sin_phi, cos_phi) = sin_cos_of_turns(turns);
+        let (sin_phi, cos_phi) = (std::f32::consts::TAU * turns).sin_cos();
         LightSample {
             direction: Vec3::new(sine * sin_phi, cosine, -sine * cos_phi),
             density: lerp(left, right, across),

@@ -13,7 +13,6 @@
 //! `F0 = 0` still leaves a grazing lobe; a surface without one is drawn with a [`Material`] evaluated at
 //! `lobe_strength` 0.
 
-use crate::math::elementary::{ln_one_minus, one_minus_exp, sin_cos_of_turns};
 use crate::math::frame::{Frame, sample_cosine_hemisphere};
 use crate::math::luminance;
 use crate::math::real::Real;
@@ -69,7 +68,7 @@ impl LobeGeometry {
         Some(LobeGeometry {
             cos_in: cos_in.min(1.0),
             cos_out: cos_out.min(1.0),
-            ln_cos_half: 0.5 * ln_one_minus(sin_squared),
+            ln_cos_half: 0.5 * (-sin_squared).ln_1p(),
             half_dot_out: (0.5 * length_squared.sqrt()).min(1.0),
         })
     }
@@ -211,9 +210,9 @@ impl LobeSampler {
         let light = if u[0] < share {
             // Half vectors with density (e+2)/(2 pi) cos^(e+1): ln cos = a^2/2 ln(1 - u).
             let u = [(u[0] / share).min(BELOW_ONE), u[1]];
-            let sin_squared = one_minus_exp(ln_one_minus(u[0]) / self.inverse_width_squared);
+            let sin_squared = -((-u[0]).ln_1p() / self.inverse_width_squared).exp_m1();
             let sin = sin_squared.sqrt();
-            let (sin_phi, cos_phi) = sin_cos_of_turns(u[1]);
+            let (sin_phi, cos_phi) = (std::f32::consts::TAU * u[1]).sin_cos();
             let half = Vec3::new(sin * cos_phi, sin * sin_phi, (1.0 - sin_squared).sqrt());
             let viewer = frame.local_from_outer(towards_viewer);
             half * (2.0 * viewer.dot(half)) - viewer

@@ -1,6 +1,5 @@
 //! An orthonormal frame around a direction.
 
-use super::elementary::sin_cos_of_turns;
 use glam::Vec3;
 
 /// A right-handed orthonormal frame; `normal` is the local z axis.
@@ -47,7 +46,7 @@ impl Frame {
 #[inline]
 pub fn sample_cosine_hemisphere(u: [f32; 2]) -> Vec3 {
     let radius = u[0].sqrt();
-    let (sin, cos) = sin_cos_of_turns(u[1]);
+    let (sin, cos) = (std::f32::consts::TAU * u[1]).sin_cos();
     Vec3::new(radius * cos, radius * sin, (1.0 - u[0]).max(0.0).sqrt())
 }
 

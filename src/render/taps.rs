@@ -9,7 +9,7 @@ use std::f32::consts::{PI, TAU};
 const WHOLE: f32 = 8_388_608.0;
 
 /// Where several directions read a light bilinearly.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Taps {
     /// The two rows and then the two columns around each: their number is in the low 23 bits.
     rows_and_columns: [[f32; WIDEST]; 4],
@@ -20,9 +20,6 @@ pub(super) struct Taps {
 }
 
 impl Taps {
-    /// No directions.
-    pub const NONE: Taps = Taps { rows_and_columns: [[WHOLE; WIDEST]; 4], width: 1, weights: [[0.0; WIDEST]; 4] };
-
     /// Number of the `k`-th texel of a direction.
     #[inline(always)]
     pub fn texel(&self, k: usize, lane: usize) -> usize {
@@ -97,7 +94,7 @@ mod tests {
             directions.extend([Vec3::Y, Vec3::NEG_Y, Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::NEG_Z, Vec3::Y, Vec3::Y]);
             for eight in directions.chunks_exact(Plain::LANES) {
                 let axis = |k: usize| Plain::load(&eight.iter().map(|direction| direction[k]).collect::<Vec<_>>());
-                let mut taps = Taps::NONE;
+                let mut taps = Taps::default();
                 taps.find([axis(0), axis(1), axis(2)], (width, height), 0);
                 for (lane, &direction) in eight.iter().enumerate() {
                     let tap = tap_of_direction(direction, width, height);
@@ -117,7 +114,7 @@ mod tests {
         use crate::math::sphere::tap_of_angles;
         for (width, height) in [(7usize, 5usize), (1, 1), (16_384, 8192)] {
             let value = |texel: usize| ((texel / width) as f32 * 0.37).sin() + ((texel % width) as f32 * 0.11).cos();
-            let mut taps = Taps::NONE;
+            let mut taps = Taps::default();
             for step in 0..=600 {
                 let phi = -PI + 3.0 * PI * step as f32 / 600.0;
                 let theta = PI * ((step * 37) % 601) as f32 / 600.0;

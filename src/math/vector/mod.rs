@@ -113,6 +113,12 @@ pub trait Vector: Copy {
     }
 }
 
+/// Dot products of vectors in space.
+#[inline(always)]
+pub fn dot<V: Vector>(a: [V; 3], b: [V; 3]) -> V {
+    a[0].mul_add(b[0], a[1].mul_add(b[1], a[2].mul(b[2])))
+}
+
 /// Portable Rust, eight numbers.
 #[derive(Clone, Copy, Debug)]
 pub struct Plain([f32; 8]);

@@ -8,7 +8,7 @@ use super::light_basis::{LightBasis, LightPlanes};
 use super::lobe_sum::{LobePlace, LobeSums};
 use crate::math::frame::Frame;
 use crate::math::vector::elementary::exp_minus_one;
-use crate::math::vector::{Vector, WIDEST};
+use crate::math::vector::{Vector, WIDEST, dot};
 use crate::render::taps::Taps;
 use glam::Vec4;
 
@@ -28,15 +28,12 @@ struct Lobe<V> {
 }
 
 /// What the next places weigh, and where they read the light.
+#[derive(Default)]
 struct Next {
     taps: Taps,
     /// Weights of `S0 - S5` and of `S5`; zero below a horizon.
     base: [f32; WIDEST],
     grazing: [f32; WIDEST],
-}
-
-impl Next {
-    const NONE: Next = Next { taps: Taps::NONE, base: [0.0; WIDEST], grazing: [0.0; WIDEST] };
 }
 
 impl<V: Vector> Lobe<V> {
@@ -76,15 +73,13 @@ impl<V: Vector> Lobe<V> {
         for (k, value) in half.iter_mut().enumerate() {
             *value = self.tangent[k].mul_add(along, self.bitangent[k].mul_add(across, self.normal[k].mul(cos)));
         }
-        let [x, y, z] = self.to_viewer;
-        let half_dot_out = half[0].mul_add(x, half[1].mul_add(y, half[2].mul(z)));
+        let half_dot_out = dot(half, self.to_viewer);
         let twice = half_dot_out.add(half_dot_out);
         let mut direction = [zero; 3];
         for (k, value) in direction.iter_mut().enumerate() {
             *value = half[k].mul_add(twice, zero.sub(self.to_viewer[k]));
         }
-        let [x, y, z] = self.normal;
-        let cos_in = direction[0].mul_add(x, direction[1].mul_add(y, direction[2].mul(z)));
+        let cos_in = dot(direction, self.normal);
         let above = cos_in.min(half_dot_out);
         if !above.any_positive() {
             return false;
@@ -115,7 +110,7 @@ pub(super) fn sums_in<V: Vector>(
     let places = places(count);
     let count = places.log_rest.len();
     let lobe = Lobe::<V>::new(place, width, count);
-    let mut next = Next::NONE;
+    let mut next = Next::default();
     let shares = &place.shares[..light.texels.len()];
     // Red, green, blue and a white light over what is seen.
     let (mut base, mut grazing) = (Vec4::ZERO, Vec4::ZERO);
@@ -152,7 +147,7 @@ pub(super) fn row_in<V: Vector>(basis: &LightBasis, place: &LobePlace, width: f3
     let places = places(place_count(basis, width));
     let count = places.log_rest.len();
     let lobe = Lobe::<V>::new(place, width, count);
-    let mut next = Next::NONE;
+    let mut next = Next::default();
     let shares = &place.shares[..row.len()];
     for at in (0..count).step_by(V::LANES) {
         if !lobe.find(basis, places, at, &mut next) {

@@ -9,17 +9,15 @@ use super::light_cells::LightCells;
 use crate::light::EnvironmentSampler;
 use crate::math::random::{SampleStream, next_pairs};
 use crate::math::vector::elementary::{angle, ln_one_minus, one_minus_exp, sine_and_cosine_of_turns};
-use crate::math::vector::{Vector, WIDEST, versions};
+use crate::math::vector::{Vector, WIDEST, dot, versions};
 use crate::render::taps::Taps;
 use std::f32::consts::{LOG2_E, PI};
 
 /// One number of each path.
 pub(super) type Lanes = [f32; WIDEST];
-/// No number of any path.
-pub(super) const NONE: Lanes = [0.0; WIDEST];
 
 /// Where paths have met the surface.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Arrivals {
     /// How many paths; what lies behind them in each list is left over from others.
     pub count: usize,
@@ -40,7 +38,7 @@ pub(super) struct Arrivals {
 }
 
 /// A direction for each path, and the lobe about it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Directions {
     /// Unit direction towards the light, x, y and z.
     pub direction: [Lanes; 3],
@@ -58,20 +56,8 @@ pub(super) struct Directions {
     pub taps: Taps,
 }
 
-impl Directions {
-    const NONE: Directions = Directions {
-        direction: [NONE; 3],
-        above: NONE,
-        cos_in: NONE,
-        ln_cos_half: NONE,
-        half_dot_out: NONE,
-        lobe_density: NONE,
-        taps: Taps::NONE,
-    };
-}
-
 /// What each path of a packet is offered.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Proposals {
     /// Cosine between shading normal and the direction to where the path comes from.
     pub cos_out: Lanes,
@@ -87,35 +73,6 @@ pub(super) struct Proposals {
     pub phi: Lanes,
     /// See there.
     pub theta: Lanes,
-}
-
-impl Default for Arrivals {
-    fn default() -> Self {
-        Arrivals {
-            count: 0,
-            streams: [SampleStream::default(); WIDEST],
-            normal: [NONE; 3],
-            geometric_normal: [NONE; 3],
-            to_viewer: [NONE; 3],
-            specular: NONE,
-            diffuse: NONE,
-            log_width: NONE,
-        }
-    }
-}
-
-impl Default for Proposals {
-    fn default() -> Self {
-        Proposals {
-            cos_out: NONE,
-            has_light: false,
-            of_light: Directions::NONE,
-            light_density: NONE,
-            of_lobe: Directions::NONE,
-            phi: NONE,
-            theta: NONE,
-        }
-    }
 }
 
 versions! {
@@ -150,7 +107,7 @@ pub(super) fn propose_in<V: Vector>(
     let count = arrivals.count;
     let light_numbers = next_pairs(&mut arrivals.streams, count);
     let lobe_numbers = next_pairs(&mut arrivals.streams, count);
-    let mut cells = LightCells::NONE;
+    let mut cells = LightCells::default();
     proposals.has_light = cells.find(light, &light_numbers, count);
     for at in (0..count).step_by(V::LANES) {
         let surface = Surface::<V>::load(arrivals, at, lobe_strength);
@@ -182,11 +139,6 @@ struct Surface<V> {
     /// See [`crate::material::LobeSampler`].
     specular_share: V,
     inverse_width_squared: V,
-}
-
-#[inline(always)]
-fn dot<V: Vector>(a: [V; 3], b: [V; 3]) -> V {
-    a[0].mul_add(b[0], a[1].mul_add(b[1], a[2].mul(b[2])))
 }
 
 #[inline(always)]

@@ -1,12 +1,13 @@
 //! Directions drawn from the light for all paths of a packet: the table is looked up path by path, the rest is arithmetic.
 
-use super::kernel::{Lanes, NONE};
+use super::kernel::Lanes;
 use crate::light::EnvironmentSampler;
 use crate::math::vector::Vector;
 use crate::math::vector::elementary::{angle, sine_and_cosine_of_turns};
 use std::f32::consts::TAU;
 
 /// Cells of the light's table, one a path; see [`crate::light::sampler::LightCell`].
+#[derive(Default)]
 pub(super) struct LightCells {
     rest: [Lanes; 2],
     corners: [Lanes; 4],
@@ -29,23 +30,13 @@ pub(super) struct Drawn<V> {
 }
 
 impl LightCells {
-    /// No cells.
-    pub const NONE: LightCells = LightCells {
-        rest: [NONE; 2],
-        corners: [NONE; 4],
-        column: NONE,
-        from_pole: [NONE; 2],
-        pole: NONE,
-        columns: 1.0,
-    };
-
     /// Looks up the cells that pairs of random numbers fall into; false where there is no light.
     #[inline(always)]
     pub fn find(&mut self, light: &EnvironmentSampler, numbers: &[Lanes; 2], count: usize) -> bool {
-        let Some(columns) = light.columns() else { return false };
-        self.columns = columns as f32;
+        let Some(tables) = light.tables() else { return false };
+        self.columns = tables.columns() as f32;
         for lane in 0..count {
-            let Some(cell) = light.cell([numbers[0][lane], numbers[1][lane]]) else { return false };
+            let cell = tables.cell([numbers[0][lane], numbers[1][lane]]);
             for k in 0..2 {
                 self.rest[k][lane] = cell.rest[k];
                 self.from_pole[k][lane] = cell.ring.from_pole[k];
