@@ -35,6 +35,10 @@ pub struct TexelRates {
     pub specular: f32,
     /// Of the logarithm of the microfacet width.
     pub log_width: f32,
+    /// The share of the second moment, in [0, 1], that is the square of the step's mean gradient over all texels it
+    /// touched; 0 is plain Adam. With it a texel of which a step says little moves little, where plain Adam's first steps
+    /// are full ones, whatever the gradient.
+    pub common: f32,
 }
 
 impl Moments {
@@ -58,6 +62,8 @@ impl Moments {
             _ => rates.log_width,
         };
         let log_min = MIN_WIDTH.ln();
+        let common =
+            if rates.common > 0.0 { mean_sizes(gradient).map(|size| rates.common * size * size) } else { [0.0; 7] };
         texels
             .par_iter_mut()
             .zip(gradient)
@@ -74,7 +80,9 @@ impl Moments {
                 }
                 let corrections = count_update(first);
                 for number in 0..7 {
-                    let direction = update(own[number], &mut first[number], &mut second[number], corrections);
+                    accumulate(own[number], &mut first[number], &mut second[number]);
+                    let squared = (1.0 - rates.common) * (second[number] * corrections.1) + common[number];
+                    let direction = first[number] * corrections.0 / (squared.sqrt() + EPSILON);
                     let moved = texel[number] - rate_of(number) * direction;
                     texel[number] = if number == 6 { moved.clamp(log_min, 0.0) } else { moved.clamp(0.0, 1.0) };
                 }
@@ -125,6 +133,22 @@ impl Moments {
     }
 }
 
+/// Mean absolute value of each of the seven numbers over the texels that a gradient touched.
+fn mean_sizes(gradient: &[Texel<f32>]) -> [f32; 7] {
+    let of_chunk = |texels: &[Texel<f32>]| {
+        let mut sums = [0.0f64; 8];
+        for own in texels.iter().filter(|own| own[7] != 0.0 && own.iter().all(|value| value.abs() < LARGEST_GRADIENT)) {
+            (0..7).for_each(|number| sums[number] += f64::from(own[number].abs()));
+            sums[7] += 1.0;
+        }
+        sums
+    };
+    // Chunks of one size, added in their order: the same bits whatever the number of threads.
+    let sums: Vec<[f64; 8]> = gradient.par_chunks(1 << 14).map(of_chunk).collect();
+    let total = sums.iter().fold([0.0f64; 8], |total, sums| std::array::from_fn(|k| total[k] + sums[k]));
+    std::array::from_fn(|number| (total[number] / total[7].max(1.0)) as f32)
+}
+
 /// Counts an update of a group and returns the corrections of both moments.
 fn count_update(first: &mut Texel<f32>) -> (f32, f32) {
     first[7] += 1.0;
@@ -155,7 +179,7 @@ mod tests {
         let start = texels[1];
         let goal = [0.2, 0.9, 0.4, 0.0, 1.0, 0.3, -2.0];
         let mut moments = Moments::zeros(2);
-        let rates = TexelRates { diffuse: 0.02, specular: 0.02, log_width: 0.05 };
+        let rates = TexelRates { diffuse: 0.02, specular: 0.02, log_width: 0.05, common: 0.0 };
         for step in 0..600 {
             let mut gradient = vec![[0.0f32; 8]; 2];
             for number in 0..7 {
@@ -167,6 +191,7 @@ mod tests {
                 diffuse: rates.diffuse * fade,
                 specular: rates.specular * fade,
                 log_width: rates.log_width * fade,
+                ..rates
             };
             assert_eq!(moments.step_texels(&mut texels, &mut gradient, rates), 0);
             assert_eq!(gradient[0], [0.0; 8], "the gradient is cleared");
@@ -178,11 +203,31 @@ mod tests {
     }
 
     #[test]
+    fn a_texel_of_which_a_first_step_says_little_moves_little_where_moments_are_in_common() {
+        let first_step = |common: f32| {
+            let mut texels = vec![[0.5f32; 8]; 3];
+            texels.iter_mut().for_each(|texel| texel[6] = -1.0);
+            let sizes = [1e-7f32, 1e-9, 0.0];
+            let mut gradient: Vec<Texel<f32>> = sizes.map(|size| [size; 8]).to_vec();
+            let rates = TexelRates { diffuse: 0.1, specular: 0.1, log_width: 0.1, common };
+            assert_eq!(Moments::zeros(3).step_texels(&mut texels, &mut gradient, rates), 0);
+            assert_eq!((texels[2][0], texels[2][6]), (0.5, -1.0), "nothing touched it");
+            [0, 1].map(|texel| (0.5 - texels[texel][0], -1.0 - texels[texel][6]))
+        };
+        let [strong, weak] = first_step(0.0);
+        assert!((strong.0 - 0.1).abs() < 1e-6 && (weak.0 - 0.1).abs() < 1e-6, "{strong:?} {weak:?}");
+        let [strong, weak] = first_step(0.5);
+        // The mean over both that were touched is 5.05e-8: by the strong one's root of (1 + 0.505^2) / 2.
+        assert!((strong.0 - 0.1 / (0.5 * (1.0f32 + 0.505 * 0.505)).sqrt()).abs() < 1e-5, "{strong:?}");
+        assert!(weak.0 < 0.003 && weak.0 > 0.0 && (weak.0 - weak.1).abs() < 1e-6, "{weak:?}");
+    }
+
+    #[test]
     fn a_gradient_that_is_not_finite_is_counted_and_left_out() {
         let mut texels = vec![[0.5f32; 8]];
         let mut gradient = vec![[f32::NAN; 8]];
         let mut moments = Moments::zeros(1);
-        let rates = TexelRates { diffuse: 0.1, specular: 0.1, log_width: 0.1 };
+        let rates = TexelRates { diffuse: 0.1, specular: 0.1, log_width: 0.1, common: 0.5 };
         assert_eq!(moments.step_texels(&mut texels, &mut gradient, rates), 1);
         assert_eq!(texels[0], [0.5; 8]);
         assert_eq!(moments, Moments::zeros(1));

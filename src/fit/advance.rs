@@ -52,6 +52,7 @@ impl Fitter {
             diffuse: of_maps * self.settings.rate_diffuse,
             specular: free * self.settings.rate_specular,
             log_width: free * self.settings.rate_roughness,
+            common: stage.common_moment(),
         };
         let base = &mut work.gradient.texels.levels[0].texels;
         let texels = self.state.moments.step_texels(&mut self.state.texels, base, rates);

@@ -85,6 +85,13 @@ impl Stage {
         if self.kind == StageKind::Polish { 0.25 } else { 1.0 }
     }
 
+    /// The share of texels' second moment that is common to all, see
+    /// [`TexelRates::common`](super::adam::TexelRates::common). A step of polishing sees a texel by a few pixels, and all of
+    /// them by little more than twenty: plain Adam's first steps of full size would stay as noise.
+    pub fn common_moment(&self) -> f32 {
+        if self.kind == StageKind::Polish { 0.5 } else { 0.0 }
+    }
+
     /// Strength of the specular lobe at a step of this stage: rises linearly over the first `ramp` steps of its kind.
     pub fn lobe_strength(&self, step: usize, ramp: usize) -> f32 {
         match self.kind {

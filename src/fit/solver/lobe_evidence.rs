@@ -67,6 +67,8 @@ impl LobeBelief {
 const FINE: usize = 4;
 /// Logarithm of the weight, relative to the best, below which a point or a kind counts for nothing.
 const NEGLIGIBLE: f64 = -21.0;
+/// The same of the one factor of a kind's evidence; the others differ by less than what is between these.
+const NEGLIGIBLE_FACTOR: f64 = -60.0;
 
 /// Asks groups of texels for the evidence that they share one lobe.
 pub struct Evidence {
@@ -187,21 +189,25 @@ impl FamilyEvidence {
 
     /// Logarithm of the evidence at a width, and mean and square of F0 per channel, of all kinds together.
     fn at_width(&self, sums: &[System; 3]) -> (f64, [[f64; 2]; 3]) {
-        let moments = |of_channels: [(f64, f64); 3]| of_channels.map(|(mean, variance)| [mean, variance + mean * mean]);
-        let mut kinds = self.kinds.iter().map(|kind| kind.at_width(sums));
-        let Some((mut largest, first)) = kinds.next() else { return (f64::NEG_INFINITY, [[0.0; 2]; 3]) };
-        // Weights relative to the likeliest so far.
-        let (mut total, mut sum) = (1.0, moments(first));
-        for (log, of_channels) in kinds {
-            let rise = log - largest;
-            if rise < NEGLIGIBLE {
+        // Factors relative to the largest so far.
+        let mut largest = f64::NEG_INFINITY;
+        let (mut total, mut sum) = (0.0, [[0.0; 2]; 3]);
+        for kind in &self.kinds {
+            let (log, divisor_squared, of_channels) = kind.at_width(sums);
+            if log - largest < NEGLIGIBLE_FACTOR {
                 continue;
             }
-            let (keep, weight) = if rise > 0.0 { ((-rise).exp(), 1.0) } else { (1.0, rise.exp()) };
-            largest = largest.max(log);
-            total = keep * total + weight;
-            for (sum, own) in sum.iter_mut().zip(moments(of_channels)) {
-                *sum = [0, 1].map(|k| keep * sum[k] + weight * own[k]);
+            if log > largest {
+                let keep = (largest - log).exp();
+                largest = log;
+                total *= keep;
+                sum = sum.map(|own| own.map(|value| keep * value));
+            }
+            let weight = (log - largest).exp() / divisor_squared.sqrt();
+            total += weight;
+            for (sum, (mean, variance)) in sum.iter_mut().zip(of_channels) {
+                sum[0] += weight * mean;
+                sum[1] += weight * (variance + mean * mean);
             }
         }
         (largest + total.ln(), sum.map(|own| own.map(|value| value / total)))

@@ -45,12 +45,13 @@ impl KindEvidence {
         }
     }
 
-    /// Logarithm of the evidence at one width, with mean and variance of F0 per channel.
+    /// The evidence at one width, with mean and variance of F0 per channel: the logarithm of one factor, and the square of
+    /// what it is divided by, whose logarithm kinds need not take one by one.
     ///
     /// Diffuse reflectance is integrated out, and it is at least zero: in a channel where it would be less at the best
     /// F0 it is held at zero, and F0 found anew. Without that, wide and strong lobes over what they outshine, made up
     /// for by less than black below, took over photographs (`saharov_bmvs`: RMSE of the maps .0446, with it .0367).
-    pub(super) fn at_width(&self, sums: &[System; 3]) -> (f64, [(f64, f64); 3]) {
+    pub(super) fn at_width(&self, sums: &[System; 3]) -> (f64, f64, [(f64, f64); 3]) {
         let all: [System; 3] = std::array::from_fn(|c| System {
             ee: sums[c].ee + self.ee,
             ey: sums[c].ey + self.ey[c],
@@ -80,9 +81,9 @@ impl KindEvidence {
             let below = [0, 1, 2].map(|c| !held[c] && all[c].ey < all[c].es * best[c]);
             if below == [false; 3] {
                 let explained: f64 = (0..3).map(|c| side[c] * best[c]).sum();
-                let log = self.log_share - 0.5 * (cost - explained + (determinant * volume).ln());
+                let log = self.log_share - 0.5 * (cost - explained);
                 let variance = |c: usize| (cofactors[c] / determinant).max(0.0);
-                return (log, [0, 1, 2].map(|c| (best[c].clamp(0.0, 1.0), variance(c))));
+                return (log, determinant * volume, [0, 1, 2].map(|c| (best[c].clamp(0.0, 1.0), variance(c))));
             }
             held = [0, 1, 2].map(|c| held[c] || below[c]);
         }
@@ -114,7 +115,8 @@ mod tests {
         for kind in &LobePrior::default().families[0].kinds {
             for count in [0, 1, 30] {
                 let (around, sums) = ([0.3, 0.25, 0.2], pixels(count));
-                let (log, of_channels) = KindEvidence::new(kind, around).at_width(&sums);
+                let (log, divisor_squared, of_channels) = KindEvidence::new(kind, around).at_width(&sums);
+                let log = log - 0.5 * divisor_squared.ln();
                 // F0 of all channels together: normal before looking, diffuse reflectance eliminated channel by channel.
                 let (common, own) = (kind.specular.1.powi(2), kind.specular.2.powi(2));
                 let covariance = DMat3::from_diagonal(DVec3::splat(own)) + DMat3::from_cols_array(&[common; 9]);

@@ -31,8 +31,9 @@ pub struct TreeTexel {
 const LEAST_TO_CLUSTER: usize = 12;
 /// Nor a square of fewer texels along its side.
 const LEAST_SIDE_TO_CLUSTER: usize = 8;
-/// Texels along the side of the smallest squares that a cluster of one colour is cut into.
-const SMALLEST_IN_CLUSTER: usize = 2;
+/// Texels along the side of the smallest squares. One texel has too few pixels of its own for a lobe of its own: with
+/// squares of one texel maps of `toys` were the same, and three quarters of all groups are such squares.
+const SMALLEST: usize = 2;
 
 struct Node {
     texels: Vec<u32>,
@@ -60,8 +61,8 @@ pub fn beliefs(
     }
     let evidence = Evidence::new(around, log_widths, prior);
     let unseen = evidence.shared_lobe(&LobeSumsOfGroup::default());
-    let alone = |sums: &LobeSumsOfGroup| (!sums.is_empty()).then(|| evidence.shared_lobe(sums));
-    let tree = Tree { texels, sums, alone: sums.iter().map(alone).collect(), unseen, evidence, prior };
+    let is_seen = sums.iter().map(|sums| !sums.is_empty()).collect();
+    let tree = Tree { texels, sums, is_seen, unseen, evidence, prior };
     let root = tree.grow((0..texels.len() as u32).collect(), (0, 0), side, true);
     let mut made = vec![LobeBelief::default(); texels.len()];
     tree.spread(&root, 1.0, &mut made);
@@ -77,9 +78,9 @@ pub fn beliefs(
 struct Tree<'a> {
     texels: &'a [TreeTexel],
     sums: &'a [LobeSumsOfGroup],
-    /// Evidence and belief of each texel alone; `None` where it has no pixel of its own.
-    alone: Vec<Option<(f64, LobeBelief)>>,
-    /// The same of groups without pixels.
+    /// Whether a texel has pixels of its own.
+    is_seen: Vec<bool>,
+    /// Evidence and belief of groups without pixels.
     unseen: (f64, LobeBelief),
     evidence: Evidence,
     prior: &'a LobePrior,
@@ -87,21 +88,18 @@ struct Tree<'a> {
 
 impl Tree<'_> {
     fn grow(&self, texels: Vec<u32>, corner: (u16, u16), side: usize, by_colour: bool) -> Node {
-        // Maps may be finer than photos: what has no pixels adds nothing, and of one that has some the answer is known.
-        let mut seen = texels.iter().map(|&texel| texel as usize).filter(|&texel| self.alone[texel].is_some());
-        let (log_leaf, leaf) = match (seen.next(), seen.next()) {
-            (None, _) => self.unseen,
-            (Some(one), None) => self.alone[one].unwrap_or(self.unseen),
-            (Some(one), Some(other)) => {
-                let mut sums = self.sums[one].clone();
-                [other].into_iter().chain(seen).for_each(|texel| sums.add(&self.sums[texel]));
+        // Maps may be finer than photos: what has no pixels adds nothing.
+        let mut seen = texels.iter().map(|&texel| texel as usize).filter(|&texel| self.is_seen[texel]);
+        let (log_leaf, leaf) = match seen.next() {
+            None => self.unseen,
+            Some(first) => {
+                let mut sums = self.sums[first].clone();
+                seen.for_each(|texel| sums.add(&self.sums[texel]));
                 self.evidence.shared_lobe(&sums)
             }
         };
         let mut cuts = Vec::new();
-        // A cluster of one colour is cut into quarters, but not into crumbs.
-        let smallest = if by_colour { 1 } else { SMALLEST_IN_CLUSTER };
-        if side > smallest && texels.len() > 1 {
+        if side > SMALLEST && texels.len() > 1 {
             let half = (side / 2) as u16;
             let mut quarters: [Vec<u32>; 4] = Default::default();
             for &texel in &texels {

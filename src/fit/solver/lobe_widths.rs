@@ -50,6 +50,24 @@ impl WidthStencil {
     }
 }
 
+/// The stencil of one width, kept for as long as the same integrals are known.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct KeptStencil {
+    known: (usize, usize),
+    stencil: WidthStencil,
+}
+
+impl KeptStencil {
+    /// As [`WidthStencil::new`]; the width has to be the same each time.
+    pub fn of(&mut self, nodes: &[f64], log_width: f64, known: Range<usize>) -> WidthStencil {
+        if self.known != (known.start, known.end) {
+            self.known = (known.start, known.end);
+            self.stencil = WidthStencil::new(nodes, log_width, known);
+        }
+        self.stencil
+    }
+}
+
 /// Logarithms of the widths at which lobes are weighed, in rising order.
 pub fn weighed_log_widths() -> [f64; LOBE_WIDTHS] {
     let nodes = log_widths();

@@ -64,6 +64,26 @@ pub struct Tile {
     pub(super) noise: f64,
 }
 
+/// Part of a pixel that one texel is: what multiplies the texel's diffuse reflectance, and the pixel.
+#[derive(Clone, Copy, Default)]
+struct DiffusePart {
+    arriving: [f32; 3],
+    pixel: u32,
+}
+
+/// Parts of pixels, by texel.
+struct DiffuseParts {
+    parts: Vec<DiffusePart>,
+    ranges: Vec<std::ops::Range<u32>>,
+}
+
+impl DiffuseParts {
+    fn of(&self, texel: usize) -> &[DiffusePart] {
+        let std::ops::Range { start, end } = self.ranges[texel];
+        &self.parts[start as usize..end as usize]
+    }
+}
+
 /// Least variance of the noise, in squared radiance.
 pub(super) fn least_noise(mean_radiance: f32) -> f64 {
     (LEAST_NOISE * f64::from(mean_radiance).max(1e-6)).powi(2)
@@ -203,29 +223,77 @@ impl Tile {
 
     /// Gauss and Seidel over the texels, leaning weakly on what they were.
     pub(super) fn solve_diffuse(&mut self) {
-        let of_texel = self.pixels_of_texels();
-        for c in 0..3 {
-            let mut left: Vec<f32> = self.pixels.iter().map(|pixel| self.residual(pixel)[c]).collect();
-            let lean = self.lean(c);
-            let start: Vec<f32> = self.rho.iter().map(|rho| rho[c]).collect();
-            for _ in 0..SWEEPS {
-                for (texel, pixels) in of_texel.iter().enumerate() {
-                    let old = self.rho[texel][c];
-                    let (mut ee, mut er) = (lean, lean * (start[texel] - old));
-                    for &(index, weight) in pixels {
-                        let terms = &self.pixels[index as usize].terms;
-                        let e = weight * terms.arriving[c];
-                        ee += terms.weight * e * e;
-                        er += terms.weight * e * left[index as usize];
+        let parts = self.diffuse_parts();
+        let lean = [0, 1, 2].map(|c| self.lean(c));
+        // Of each pixel what is left of its radiance, and its weight.
+        let mut left: Vec<[f32; 4]> = self
+            .pixels
+            .iter()
+            .map(|pixel| {
+                let [r, g, b] = self.residual(pixel);
+                [r, g, b, pixel.terms.weight]
+            })
+            .collect();
+        let start = self.rho.clone();
+        let held: Vec<[f32; 3]> = (0..start.len())
+            .map(|texel| {
+                parts.of(texel).iter().fold(lean, |sum, part| {
+                    let weight = left[part.pixel as usize][3];
+                    [0, 1, 2].map(|c| sum[c] + weight * part.arriving[c] * part.arriving[c])
+                })
+            })
+            .collect();
+        for _ in 0..SWEEPS {
+            for (texel, rho) in self.rho.iter_mut().enumerate() {
+                let old = *rho;
+                let mut pull = [0, 1, 2].map(|c| lean[c] * (start[texel][c] - old[c]));
+                for part in parts.of(texel) {
+                    let left = &left[part.pixel as usize];
+                    for c in 0..3 {
+                        pull[c] += left[3] * part.arriving[c] * left[c];
                     }
-                    let new = (old + er / ee).clamp(0.0, 1.0);
-                    self.rho[texel][c] = new;
-                    for &(index, weight) in pixels {
-                        left[index as usize] -= (new - old) * weight * self.pixels[index as usize].terms.arriving[c];
+                }
+                *rho = [0, 1, 2].map(|c| (old[c] + pull[c] / held[texel][c]).clamp(0.0, 1.0));
+                let moved = [0, 1, 2].map(|c| rho[c] - old[c]);
+                for part in parts.of(texel) {
+                    let left = &mut left[part.pixel as usize];
+                    for c in 0..3 {
+                        left[c] -= moved[c] * part.arriving[c];
                     }
                 }
             }
         }
+    }
+
+    /// What each texel's diffuse reflectance sends to the pixels that show it, texel after texel: sweeps go over it many
+    /// times, and pixels with all their terms are too large for that.
+    fn diffuse_parts(&self) -> DiffuseParts {
+        let mut offsets = vec![0u32; self.texels.len() + 1];
+        for &(texel, _) in &self.taps {
+            offsets[texel as usize + 1] += 1;
+        }
+        for texel in 0..self.texels.len() {
+            offsets[texel + 1] += offsets[texel];
+        }
+        let mut next = offsets.clone();
+        let mut parts = vec![DiffusePart::default(); self.taps.len()];
+        for (index, pixel) in self.pixels.iter().enumerate() {
+            for &(texel, weight) in &self.taps[pixel.taps.clone()] {
+                let place = &mut next[texel as usize];
+                let arriving = pixel.terms.arriving.map(|arriving| weight * arriving);
+                // What lies outside of the tile counts as the texel the pixel covers most, more than once perhaps.
+                match parts[offsets[texel as usize] as usize..*place as usize].last_mut() {
+                    Some(last) if last.pixel == index as u32 => {
+                        (0..3).for_each(|c| last.arriving[c] += arriving[c]);
+                    }
+                    _ => {
+                        parts[*place as usize] = DiffusePart { arriving, pixel: index as u32 };
+                        *place += 1;
+                    }
+                }
+            }
+        }
+        DiffuseParts { parts, ranges: offsets.iter().zip(&next).map(|(&first, &end)| first..end).collect() }
     }
 
     /// Weights of the pixels by how well they fit (Cauchy), and the noise.

@@ -7,7 +7,7 @@ use super::cell_sums::System;
 use super::lobe_evidence::{LobeBelief, LobeSumsOfGroup};
 use super::lobe_prior::LobePrior;
 use super::lobe_tree::{TreeTexel, beliefs};
-use super::lobe_widths::{LOBE_WIDTHS, WidthStencil, weighed_log_widths, weighed_stencils};
+use super::lobe_widths::{KeptStencil, LOBE_WIDTHS, weighed_log_widths, weighed_stencils};
 use super::round::log_widths;
 use super::tile::{TILE, Tile};
 use std::time::Instant;
@@ -29,10 +29,11 @@ impl Tile {
     /// What the lobes of the texels under each pixel send to it, as they are believed now.
     pub(super) fn set_lobes(&mut self) {
         let widths = log_widths();
+        let mut stencils = vec![KeptStencil::default(); self.texels.len()];
         for pixel in &mut self.pixels {
-            let of_texel = |texel: usize| {
+            let mut of_texel = |texel: usize| {
                 let mean = &self.lobes[texel].mean;
-                let stencil = WidthStencil::new(&widths, mean[3], pixel.nodes.0..pixel.nodes.1);
+                let stencil = stencils[texel].of(&widths, mean[3], pixel.nodes.0..pixel.nodes.1);
                 let of =
                     |c: usize| mean[c] as f32 * stencil.of(&pixel.terms.base, c) + stencil.of(&pixel.terms.grazing, c);
                 [0, 1, 2].map(of)
@@ -125,6 +126,7 @@ impl Tile {
 #[cfg(test)]
 pub(super) mod tests {
     use super::super::block::PixelTerms;
+    use super::super::lobe_widths::WidthStencil;
     use super::super::tile::TilePixel;
     use super::*;
     use crate::math::random::SequentialRandom;
@@ -132,10 +134,11 @@ pub(super) mod tests {
     /// Diffuse reflectance, F0 and the logarithm of the width: a paint, and a metal beside it.
     pub const TRUTH: [(f32, f64, f64); 2] = [(0.5, 0.05, -0.9), (0.05, 0.6, -0.5)];
 
-    /// Two texels, and pixels that show a share of the second: exact sums of what the two send.
+    /// Two texels, in squares beside each other that may have lobes of their own, and pixels that show a share of the
+    /// second: exact sums of what the two send.
     pub fn tile(believed: [(f32, f64, f64); 2]) -> Tile {
         let widths = log_widths();
-        let mut tile = Tile { texels: vec![0, 1], ..Tile::default() };
+        let mut tile = Tile { texels: vec![0, 2], ..Tile::default() };
         for (rho, specular, log_width) in believed {
             tile.rho.push([rho; 3]);
             tile.lobes.push(LobeBelief { mean: [specular, specular, specular, log_width], ..LobeBelief::default() });

@@ -7,7 +7,7 @@
 //! .0231), specular maps a little (.139 to .136).
 
 use super::cell_sums::System;
-use super::lobe_widths::WidthStencil;
+use super::lobe_widths::KeptStencil;
 use super::round::log_widths;
 use super::tile::{SWEEPS, Tile};
 
@@ -70,13 +70,16 @@ impl Tile {
 
     fn parts_of_texels(&self) -> Vec<Vec<Part>> {
         let widths = log_widths();
-        let part = |texel: usize, (pixel, weight): (u32, f32)| {
+        let part = |stencil: &mut KeptStencil, texel: usize, (pixel, weight): (u32, f32)| {
             let own = &self.pixels[pixel as usize];
-            let stencil = WidthStencil::new(&widths, self.lobes[texel].mean[3], own.nodes.0..own.nodes.1);
+            let stencil = stencil.of(&widths, self.lobes[texel].mean[3], own.nodes.0..own.nodes.1);
             Part { pixel, weight, base: [0, 1, 2].map(|c| stencil.of(&own.terms.base, c)) }
         };
-        let of_texels = self.pixels_of_texels().into_iter().enumerate();
-        of_texels.map(|(texel, pixels)| pixels.into_iter().map(|pixel| part(texel, pixel)).collect()).collect()
+        let of_texel = |(texel, pixels): (usize, Vec<(u32, f32)>)| {
+            let mut stencil = KeptStencil::default();
+            pixels.into_iter().map(|pixel| part(&mut stencil, texel, pixel)).collect()
+        };
+        self.pixels_of_texels().into_iter().enumerate().map(of_texel).collect()
     }
 }
 

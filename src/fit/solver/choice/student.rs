@@ -50,7 +50,8 @@ impl StudentNoise {
                 scale_squared = (mean / CHANNELS).max(least);
             }
             let noise = StudentNoise { freedom, scale_squared };
-            let likelihood: f64 = looked_at.iter().map(|&square| noise.log_density(square)).sum();
+            let tails: f64 = looked_at.iter().map(|&square| noise.log_fall(square)).sum();
+            let likelihood = looked_at.len() as f64 * noise.log_norm() + tails;
             if likelihood > most {
                 (most, best) = (likelihood, noise);
             }
@@ -61,9 +62,18 @@ impl StudentNoise {
 
     /// Logarithm of the density of a residual of this squared length, in nats.
     pub fn log_density(&self, square: f64) -> f64 {
+        self.log_norm() + self.log_fall(square)
+    }
+
+    /// Logarithm of the density where nothing is left.
+    fn log_norm(&self) -> f64 {
+        log_gamma_ratio(self.freedom) - 1.5 * (PI * self.freedom as f64 * self.scale_squared).ln()
+    }
+
+    /// By how much the logarithm of the density is less at a residual of this squared length.
+    fn log_fall(&self, square: f64) -> f64 {
         let nu = self.freedom as f64;
-        let norm = log_gamma_ratio(self.freedom) - 1.5 * (PI * nu * self.scale_squared).ln();
-        norm - 0.5 * (nu + CHANNELS) * (square / (nu * self.scale_squared)).ln_1p()
+        -0.5 * (nu + CHANNELS) * (square / (nu * self.scale_squared)).ln_1p()
     }
 }
 
