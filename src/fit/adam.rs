@@ -80,9 +80,8 @@ impl Moments {
                 }
                 let corrections = count_update(first);
                 for number in 0..7 {
-                    accumulate(own[number], &mut first[number], &mut second[number]);
-                    let squared = (1.0 - rates.common) * (second[number] * corrections.1) + common[number];
-                    let direction = first[number] * corrections.0 / (squared.sqrt() + EPSILON);
+                    let moments = (&mut first[number], &mut second[number]);
+                    let direction = update(own[number], moments, corrections, (rates.common, common[number]));
                     let moved = texel[number] - rate_of(number) * direction;
                     texel[number] = if number == 6 { moved.clamp(log_min, 0.0) } else { moved.clamp(0.0, 1.0) };
                 }
@@ -129,7 +128,7 @@ impl Moments {
     /// One plain number in group 0: returns its step before the rate.
     pub fn direction_of(&mut self, group: usize, gradient: f32) -> f32 {
         let corrections = count_update(&mut self.first[group]);
-        update(gradient, &mut self.first[group][0], &mut self.second[group][0], corrections)
+        update(gradient, (&mut self.first[group][0], &mut self.second[group][0]), corrections, (0.0, 0.0))
     }
 }
 
@@ -161,11 +160,18 @@ fn accumulate(gradient: f32, first: &mut f32, second: &mut f32) {
     *second = BETA_TWO * *second + (1.0 - BETA_TWO) * gradient * gradient;
 }
 
+/// Takes a gradient into both moments and returns the direction of the step. `common` is the share of the second moment
+/// that others set, and that share of it.
 #[inline(always)]
-fn update(gradient: f32, first: &mut f32, second: &mut f32, corrections: (f32, f32)) -> f32 {
+fn update(
+    gradient: f32,
+    (first, second): (&mut f32, &mut f32),
+    corrections: (f32, f32),
+    (share, common): (f32, f32),
+) -> f32 {
     accumulate(gradient, first, second);
-    let scale = (*second * corrections.1).sqrt();
-    *first * corrections.0 / (scale + EPSILON)
+    let squared = (1.0 - share) * (*second * corrections.1) + common;
+    *first * corrections.0 / (squared.sqrt() + EPSILON)
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use super::block::PixelTerms;
 use super::lobe_evidence::LobeBelief;
 use super::lobe_prior::LobePrior;
 use super::round::{BlockWork, Round};
+use std::ops::Range;
 
 /// Texels along a tile's side.
 pub const TILE: usize = 32;
@@ -32,7 +33,7 @@ pub(super) struct TilePixel {
     pub(super) observation: u32,
     pub(super) clipped: bool,
     /// Where its taps lie.
-    pub(super) taps: std::ops::Range<usize>,
+    pub(super) taps: Range<usize>,
     /// What the lobes of the texels it shows send.
     pub(super) lobe: [f32; 3],
     /// How much more that is than if all of it had the lobe of its own texel.
@@ -65,21 +66,21 @@ pub struct Tile {
 }
 
 /// Part of a pixel that one texel is: what multiplies the texel's diffuse reflectance, and the pixel.
-#[derive(Clone, Copy, Default)]
 struct DiffusePart {
     arriving: [f32; 3],
     pixel: u32,
 }
 
-/// Parts of pixels, by texel.
-struct DiffuseParts {
-    parts: Vec<DiffusePart>,
-    ranges: Vec<std::ops::Range<u32>>,
+/// Parts of pixels, texel after texel.
+pub(super) struct ByTexel<P> {
+    parts: Vec<P>,
+    ranges: Vec<Range<u32>>,
 }
 
-impl DiffuseParts {
-    fn of(&self, texel: usize) -> &[DiffusePart] {
-        let std::ops::Range { start, end } = self.ranges[texel];
+impl<P> ByTexel<P> {
+    /// Those of a texel.
+    pub(super) fn of(&self, texel: usize) -> &[P] {
+        let Range { start, end } = self.ranges[texel];
         &self.parts[start as usize..end as usize]
     }
 }
@@ -202,17 +203,30 @@ impl Tile {
     }
 
     /// The pixels that show each texel, and how much of them it is.
-    pub(super) fn pixels_of_texels(&self) -> Vec<Vec<(u32, f32)>> {
-        let mut of_texel: Vec<Vec<(u32, f32)>> = vec![Vec::new(); self.texels.len()];
+    pub(super) fn pixels_of_texels(&self) -> ByTexel<(u32, f32)> {
+        let mut first = vec![0u32; self.texels.len() + 1];
+        for &(texel, _) in &self.taps {
+            first[texel as usize + 1] += 1;
+        }
+        for texel in 0..self.texels.len() {
+            first[texel + 1] += first[texel];
+        }
+        let mut ranges: Vec<Range<u32>> = first[..self.texels.len()].iter().map(|&first| first..first).collect();
+        let mut parts = vec![(0, 0.0); self.taps.len()];
         for (index, pixel) in self.pixels.iter().enumerate() {
             for &(texel, weight) in &self.taps[pixel.taps.clone()] {
-                match of_texel[texel as usize].last_mut() {
+                let range = &mut ranges[texel as usize];
+                // What lies outside of the tile counts as the texel the pixel covers most, more than once perhaps.
+                match parts[range.start as usize..range.end as usize].last_mut() {
                     Some(last) if last.0 == index as u32 => last.1 += weight,
-                    _ => of_texel[texel as usize].push((index as u32, weight)),
+                    _ => {
+                        parts[range.end as usize] = (index as u32, weight);
+                        range.end += 1;
+                    }
                 }
             }
         }
-        of_texel
+        ByTexel { parts, ranges }
     }
 
     /// How strongly diffuse reflectance leans on what it was, in units of the pixels' weights.
@@ -267,33 +281,13 @@ impl Tile {
 
     /// What each texel's diffuse reflectance sends to the pixels that show it, texel after texel: sweeps go over it many
     /// times, and pixels with all their terms are too large for that.
-    fn diffuse_parts(&self) -> DiffuseParts {
-        let mut offsets = vec![0u32; self.texels.len() + 1];
-        for &(texel, _) in &self.taps {
-            offsets[texel as usize + 1] += 1;
-        }
-        for texel in 0..self.texels.len() {
-            offsets[texel + 1] += offsets[texel];
-        }
-        let mut next = offsets.clone();
-        let mut parts = vec![DiffusePart::default(); self.taps.len()];
-        for (index, pixel) in self.pixels.iter().enumerate() {
-            for &(texel, weight) in &self.taps[pixel.taps.clone()] {
-                let place = &mut next[texel as usize];
-                let arriving = pixel.terms.arriving.map(|arriving| weight * arriving);
-                // What lies outside of the tile counts as the texel the pixel covers most, more than once perhaps.
-                match parts[offsets[texel as usize] as usize..*place as usize].last_mut() {
-                    Some(last) if last.pixel == index as u32 => {
-                        (0..3).for_each(|c| last.arriving[c] += arriving[c]);
-                    }
-                    _ => {
-                        parts[*place as usize] = DiffusePart { arriving, pixel: index as u32 };
-                        *place += 1;
-                    }
-                }
-            }
-        }
-        DiffuseParts { parts, ranges: offsets.iter().zip(&next).map(|(&first, &end)| first..end).collect() }
+    fn diffuse_parts(&self) -> ByTexel<DiffusePart> {
+        let ByTexel { parts, ranges } = self.pixels_of_texels();
+        let part = |(pixel, weight): (u32, f32)| DiffusePart {
+            arriving: self.pixels[pixel as usize].terms.arriving.map(|arriving| weight * arriving),
+            pixel,
+        };
+        ByTexel { parts: parts.into_iter().map(part).collect(), ranges }
     }
 
     /// Weights of the pixels by how well they fit (Cauchy), and the noise.

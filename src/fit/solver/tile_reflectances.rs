@@ -75,11 +75,12 @@ impl Tile {
             let stencil = stencil.of(&widths, self.lobes[texel].mean[3], own.nodes.0..own.nodes.1);
             Part { pixel, weight, base: [0, 1, 2].map(|c| stencil.of(&own.terms.base, c)) }
         };
-        let of_texel = |(texel, pixels): (usize, Vec<(u32, f32)>)| {
+        let of_texels = self.pixels_of_texels();
+        let of_texel = |texel: usize| {
             let mut stencil = KeptStencil::default();
-            pixels.into_iter().map(|pixel| part(&mut stencil, texel, pixel)).collect()
+            of_texels.of(texel).iter().map(|&pixel| part(&mut stencil, texel, pixel)).collect()
         };
-        self.pixels_of_texels().into_iter().enumerate().map(of_texel).collect()
+        (0..self.texels.len()).map(of_texel).collect()
     }
 }
 
