@@ -139,20 +139,33 @@ impl LightShape {
         [0, 1, 2].map(|c| self.coefficients_of(&light.iter().map(|radiance| radiance[c]).collect::<Vec<f32>>()))
     }
 
-    /// Neighbours among the wide hats: pairs with the second after the first, wrapping in phi.
+    /// Neighbours among the wide hats.
     pub fn neighbours(&self) -> Vec<(usize, usize)> {
-        let (width, height) = self.coarse;
-        let mut pairs = Vec::new();
-        for row in 0..height {
-            for column in 0..width {
-                pairs.push((row * width + column, row * width + (column + 1) % width));
-                if row + 1 < height {
-                    pairs.push((row * width + column, (row + 1) * width + column));
-                }
-            }
-        }
+        neighbours(self.coarse)
+    }
+
+    /// Neighbours among the texels, one of which at least has a narrow hat.
+    pub fn neighbours_of_fine(&self) -> Vec<(usize, usize)> {
+        let mut is_fine = vec![false; self.size.0 * self.size.1];
+        self.fine.iter().for_each(|&texel| is_fine[texel as usize] = true);
+        let mut pairs = neighbours(self.size);
+        pairs.retain(|&(a, b)| is_fine[a] || is_fine[b]);
         pairs
     }
+}
+
+/// Pairs of neighbours on the sphere, from each place to the right, wrapping in phi, and down.
+fn neighbours((width, height): (usize, usize)) -> Vec<(usize, usize)> {
+    let mut pairs = Vec::new();
+    for row in 0..height {
+        for column in 0..width {
+            pairs.push((row * width + column, row * width + (column + 1) % width));
+            if row + 1 < height {
+                pairs.push((row * width + column, (row + 1) * width + column));
+            }
+        }
+    }
+    pairs
 }
 
 /// The texels that deserve a narrow hat: those of the most radiance times solid angle, with their neighbours.

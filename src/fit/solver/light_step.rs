@@ -13,6 +13,12 @@ use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
 const LEAST_USUAL: f64 = 0.3;
 /// How many times its excess over the usual radiance a narrow hat may be, see [`narrow_scales`].
 const NARROW_GROWTH: f64 = 10.0;
+/// Share of the hold on suns that all narrow hats have, so that none of them is free.
+const LEAST_HOLD: f64 = 1e-6;
+/// By which power of the scale of a texel it may differ from its neighbours: suns more than they may shine. With 1 a sun
+/// of 1e5 is smeared (diffuse error of that hard case a fifth larger), with 2 holes between what photos show stay dark
+/// (held-out errors of the hard cases 0.905 of those without [`believe_narrow`], geometric mean, with 1.25 0.878).
+const NEIGHBOUR_POWER: f64 = 1.25;
 /// Rows that are added to a normal matrix at once.
 const ROWS_AT_ONCE: usize = 512;
 
@@ -170,6 +176,29 @@ pub fn narrow_scales(shape: &LightShape, light: &[[f32; 3]], coefficients: &[Vec
     shape.fine.iter().map(scale).collect()
 }
 
+/// Adds what is believed of texels with narrow hats. Sky is about as bright as what is beside it, so that a hole in what
+/// photos show takes the radiance of its rim. What may be a sun, by its scale, is hardly held to its neighbours; its
+/// narrow hat rather is zero, which keeps light in few texels.
+fn believe_narrow(matrix: &mut [f64], shape: &LightShape, narrow: &[f64], usual: f64) {
+    let count = shape.count();
+    let coarse = shape.coarse.0 * shape.coarse.1;
+    let mut scales = vec![1.0f64; shape.size.0 * shape.size.1];
+    for (place, (&scale, &texel)) in narrow.iter().zip(&shape.fine).enumerate() {
+        scales[texel as usize] = scale;
+        let is_sun = 1.0 - 1.0 / scale + LEAST_HOLD;
+        matrix[(coarse + place) * (count + 1)] += is_sun / (scale * usual).powi(2);
+    }
+    for (a, b) in shape.neighbours_of_fine() {
+        let weight = 1.0 / (usual * scales[a].max(scales[b]).powf(NEIGHBOUR_POWER)).powi(2);
+        let difference = shape.reduce_sparse(&[(a as u32, 1.0), (b as u32, -1.0)]);
+        for &(row, value) in &difference {
+            for &(column, other) in &difference {
+                matrix[row as usize * count + column as usize] += weight * value * other;
+            }
+        }
+    }
+}
+
 /// The radiance of most of a sky, by its wide hats; the mean may be that of a sun.
 fn usual_radiance(shape: &LightShape, x: &[f32]) -> f64 {
     let mut wide = x[..shape.coarse.0 * shape.coarse.1].to_vec();
@@ -201,7 +230,6 @@ pub fn solve_channel(
         }
     }
     let mut right: Vec<f64> = equations.right.iter().map(|value| value * prior.independence).collect();
-    let coarse = shape.coarse.0 * shape.coarse.1;
     let (mean, usual) = (mean_radiance(shape, x), usual_radiance(shape, x));
     // Relative differences: scales are those of the light before the step, and bright places are not held down.
     for (a, b) in shape.neighbours() {
@@ -212,10 +240,7 @@ pub fn solve_channel(
         matrix[a * count + b] -= weight;
         matrix[b * count + a] -= weight;
     }
-    for (place, scale) in narrow.iter().enumerate() {
-        let index = coarse + place;
-        matrix[index * count + index] += 1.0 / (scale * usual).powi(2);
-    }
+    believe_narrow(&mut matrix, shape, narrow, usual);
     let belief = (0..count)
         .map(|row| matrix[row * count + row] - equations.matrix[row * count + row] * prior.independence)
         .collect();
@@ -296,6 +321,32 @@ mod tests {
         let found = shape.expand(&x);
         assert!((found[sun as usize] - 1000.0).abs() < 20.0, "{}", found[sun as usize]);
         assert!(found[blue as usize] < 4.0, "{}", found[blue as usize]);
+    }
+
+    #[test]
+    fn a_hole_in_what_photos_show_takes_the_radiance_of_its_rim() {
+        // A bright band that begins at the horizon, as a ground does; a column of it is in no photo.
+        let (width, height) = (32, 16);
+        let is_bright = |texel: usize| (8..12).contains(&(texel / width));
+        let is_hidden = |texel: usize| texel % width == 11 && (8..11).contains(&(texel / width));
+        let texels = 0..width * height;
+        let fine: Vec<u32> = texels.clone().filter(|&texel| is_bright(texel)).map(|texel| texel as u32).collect();
+        let shape = LightShape::new((width, height), fine);
+        let truth = |texel: usize| if is_bright(texel) { 0.9f32 } else { 0.7 };
+        let mut equations = NormalEquations::new(shape.count());
+        for texel in texels.clone().filter(|&texel| !is_hidden(texel)) {
+            let entries = shape.reduce_sparse(&[(texel as u32, 100.0)]);
+            equations.add_sparse(&entries, 100.0 * f64::from(truth(texel)));
+        }
+        let light: Vec<[f32; 3]> = texels.map(|texel| [truth(texel); 3]).collect();
+        let coefficients = shape.coefficients_of_channels(&light);
+        let scales = narrow_scales(&shape, &light, &coefficients);
+        let prior = LightPrior { variation: 0.7, independence: 1.0, gauge_slack: 1.0 };
+        let row = vec![1.0 / (width * height) as f32; width * height];
+        let mut x = vec![0.7; shape.count()];
+        solve_channel(&equations, &shape, &prior, &Gauge { row: &row, mean: 0.75 }, &scales, &mut x);
+        let hidden = shape.expand(&x)[9 * width + 11];
+        assert!((0.78..0.95).contains(&hidden), "{hidden}");
     }
 
     #[test]
