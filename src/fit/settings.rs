@@ -145,7 +145,7 @@ pub struct FitSettings {
     #[arg(long, default_value_t = FitSettings::default().solver_rounds)]
     pub solver_rounds: usize,
     /// Width and height of the solver's grid over the atlas at whose points rays are traced; at most the maps' size is
-    /// used.
+    /// used. When not given: 128 with polishing, else 256.
     #[arg(long, default_value_t = FitSettings::default().solver_grid)]
     pub solver_grid: usize,
     /// Sizes of photos and maps at which the solver works, each half of the next: light and maps are found at the smallest
@@ -158,7 +158,7 @@ pub struct FitSettings {
     pub solver_choices: Choosing,
     /// Optimiser steps after the solver's maps, on all maps and the light, by the gradient of whole paths: for photos of
     /// real places, whose edges, background and geometry the solver's model does not carry. The solver then leaves the
-    /// finest maps to them. Where its model holds, they make maps worse. When not given: 80 for 8-bit photos, else none.
+    /// finest maps to them. Where its model holds, they make maps worse. When not given: 90 for 8-bit photos, else none.
     #[arg(long, default_value_t = FitSettings::default().solver_polish)]
     pub solver_polish: usize,
     /// Optimiser steps between two looks at the held-out views; 0 never looks.

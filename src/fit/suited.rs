@@ -15,8 +15,10 @@ pub struct Suited {
     pub map_size: Option<usize>,
 }
 
-/// From here on more steps bring a scene of photographs little: 60 leave a tenth of a decibel, 150 bring none.
-const POLISH_OF_PHOTOGRAPHS: usize = 80;
+/// As many as take no longer than what photographs do not need of the solver: its finer edges and finer grid.
+const POLISH_OF_PHOTOGRAPHS: usize = 90;
+/// So much coarser is the solver's grid where polishing follows, by whole paths: shadows as fine as maps need are theirs.
+const COARSER_GRID: usize = 2;
 /// Share of an atlas that charts cover, at the least, as a rule.
 const COVERED_SHARE: f64 = 0.6;
 /// Maps are not made smaller than this of themselves: that all levels of coarse-to-fine have texels.
@@ -51,6 +53,10 @@ impl Suited {
         // Polishing leaves the solver the sizes below the full one, and it does with one more of them.
         if is_free("solver-levels") {
             settings.solver_levels = FitSettings::default().solver_levels + usize::from(settings.solver_polish > 0);
+        }
+        if is_free("solver-grid") {
+            let coarser = if settings.solver_polish > 0 { COARSER_GRID } else { 1 };
+            settings.solver_grid = FitSettings::default().solver_grid / coarser;
         }
         if is_free("map-size") {
             settings.map_size = self.map_size.map_or(settings.map_size, |size| size.min(settings.map_size));
@@ -102,17 +108,18 @@ mod tests {
 
     #[test]
     fn polishing_and_its_sizes_go_together() {
-        let photographs = Suited { method: Method::Paper, solver_polish: 80, map_size: None };
+        let photographs = Suited { method: Method::Paper, solver_polish: 90, map_size: None };
         let rendered = Suited { method: Method::Solver, solver_polish: 0, map_size: None };
         let of = |suited: &Suited, polish: usize, chosen: &[&str]| {
             let from = FitSettings { solver_polish: polish, solver_levels: 1, ..FitSettings::default() };
             let settings = applied(suited, from, chosen);
-            (settings.solver_polish, settings.solver_levels)
+            (settings.solver_polish, settings.solver_levels, settings.solver_grid)
         };
-        assert_eq!((of(&photographs, 0, &[]), of(&rendered, 0, &[])), ((80, 3), (0, 2)));
-        assert_eq!(of(&rendered, 5, &["solver-polish"]), (5, 3));
-        assert_eq!(of(&photographs, 0, &["solver-polish"]), (0, 2));
-        assert_eq!(of(&photographs, 0, &["solver-levels"]), (80, 1));
+        assert_eq!((of(&photographs, 0, &[]), of(&rendered, 0, &[])), ((90, 3, 128), (0, 2, 256)));
+        assert_eq!(of(&rendered, 5, &["solver-polish"]), (5, 3, 128));
+        assert_eq!(of(&photographs, 0, &["solver-polish"]), (0, 2, 256));
+        assert_eq!(of(&photographs, 0, &["solver-levels"]), (90, 1, 128));
+        assert_eq!(of(&photographs, 0, &["solver-grid"]), (90, 3, 256));
     }
 
     #[test]

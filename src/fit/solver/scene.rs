@@ -91,6 +91,7 @@ impl SolverScene {
             grid: settings.grid.min(settings.map_size),
             bounce_rays: settings.bounce_rays,
             max_bounces: settings.max_bounces,
+            fine_shadows: settings.fine_edges,
             lobe_strength: 1.0,
             seed: settings.seed,
         };
@@ -102,7 +103,7 @@ impl SolverScene {
             map_size: settings.map_size,
             lobe_rays: settings.max_bounces > 1,
             seed: settings.seed,
-            ..FootprintSettings::default()
+            ..if settings.fine_edges { FootprintSettings::default() } else { FootprintSettings::COARSE }
         };
         let traced = |target: &Target, sieve: Option<&Sieve>| {
             let (grid, view) = (&transport.grid, target.view as u32);

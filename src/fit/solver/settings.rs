@@ -48,6 +48,11 @@ pub struct SolverSettings {
     /// By how much the mean light on the surface may differ from the one that is held, relative, where no background
     /// pixel fixes the scale.
     pub gauge_slack: f64,
+    /// Follow edges finer than pixels and texels of the light: what a pixel at an edge shows is traced at many places, and
+    /// so is which part of a texel of the light a point sees. Photographs do not need it, whose mesh and cameras are not
+    /// right to a fraction of a pixel: with one place a pixel and a ray a texel of the light `saharov_bmvs` has 23.81 dB
+    /// in held-out views in 55 s, with all of them 23.64 dB in 65 s.
+    pub fine_edges: bool,
     /// Fit a gain for each view, with mean logarithm zero.
     pub exposure: bool,
     /// Take pixels that show the background as evidence for the light.
@@ -73,6 +78,7 @@ impl SolverSettings {
             max_bounces: settings.bounces,
             coarse_rounds: settings.solver_rounds / 2,
             fine_rounds: settings.solver_rounds - settings.solver_rounds / 2,
+            fine_edges: settings.solver_polish == 0,
             exposure: settings.exposure,
             use_background: settings.background == BackgroundEvidence::Use,
             fixed_light: settings.fixed_light,
@@ -100,6 +106,7 @@ impl Default for SolverSettings {
             light_variation: 0.7,
             independence: 0.05,
             gauge_slack: 0.02,
+            fine_edges: true,
             exposure: false,
             use_background: true,
             fixed_light: false,

@@ -110,9 +110,15 @@ pub struct FootprintSettings {
     pub seed: u64,
 }
 
+impl FootprintSettings {
+    /// One ray a pixel, through its middle.
+    pub const COARSE: FootprintSettings =
+        FootprintSettings { map_size: 512, coarse_side: 1, fine_side: 1, lobe_rays: true, seed: 1 };
+}
+
 impl Default for FootprintSettings {
     fn default() -> Self {
-        FootprintSettings { map_size: 512, coarse_side: 2, fine_side: 8, lobe_rays: true, seed: 1 }
+        FootprintSettings { coarse_side: 2, fine_side: 8, ..FootprintSettings::COARSE }
     }
 }
 
@@ -138,7 +144,8 @@ impl ViewFootprints {
         settings: &FootprintSettings,
         is_wanted: Option<&(dyn Fn(u32, Vec2) -> bool + Sync)>,
     ) -> Self {
-        let corners = corners_of_pixels(surface, camera);
+        // Corners tell where more places are to be looked at.
+        let corners = (settings.fine_side > settings.coarse_side).then(|| corners_of_pixels(surface, camera));
         let rows: Vec<ViewFootprints> = (0..camera.height)
             .into_par_iter()
             .map(|row| {
@@ -154,7 +161,9 @@ impl ViewFootprints {
                         continue;
                     }
                     let first = row * (camera.width + 1) + column;
-                    let around = [0, 1, camera.width + 1, camera.width + 2].map(|step| &corners[first + step]);
+                    let around = corners
+                        .as_ref()
+                        .map(|corners| [0, 1, camera.width + 1, camera.width + 2].map(|step| &corners[first + step]));
                     let escaped = pieces_of_pixel(surface, camera, row, column, settings, around, &mut pieces);
                     made.escaped.push(escaped);
                     for piece in &pieces {

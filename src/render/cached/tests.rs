@@ -112,7 +112,8 @@ fn inherited_visibility_is_that_of_rays_but_for_a_few_texels() {
     let small = small();
     let basis = LightBasis::new(64, 32);
     let grid = VisibilityGrid::new(&small.surface, 64);
-    let visibility = visibility::Visibility::trace(&small.surface, &grid, &basis, &AtomicBool::new(false)).unwrap();
+    let visibility =
+        visibility::Visibility::trace(&small.surface, &grid, &basis, true, &AtomicBool::new(false)).unwrap();
     let (mut wrong, mut count) = (0usize, 0usize);
     for (index, point) in grid.points.iter().enumerate().step_by(7) {
         let origin = small.surface.bvh().offset_origin(point.position, point.geometric_normal, point.geometric_normal);
@@ -132,6 +133,44 @@ fn inherited_visibility_is_that_of_rays_but_for_a_few_texels() {
     let share = wrong as f64 / count as f64;
     println!("{wrong} of {count} texels differ; {} rays for {} points", visibility.rays, grid.points.len());
     assert!(count > 20_000 && share < 0.004, "{share}");
+}
+
+#[test]
+fn coarse_shadows_take_fewer_rays_and_lose_little() {
+    let small = small();
+    let basis = LightBasis::new(64, 32);
+    let grid = VisibilityGrid::new(&small.surface, 64);
+    let [fine, coarse] = [true, false].map(|fine_edges| {
+        visibility::Visibility::trace(&small.surface, &grid, &basis, fine_edges, &AtomicBool::new(false)).unwrap()
+    });
+    let pairs = || fine.shares.iter().zip(&coarse.shares);
+    let difference = pairs().map(|(a, b)| f64::from(a.abs_diff(*b)) / 255.0).sum::<f64>() / fine.shares.len() as f64;
+    let inside = pairs().filter(|(a, b)| a.abs_diff(**b) == 255).count() as f64 / fine.shares.len() as f64;
+    println!("{} and {} rays, mean difference {difference:.4}, {inside:.4} opposite", fine.rays, coarse.rays);
+    assert!(coarse.rays * 3 < fine.rays * 2 && difference > 0.0, "{} {}", coarse.rays, fine.rays);
+    assert!(difference < 0.02 && inside < 0.004, "{difference} {inside}");
+}
+
+#[test]
+fn one_ray_a_pixel_makes_one_whole_shading_point_of_what_its_middle_shows() {
+    let small = small();
+    let grid = VisibilityGrid::new(&small.surface, 64);
+    let camera = &small.scene.views[0].camera;
+    let settings = FootprintSettings { map_size: 128, ..FootprintSettings::COARSE };
+    let footprints = ViewFootprints::trace(&small.surface, &grid, camera, 0, &settings);
+    let mut points = footprints.points.iter().peekable();
+    for pixel in 0..camera.width * camera.height {
+        let middle = glam::Vec2::new((pixel % camera.width) as f32 + 0.5, (pixel / camera.width) as f32 + 0.5);
+        let hit = small.surface.closest(&camera.ray_through(middle));
+        assert_eq!(footprints.escaped[pixel], if hit.is_some() { 0.0 } else { 1.0 }, "{pixel}");
+        // The back of a surface and its very rim have none.
+        if let Some(point) = points.next_if(|point| point.pixel as usize == pixel) {
+            let seen = small.surface.point(&hit.unwrap());
+            assert!(point.share == 1.0 && point.normal.dot(seen.shading_normal) > 0.9999, "{pixel}");
+            assert!((1..=4).contains(&point.texel_count) && point.normal_variance == 0.0, "{pixel}");
+        }
+    }
+    assert!(points.next().is_none() && footprints.points.len() > 1000, "{}", footprints.points.len());
 }
 
 #[test]

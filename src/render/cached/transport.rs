@@ -24,6 +24,8 @@ pub struct CachedSettings {
     pub bounce_rays: usize,
     /// Number of surface hits on the longest path: 1 is direct light only.
     pub max_bounces: usize,
+    /// Whether four rays look at a texel of the light that an edge of a shadow crosses, and not one.
+    pub fine_shadows: bool,
     /// Strength of the specular lobe as a whole, in [0, 1].
     pub lobe_strength: f32,
     /// Seed of the rays to other surface.
@@ -32,7 +34,7 @@ pub struct CachedSettings {
 
 impl Default for CachedSettings {
     fn default() -> Self {
-        CachedSettings { grid: 256, bounce_rays: 64, max_bounces: 3, lobe_strength: 1.0, seed: 1 }
+        CachedSettings { grid: 256, bounce_rays: 64, max_bounces: 3, fine_shadows: true, lobe_strength: 1.0, seed: 1 }
     }
 }
 
@@ -78,7 +80,7 @@ impl CachedTransport {
     ) -> Option<Self> {
         let basis = LightBasis::new(light_size.0, light_size.1);
         let grid = VisibilityGrid::new(surface, settings.grid);
-        let visibility = Visibility::trace(surface, &grid, &basis, stop)?;
+        let visibility = Visibility::trace(surface, &grid, &basis, settings.fine_shadows, stop)?;
         let began = Instant::now();
         let bounces = (settings.max_bounces > 1)
             .then(|| BounceMatrix::trace(surface, &grid, settings.bounce_rays, settings.seed, stop));

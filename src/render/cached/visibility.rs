@@ -35,11 +35,18 @@ pub struct Visibility {
 }
 
 impl Visibility {
-    /// Traces the visibility of all points of a grid; `None` when `stop` was raised.
-    pub fn trace(surface: &Surface, grid: &VisibilityGrid, basis: &LightBasis, stop: &AtomicBool) -> Option<Self> {
+    /// Traces the visibility of all points of a grid; `None` when `stop` was raised. Without `fine_edges` no texel is
+    /// looked at in more than one cell: half of the rays, and edges of shadows as wide as texels.
+    pub fn trace(
+        surface: &Surface,
+        grid: &VisibilityGrid,
+        basis: &LightBasis,
+        fine_edges: bool,
+        stop: &AtomicBool,
+    ) -> Option<Self> {
         let stride = basis.padded();
         let mut shares = vec![0u8; grid.points.len() * stride];
-        let cells = Cells::new(basis);
+        let cells = Cells::new(basis, fine_edges);
         let mut rays = 0;
         let mut step = COARSEST_STRIDE;
         let mut done = vec![false; grid.points.len()];
@@ -136,6 +143,8 @@ struct Cells {
     /// Directions of the cells, twice as many along each axis as texels.
     directions: Vec<Vec3>,
     padded: usize,
+    /// Whether the other three cells of a texel are traced where its neighbourhood is not of one mind.
+    fine_edges: bool,
 }
 
 #[derive(Default)]
@@ -147,12 +156,12 @@ struct Scratch {
 }
 
 impl Cells {
-    fn new(basis: &LightBasis) -> Self {
+    fn new(basis: &LightBasis, fine_edges: bool) -> Self {
         let (width, height) = (basis.width, basis.height);
         let directions = (0..4 * width * height)
             .map(|cell| direction_of_texel(cell / (2 * width), cell % (2 * width), 2 * width, 2 * height))
             .collect();
-        Cells { width, height, directions, padded: basis.padded() }
+        Cells { width, height, directions, padded: basis.padded(), fine_edges }
     }
 
     /// Visible shares of all hats at a point, and the number of rays that took.
@@ -217,12 +226,12 @@ impl Cells {
                         agree &= first_cell[near_row * width + (column + step) % width] == own;
                     }
                 }
-                let inherited = scratch.texels[texel] != 3;
+                let is_known = agree || scratch.texels[texel] != 3 || !self.fine_edges;
                 let mut sum = 0;
                 for k in 0..4 {
                     let cell = cell_of(row, column, k);
                     if scratch.cells[cell] == 2 {
-                        scratch.cells[cell] = if agree || inherited { own } else { trace(cell) };
+                        scratch.cells[cell] = if is_known { own } else { trace(cell) };
                     }
                     sum += scratch.cells[cell];
                 }

@@ -97,14 +97,15 @@ impl Piece {
     }
 }
 
-/// Fills `pieces` and returns the share of the pixel that escapes.
+/// Fills `pieces` and returns the share of the pixel that escapes. Without `corners` no more than the first places are
+/// looked at.
 pub(super) fn pieces_of_pixel(
     surface: &Surface,
     camera: &Camera,
     row: usize,
     column: usize,
     settings: &FootprintSettings,
-    corners: [&Seen; 4],
+    corners: Option<[&Seen; 4]>,
     pieces: &mut Vec<Piece>,
 ) -> f32 {
     let mut side = settings.coarse_side.max(1);
@@ -152,11 +153,12 @@ pub(super) fn pieces_of_pixel(
         for piece in pieces.iter_mut() {
             piece.share = piece.samples as f32 / total as f32;
         }
-        let agree = match pieces.as_slice() {
-            [piece] if piece.samples == total => {
+        let agree = match (corners, pieces.as_slice()) {
+            (None, _) => true,
+            (Some(corners), [piece]) if piece.samples == total => {
                 corners.iter().all(|corner| matches!(corner, Seen::Front { point, reach } if piece.has(point, *reach)))
             }
-            [] if escaped == total => corners.iter().all(|corner| matches!(corner, Seen::Background)),
+            (Some(corners), []) if escaped == total => corners.iter().all(|corner| matches!(corner, Seen::Background)),
             _ => false,
         };
         if agree || side >= settings.fine_side {
