@@ -49,12 +49,13 @@ fn linear_photos_are_given_to_the_solver_unless_something_else_was_asked_for() {
     assert_eq!(of(&bytes, &["--method", "solver"]), Method::Solver);
     let polish = |scene: &Scene, more: &[&str]| {
         let settings = suited(scene, None, &[&["--method", "solver"], more].concat());
-        (settings.solver_polish, settings.solver_levels)
+        (settings.solver_polish, settings.solver_levels, settings.solver_grid)
     };
-    assert_eq!((polish(&linear, &[]), polish(&bytes, &[])), ((0, 2), (80, 3)));
-    assert_eq!(polish(&linear, &["--solver-polish", "5"]), (5, 3));
-    assert_eq!(polish(&bytes, &["--solver-polish", "0"]), (0, 2));
-    assert_eq!(polish(&bytes, &["--solver-levels", "1"]), (80, 1));
+    assert_eq!((polish(&linear, &[]), polish(&bytes, &[])), ((0, 2, 256), (90, 3, 128)));
+    assert_eq!(polish(&linear, &["--solver-polish", "5"]), (5, 3, 128));
+    assert_eq!(polish(&bytes, &["--solver-polish", "0"]), (0, 2, 256));
+    assert_eq!(polish(&bytes, &["--solver-levels", "1"]), (90, 1, 128));
+    assert_eq!(polish(&bytes, &["--solver-grid", "256"]), (90, 3, 256));
 
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("settings.toml");
