@@ -1,7 +1,8 @@
 //! What a camera sees of the surface, traced once: shading points with the texels they cover.
 //!
 //! A pixel is sampled at 4 places, or 64 where those and its corners do not agree (at 16, coverage errs by three per cent: a
-//! hundredth of a picture's root mean square before a black background). Samples on one smooth piece of surface become
+//! hundredth of a picture's root mean square before a black background); or in its middle alone
+//! ([`FootprintSettings::COARSE`]), where photographs are of a real place. Samples on one smooth piece of surface become
 //! one shading point: their mean normal and direction, and one list of texels with weights that sum to 1 (the exact mean
 //! of their bilinear lookups). Most pixels have one; edges and silhouettes have several, each with its share. How far the
 //! normals of a piece differ is kept as their variance, which makes its lobe wider.
