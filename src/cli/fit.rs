@@ -112,8 +112,7 @@ pub fn suit(options: &FitOptions, opened: &OpenedScene, settings: &mut FitSettin
     suited.apply(settings, &options.fit.typed);
     if settings.method == Method::Paper {
         // What the solver would do is no setting of such a run.
-        (settings.solver_polish, settings.solver_levels) = (asked.solver_polish, asked.solver_levels);
-        settings.solver_grid = asked.solver_grid;
+        settings.polish_as(&asked);
     }
 }
 

@@ -215,6 +215,13 @@ impl FitSettings {
         self.method == Method::Solver || self.steps == Steps::OneStep || self.steps_all > 0
     }
 
+    /// Takes over whether others polish the solver's maps, and what goes with it.
+    pub fn polish_as(&mut self, other: &FitSettings) {
+        self.solver_polish = other.solver_polish;
+        self.solver_levels = other.solver_levels;
+        self.solver_grid = other.solver_grid;
+    }
+
     /// Checks every range; the error names the setting.
     pub fn validate(&self) -> Result<()> {
         let wrong = |name: &str, message: &str| {

@@ -190,11 +190,15 @@ fn believe_narrow(matrix: &mut [f64], shape: &LightShape, narrow: &[f64], usual:
     }
     for (a, b) in shape.neighbours_of_fine() {
         let weight = 1.0 / (usual * scales[a].max(scales[b]).powf(NEIGHBOUR_POWER)).powi(2);
-        let difference = shape.reduce_sparse(&[(a as u32, 1.0), (b as u32, -1.0)]);
-        for &(row, value) in &difference {
-            for &(column, other) in &difference {
-                matrix[row as usize * count + column as usize] += weight * value * other;
-            }
+        add_square(matrix, count, &shape.reduce_sparse(&[(a as u32, 1.0), (b as u32, -1.0)]), weight);
+    }
+}
+
+/// Adds the square of a row of few entries (coefficient, value), times a weight, to a whole matrix.
+fn add_square(matrix: &mut [f64], count: usize, entries: &[(u32, f64)], weight: f64) {
+    for &(row, value) in entries {
+        for &(column, other) in entries {
+            matrix[row as usize * count + column as usize] += weight * value * other;
         }
     }
 }
@@ -235,10 +239,7 @@ pub fn solve_channel(
     for (a, b) in shape.neighbours() {
         let scale = 0.5 * f64::from(x[a] + x[b]) + 0.3 * mean;
         let weight = 1.0 / (prior.variation * scale).powi(2);
-        matrix[a * count + a] += weight;
-        matrix[b * count + b] += weight;
-        matrix[a * count + b] -= weight;
-        matrix[b * count + a] -= weight;
+        add_square(&mut matrix, count, &[(a as u32, 1.0), (b as u32, -1.0)], weight);
     }
     believe_narrow(&mut matrix, shape, narrow, usual);
     let belief = (0..count)

@@ -93,10 +93,7 @@ fn presets(ui: &mut Ui, model: &mut Model) {
         let mut settings = FitSettings::preset(preset);
         match model.project.as_ref().and_then(|project| project.suited.as_ref()) {
             Some(suited) => suited.apply(&mut settings, &[]),
-            None => {
-                (settings.solver_polish, settings.solver_levels) = (own.solver_polish, own.solver_levels);
-                settings.solver_grid = own.solver_grid;
-            }
+            None => settings.polish_as(&own),
         }
         settings
     };
