@@ -10,7 +10,8 @@
 //!    left is the Schur complement of the joint Gauss-Newton system.
 //! 4. [`light_step`]: the light from those rows, at least zero ([`non_negative`]), in wide and narrow hats
 //!    ([`light_shape`]), with a weak wish for smoothness. [`light_round`] is the round as a whole,
-//!    [`light_evidence`] says what each texel of the light is known by.
+//!    [`light_evidence`] says what each texel of the light is known by, `light_holes` fills what lies between texels that
+//!    photos show.
 //! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`, `tile_reflectances`) with the footprints of pixels, where the evidence
 //!    decides which texels share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_prior`], [`lobe_widths`], [`lobe_families`]), then
 //!    [`mod@diffuse`]: all diffuse texels together ([`diffuse_system`]).
@@ -31,6 +32,7 @@ pub mod eliminate;
 pub mod estimate;
 mod light_colour;
 pub mod light_evidence;
+mod light_holes;
 pub mod light_round;
 pub mod light_shape;
 pub mod light_step;

@@ -19,7 +19,7 @@ use std::sync::atomic::AtomicBool;
 pub enum SolverStep {
     /// A round on the light, counted from 0 over wide and narrow hats.
     Light(usize),
-    /// All maps.
+    /// All maps, under the light with its holes filled.
     Maps,
 }
 
@@ -28,7 +28,15 @@ impl SolverScene {
     pub fn step(&self, step: SolverStep, estimate: &mut Estimate, stop: &AtomicBool) -> Option<StepReport> {
         match step {
             SolverStep::Light(number) => self.light_round(estimate, number, stop),
-            SolverStep::Maps => self.make_maps(estimate, stop),
+            SolverStep::Maps => {
+                let found = estimate.light.clone();
+                self.fill_holes(&mut estimate.light);
+                let made = self.make_maps(estimate, stop);
+                if made.is_none() {
+                    estimate.light = found;
+                }
+                made
+            }
         }
     }
 
