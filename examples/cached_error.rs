@@ -1,12 +1,15 @@
 //! Error of cached transport against the path tracer, over its settings.
 //!
-//! `cargo run --release --no-default-features --example cached_error -- [FOLDER|demo] [samples] [grids] [side] [PICTURES]`
+//! `cargo run --release --no-default-features --example cached_error -- [FOLDER|demo|CASE] [samples] [grids] [side] [PICTURES]`
+//!
+//! `CASE` is the name of a hard case, as `patina bench hard --cases` takes it.
 //!
 //! The squared error is the product of the differences to two independent pictures of the path tracer, so that their
 //! noise does not count. Prints the error relative to the root mean square of the picture, and what the cache took. `side`
 //! is the root of the number of samples of a pixel at first. With a fifth argument the pictures go to that folder: the
 //! cache's, the path tracer's, the difference and its square.
 
+use clap::ValueEnum;
 use glam::Vec3;
 use patina::Result;
 use patina::image::{Image, RgbImage, file};
@@ -14,6 +17,7 @@ use patina::material::texels::{PyramidWeights, TexelPyramid, texels_from_maps};
 use patina::render::cached::{CachedSettings, CachedTransport, FootprintSettings, ViewFootprints};
 use patina::render::picture::{PictureSettings, render};
 use patina::render::{Parameters, Surface};
+use patina::scene::hard::{self, HardCase, HardSettings};
 use patina::scene::{ReadSettings, demo, read};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -32,6 +36,8 @@ fn main() -> Result<()> {
     let pictures = arguments.get(4).map(PathBuf::from);
     let scene = if source == "demo" {
         demo::build(&demo::DemoSettings::default())?.scene
+    } else if let Ok(case) = HardCase::from_str(source, true) {
+        hard::build(case, &HardSettings::default())?.scene
     } else {
         read(source.as_ref(), &ReadSettings { hold_out_every: 0, ..ReadSettings::default() })?
     };
@@ -43,7 +49,7 @@ fn main() -> Result<()> {
         Parameters::new(TexelPyramid::from_base(texels_from_maps(&truth.maps), &weights), &truth.environment);
     let views: Vec<usize> = [0, scene.views.len() / 3, scene.views.len() / 2].into_iter().collect();
     let stop = AtomicBool::new(false);
-    for max_bounces in [1, 3] {
+    for max_bounces in [1, truth.max_bounces.max(3)] {
         for lobe_strength in [0.0, 1.0] {
             let references: Vec<_> = views
                 .iter()
