@@ -95,16 +95,10 @@ impl SolverScene {
                 rho[texel as usize] = *own;
             }
         }
-        let size = self.settings.map_size;
-        let mut system = DiffuseSystem::new(&self.footprints, &self.observations, &rows, size);
-        if !diffuse::solve(&mut system, &mut rho, LEANING, ITERATIONS, stop) {
-            return None;
-        }
-        let errors = self.errors_of(&rows, &system.models(&rho));
-        drop(system);
+        let mut errors = self.solve_diffuse(&rows, &mut rho, stop)?;
 
-        // Nothing is dropped from here on.
-        estimate.variances.fill([0.0; 8]);
+        let mut next = estimate.clone();
+        next.variances.fill([0.0; 8]);
         for tile in &made {
             for (index, &texel) in tile.texels.iter().enumerate() {
                 let (lobe, [a, b, c]) = (&tile.lobes[index], tile.variance[index]);
@@ -112,10 +106,16 @@ impl SolverScene {
                 let specular = [0, 1, 2].map(|c| (lobe.mean[c] as f32).clamp(0.0, 1.0));
                 let texel = texel as usize;
                 let shared = (lobe.shared as f32).max(1.0);
-                estimate.set(texel, rho[texel], specular, lobe.mean[3].min(0.0) as f32, [a, b, c, d, e, f, g, shared]);
+                next.set(texel, rho[texel], specular, lobe.mean[3].min(0.0) as f32, [a, b, c, d, e, f, g, shared]);
             }
         }
-        self.fill_from_neighbours(estimate);
+        self.fill_from_neighbours(&mut next);
+        if let Some(settled) = self.settle(&mut next, &planes, at_points.arriving, &mut rows, stop)? {
+            errors = settled;
+        }
+
+        // Nothing is dropped from here on.
+        *estimate = next;
         Some(StepReport {
             residual: median(&mut residuals),
             squared_error: errors.mean(),
@@ -124,6 +124,17 @@ impl SolverScene {
             view_errors: errors.of_views(&self.views),
             choices,
         })
+    }
+
+    /// Solves for all diffuse reflectances together, from those it is given. `None` when `stop` was raised.
+    pub(super) fn solve_diffuse(
+        &self,
+        rows: &[DiffuseRow],
+        rho: &mut [[f32; 3]],
+        stop: &AtomicBool,
+    ) -> Option<ErrorSums> {
+        let mut system = DiffuseSystem::new(&self.footprints, &self.observations, rows, self.settings.map_size);
+        diffuse::solve(&mut system, rho, LEANING, ITERATIONS, stop).then(|| self.errors_of(rows, &system.models(rho)))
     }
 
     /// Blocks by the tile they begin in, with the tile's corner.
@@ -181,7 +192,7 @@ impl SolverScene {
     }
 
     /// Texels without observations take the values of the nearest that has some.
-    fn fill_from_neighbours(&self, estimate: &mut Estimate) {
+    pub(super) fn fill_from_neighbours(&self, estimate: &mut Estimate) {
         let size = self.settings.map_size;
         let solved: Vec<bool> = estimate.variances.iter().map(|variance| variance[7] > 0.0).collect();
         if !solved.contains(&true) {
