@@ -55,6 +55,16 @@ impl Estimate {
         }
     }
 
+    /// Diffuse reflectance of all texels.
+    pub fn diffuse(&self) -> Vec<[f32; 3]> {
+        self.texels.iter().map(|texel| [texel[0], texel[1], texel[2]]).collect()
+    }
+
+    /// Takes over diffuse reflectances of all texels.
+    pub fn set_diffuse(&mut self, rho: &[[f32; 3]]) {
+        self.texels.iter_mut().zip(rho).for_each(|(texel, rho)| texel[..3].copy_from_slice(rho));
+    }
+
     /// Whether a texel was solved for.
     #[inline]
     pub fn is_solved(&self, texel: usize) -> bool {

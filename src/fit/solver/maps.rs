@@ -37,7 +37,7 @@ struct TileResult {
 }
 
 impl SolverScene {
-    /// Makes all maps. `None` when `stop` was raised: nothing was changed then.
+    /// Makes all maps. `None` when `stop` was raised: the estimate is of no use then.
     pub fn make_maps(&self, estimate: &mut Estimate, stop: &AtomicBool) -> Option<StepReport> {
         let planes = self.transport.basis.planes(&estimate.light);
         let at_points = self.point_light(estimate, &planes);
@@ -89,7 +89,7 @@ impl SolverScene {
                 undecided.decide(choices, tile, &mut rows);
             }
         }
-        let mut rho: Vec<[f32; 3]> = estimate.texels.iter().map(|texel| [texel[0], texel[1], texel[2]]).collect();
+        let mut rho = estimate.diffuse();
         for tile in &made {
             for (&texel, own) in tile.texels.iter().zip(&tile.rho) {
                 rho[texel as usize] = *own;
@@ -97,8 +97,7 @@ impl SolverScene {
         }
         let mut errors = self.solve_diffuse(&rows, &mut rho, stop)?;
 
-        let mut next = estimate.clone();
-        next.variances.fill([0.0; 8]);
+        estimate.variances.fill([0.0; 8]);
         for tile in &made {
             for (index, &texel) in tile.texels.iter().enumerate() {
                 let (lobe, [a, b, c]) = (&tile.lobes[index], tile.variance[index]);
@@ -106,16 +105,13 @@ impl SolverScene {
                 let specular = [0, 1, 2].map(|c| (lobe.mean[c] as f32).clamp(0.0, 1.0));
                 let texel = texel as usize;
                 let shared = (lobe.shared as f32).max(1.0);
-                next.set(texel, rho[texel], specular, lobe.mean[3].min(0.0) as f32, [a, b, c, d, e, f, g, shared]);
+                estimate.set(texel, rho[texel], specular, lobe.mean[3].min(0.0) as f32, [a, b, c, d, e, f, g, shared]);
             }
         }
-        self.fill_from_neighbours(&mut next);
-        if let Some(settled) = self.settle(&mut next, &planes, at_points.arriving, &mut rows, stop)? {
+        self.fill_from_neighbours(estimate);
+        if let Some(settled) = self.settle(estimate, at_points, &mut rows, stop)? {
             errors = settled;
         }
-
-        // Nothing is dropped from here on.
-        *estimate = next;
         Some(StepReport {
             residual: median(&mut residuals),
             squared_error: errors.mean(),

@@ -8,7 +8,7 @@ use super::diffuse_system::DiffuseRow;
 use super::estimate::Estimate;
 use super::report::ErrorSums;
 use super::scene::SolverScene;
-use crate::render::cached::LightPlanes;
+use crate::render::cached::PointLight;
 use std::sync::atomic::AtomicBool;
 
 /// Arriving light that changes by less than this, relative root mean square over the points of the grid, has settled.
@@ -17,21 +17,21 @@ const SETTLED: f64 = 0.01;
 const MOST_SWEEPS: usize = 4;
 
 impl SolverScene {
-    /// Goes on from maps that were made under `arriving`, until it hardly changes; `rows` are what they were solved from.
+    /// Goes on from maps that were made under `at_points`, until what arrives hardly changes; `rows` are what they were solved from.
     /// The outer `None` says that `stop` was raised, the inner one that nothing had to change, else there are the errors
     /// that are left.
     pub(super) fn settle(
         &self,
         estimate: &mut Estimate,
-        planes: &LightPlanes,
-        mut arriving: Vec<[f32; 3]>,
+        at_points: PointLight,
         rows: &mut [DiffuseRow],
         stop: &AtomicBool,
     ) -> Option<Option<ErrorSums>> {
-        let mut errors = None;
-        let mut rho: Vec<[f32; 3]> = estimate.texels.iter().map(|texel| [texel[0], texel[1], texel[2]]).collect();
+        let PointLight { mut arriving, direct, .. } = at_points;
+        let (mut errors, mut rho) = (None, estimate.diffuse());
         for _ in 0..MOST_SWEEPS {
-            let now = self.point_light(estimate, planes).arriving;
+            let reflectance = self.transport.reflectance_of_points(&estimate.texels, self.settings.map_size);
+            let now = self.transport.with_bounces(direct.clone(), &reflectance).arriving;
             if relative_change(&arriving, &now) < SETTLED {
                 break;
             }
@@ -43,9 +43,7 @@ impl SolverScene {
                 row.arriving = self.interpolate(&arriving, index);
             }
             errors = Some(self.solve_diffuse(rows, &mut rho, stop)?);
-            for (texel, rho) in estimate.texels.iter_mut().zip(&rho) {
-                texel[..3].copy_from_slice(rho);
-            }
+            estimate.set_diffuse(&rho);
             self.fill_from_neighbours(estimate);
         }
         Some(errors)
@@ -91,9 +89,6 @@ mod tests {
         let Solver { scene, mut estimate } = Solver::new(&scene, &surface, solver_settings, Some(&light)).unwrap();
         let planes = scene.transport.basis.planes(&estimate.light);
         let never = AtomicBool::new(false);
-        let diffuse = |estimate: &Estimate| -> Vec<[f32; 3]> {
-            estimate.texels.iter().map(|texel| [texel[0], texel[1], texel[2]]).collect()
-        };
         estimate.texels = texels_from_maps(&truth.maps);
         estimate.variances.fill([1.0; 8]);
         let real = scene.point_light(&estimate, &planes).arriving;
@@ -106,26 +101,24 @@ mod tests {
         };
         let count = scene.observations.list.len();
         let rows: Vec<DiffuseRow> = (0..count).map(|index| row(&real, index)).collect();
-        let mut rho = diffuse(&estimate);
+        let mut rho = estimate.diffuse();
         let shown = DiffuseSystem::new(&scene.footprints, &scene.observations, &rows, SIZE).models(&rho);
         let mut darker = estimate.clone();
         darker.texels.iter_mut().for_each(|texel| texel[..3].iter_mut().for_each(|value| *value *= 0.8));
-        let arriving = scene.point_light(&darker, &planes).arriving;
-        let mut rows: Vec<DiffuseRow> = (0..count).map(|index| row(&arriving, index)).collect();
+        let at_points = scene.point_light(&darker, &planes);
+        let mut rows: Vec<DiffuseRow> = (0..count).map(|index| row(&at_points.arriving, index)).collect();
         rows.iter_mut().zip(&shown).for_each(|(row, shown)| row.radiance = *shown);
         scene.solve_diffuse(&rows, &mut rho, &never).unwrap();
-        for (texel, rho) in estimate.texels.iter_mut().zip(&rho) {
-            texel[..3].copy_from_slice(rho);
-        }
+        estimate.set_diffuse(&rho);
         let before = relative_change(&scene.point_light(&estimate, &planes).arriving, &real);
-        let errors = scene.settle(&mut estimate, &planes, arriving, &mut rows, &never).unwrap();
+        let errors = scene.settle(&mut estimate, at_points, &mut rows, &never).unwrap();
         let after = relative_change(&scene.point_light(&estimate, &planes).arriving, &real);
         println!("light between surfaces off by {before:.4}, then by {after:.4}");
         assert!(errors.is_some() && before > 0.03 && after < 0.3 * before, "{before} {after}");
 
         // What has settled is left alone.
-        let (settled, now) = (estimate.clone(), scene.point_light(&estimate, &planes).arriving);
-        assert!(scene.settle(&mut estimate, &planes, now, &mut rows, &never).unwrap().is_none());
+        let (settled, now) = (estimate.clone(), scene.point_light(&estimate, &planes));
+        assert!(scene.settle(&mut estimate, now, &mut rows, &never).unwrap().is_none());
         assert_eq!(estimate, settled);
     }
 }

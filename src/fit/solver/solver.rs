@@ -29,13 +29,11 @@ impl SolverScene {
         match step {
             SolverStep::Light(number) => self.light_round(estimate, number, stop),
             SolverStep::Maps => {
-                let found = estimate.light.clone();
-                self.fill_holes(&mut estimate.light);
-                let made = self.make_maps(estimate, stop);
-                if made.is_none() {
-                    estimate.light = found;
-                }
-                made
+                let mut next = estimate.clone();
+                self.fill_holes(&mut next.light);
+                let report = self.make_maps(&mut next, stop)?;
+                *estimate = next;
+                Some(report)
             }
         }
     }
