@@ -44,6 +44,7 @@ pub struct SolverSettings {
     /// Which share of the observations counts as independent when they are weighed against priors. Errors of neighbouring
     /// pixels go together: on the exchange scene `toys` a twentieth gave a better light (aligned error .099, against .143
     /// with three tenths) and better roughness (.120, against .129), with specular slightly worse (.106, against .101).
+    /// Lobes take less where a tile's residuals say that errors go together more (`tile_independence`).
     pub independence: f64,
     /// By how much the mean light on the surface may differ from the one that is held, relative, where no background
     /// pixel fixes the scale.

@@ -31,6 +31,7 @@ pub(super) struct TilePixel {
     pub(super) nodes: (usize, usize),
     pub(super) texel: usize,
     pub(super) observation: u32,
+    pub(super) view: u32,
     pub(super) clipped: bool,
     /// Where its taps lie.
     pub(super) taps: Range<usize>,
@@ -149,6 +150,7 @@ impl Tile {
                     nodes: (work.nodes.start, work.nodes.end),
                     texel: own as usize,
                     observation: used,
+                    view: observation.view,
                     clipped: observation.clipped,
                     taps: start..tile.taps.len(),
                     lobe: [0.0; 3],
@@ -162,7 +164,7 @@ impl Tile {
     }
 
     /// Solves reflectances and lobes in turn, and at the end F0 of each texel by itself as far as its pixels tell it.
-    /// `independence` is the share of pixels that count as independent evidence.
+    /// `independence` is the share of pixels that count as independent evidence, at most (`tile_independence`).
     pub fn solve(&mut self, map_size: usize, mean_radiance: f32, independence: f64, prior: &LobePrior) {
         if self.pixels.is_empty() {
             return;
@@ -171,7 +173,7 @@ impl Tile {
             self.set_lobes();
             self.solve_diffuse();
             self.weigh(mean_radiance);
-            self.solve_lobes(map_size, independence, prior);
+            self.solve_lobes(map_size, self.independence(independence), prior);
         }
         self.set_lobes();
         self.solve_diffuse();

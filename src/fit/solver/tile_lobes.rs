@@ -169,6 +169,7 @@ pub(super) mod tests {
                 nodes: (0, widths.len()),
                 texel: usize::from(share > 0.5),
                 observation: index,
+                view: index,
                 clipped: false,
                 taps: start..start + 2,
                 lobe: [0.0; 3],

@@ -24,7 +24,7 @@ pub struct TileTerms<'a> {
     pub map_size: usize,
     /// Mean radiance of the photos.
     pub mean_radiance: f32,
-    /// Share of the pixels that count as independent evidence.
+    /// Share of the pixels that count as independent evidence, at most.
     pub independence: f64,
     /// What is believed of lobes.
     pub prior: &'a LobePrior,
@@ -94,7 +94,7 @@ impl TileAlternatives {
         if any_withheld {
             tile.solve_diffuse();
             tile.weigh(mean_radiance);
-            tile.solve_lobes(map_size, independence, prior);
+            tile.solve_lobes(map_size, tile.independence(independence), prior);
             tile.set_lobes();
             tile.solve_reflectances(independence);
             tile.set_lobes();
