@@ -37,7 +37,8 @@ pub fn bench_scale(options: &BenchOptions, json: bool) -> Result<()> {
         true => scale::cases(options.quick),
         false => scale::cases_along(&options.triangles, &options.views, &options.maps),
     };
-    let table = scale::run(&cases, &options.methods, &options.output, &|case| {
+    let extent = if options.whole { scale::Extent::WholeFit } else { scale::Extent::OneStep };
+    let table = scale::run(&cases, &options.methods, extent, &options.output, &|case| {
         if !json {
             eprintln!("{case}");
         }

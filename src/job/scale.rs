@@ -58,15 +58,29 @@ pub fn cases(quick: bool) -> Vec<ScaleCase> {
     ]
 }
 
-/// Runs the cases by each method and gathers seconds and memory; `tell` hears of each case before it runs. A step of the
-/// solver is its first, which traces what later ones share.
-pub fn run(cases: &[ScaleCase], methods: &[Contestant], folder: &Path, tell: &dyn Fn(&str)) -> Result<StudyTable> {
+/// How much of a fit is timed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// One step on whole photos and maps. The solver's first traces what later ones share.
+    OneStep,
+    /// A fit on its defaults from its first step, small at first, to its end.
+    WholeFit,
+}
+
+/// Runs the cases by each method and gathers seconds and memory; `tell` hears of each case before it runs.
+pub fn run(
+    cases: &[ScaleCase],
+    methods: &[Contestant],
+    extent: Extent,
+    folder: &Path,
+    tell: &dyn Fn(&str),
+) -> Result<StudyTable> {
     let columns = [
         ("mesh file read", "s"),
         ("atlas", "s"),
         ("tracer", "s"),
         ("prepare fit", "s"),
-        ("one step", "s"),
+        (if extent == Extent::WholeFit { "whole fit" } else { "one step" }, "s"),
         ("peak memory", "MiB"),
     ];
     let title = format!("Growth with triangles, views and maps, {} threads", rayon::current_num_threads());
@@ -80,7 +94,7 @@ pub fn run(cases: &[ScaleCase], methods: &[Contestant], folder: &Path, tell: &dy
                 case.views,
                 case.map_size
             );
-            let settings = settings(case);
+            let settings = settings(case, extent);
             let Some(settings) = method.settings(&settings).filter(|_| method != Contestant::Mitsuba) else {
                 let note = format!("`{}` was left out: this build has no such method.", method.name());
                 if !table.notes.contains(&note) {
@@ -89,7 +103,7 @@ pub fn run(cases: &[ScaleCase], methods: &[Contestant], folder: &Path, tell: &dy
                 continue;
             };
             tell(&name);
-            let timings = run_case(case, settings, folder)?;
+            let timings = run_case(case, settings, extent, folder)?;
             let mut row: Vec<f64> = timings.iter().map(|time| time.seconds).collect();
             row.push(peak_bytes().map_or(f64::NAN, |bytes| bytes as f64 / (1 << 20) as f64));
             table.add(&name, &row);
@@ -103,8 +117,10 @@ pub fn scene(case: ScaleCase) -> Scene {
     scene_of(bumpy_sphere(case.triangles), case.views)
 }
 
-/// One step at full size.
-fn settings(case: ScaleCase) -> FitSettings {
+fn settings(case: ScaleCase, extent: Extent) -> FitSettings {
+    if extent == Extent::WholeFit {
+        return FitSettings { map_size: case.map_size, ..Default::default() };
+    }
     FitSettings {
         map_size: case.map_size,
         steps: Steps::OneStep,
@@ -116,7 +132,7 @@ fn settings(case: ScaleCase) -> FitSettings {
     }
 }
 
-fn run_case(case: ScaleCase, settings: FitSettings, folder: &Path) -> Result<Vec<StageTime>> {
+fn run_case(case: ScaleCase, settings: FitSettings, extent: Extent, folder: &Path) -> Result<Vec<StageTime>> {
     let mut timings = Vec::new();
     let path = folder.join("scale_mesh.obj");
     crate::export::obj::write(&path, &bumpy_sphere(case.triangles))?;
@@ -133,10 +149,19 @@ fn run_case(case: ScaleCase, settings: FitSettings, folder: &Path) -> Result<Vec
     let scene = scene_of(mesh, case.views);
     let mut fitter =
         timed(&mut timings, "prepare", || Fitter::new(Arc::new(scene), Arc::new(surface), settings, None))?;
-    match timed(&mut timings, "step", || fitter.step(&AtomicBool::new(false)))? {
-        StepOutcome::Stepped(_) => Ok(timings),
-        other => Err(Error::new(ErrorKind::Internal, format!("the step of the bench did not run: {other:?}"))),
-    }
+    timed(&mut timings, "fit", || {
+        loop {
+            match fitter.step(&AtomicBool::new(false))? {
+                StepOutcome::Stepped(_) if extent == Extent::WholeFit => {}
+                StepOutcome::Stepped(_) => return Ok(()),
+                StepOutcome::Finished if extent == Extent::WholeFit => return Ok(()),
+                other => {
+                    return Err(Error::new(ErrorKind::Internal, format!("a step of the bench did not run: {other:?}")));
+                }
+            }
+        }
+    })?;
+    Ok(timings)
 }
 
 /// A closed bumpy sphere, less the last triangles of its grid so that the count is exact.
@@ -206,12 +231,20 @@ mod tests {
             assert_eq!(bumpy_sphere(count).triangles.len(), count);
         }
         let folder = tempfile::tempdir().unwrap();
-        let timings = {
-            let case = ScaleCase { triangles: 500, views: 3, map_size: 64 };
-            run_case(case, settings(case), folder.path()).unwrap()
-        };
+        let case = ScaleCase { triangles: 500, views: 3, map_size: 64 };
+        let timings = run_case(case, settings(case, Extent::OneStep), Extent::OneStep, folder.path()).unwrap();
         assert_eq!(timings.len(), 5);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "the mesh file is gone");
+    }
+
+    #[test]
+    fn a_whole_fit_goes_to_its_end() {
+        let folder = tempfile::tempdir().unwrap();
+        let case = ScaleCase { triangles: 500, views: 3, map_size: 64 };
+        let short = FitSettings { steps_diffuse: 1, steps_all: 2, levels: 1, ..settings(case, Extent::WholeFit) };
+        assert_eq!(short.held_out_interval, FitSettings::default().held_out_interval);
+        let timings = run_case(case, short, Extent::WholeFit, folder.path()).unwrap();
+        assert_eq!(timings.last().map(|time| time.stage.as_str()), Some("fit"));
     }
 
     #[test]

@@ -89,6 +89,9 @@ pub struct BenchOptions {
     /// Two small cases only.
     #[arg(long)]
     pub quick: bool,
+    /// Time whole fits on their defaults in place of one step.
+    #[arg(long)]
+    pub whole: bool,
     /// The methods whose step is timed.
     #[arg(long, value_enum, value_delimiter = ',', default_values_t = [crate::job::contest::Contestant::Adam])]
     pub methods: Vec<crate::job::contest::Contestant>,
