@@ -92,7 +92,7 @@ pub struct BenchOptions {
     /// Time whole fits on their defaults in place of one step.
     #[arg(long)]
     pub whole: bool,
-    /// The methods whose step is timed.
+    /// The methods that are timed.
     #[arg(long, value_enum, value_delimiter = ',', default_values_t = [crate::job::contest::Contestant::Adam])]
     pub methods: Vec<crate::job::contest::Contestant>,
     /// Triangles: vary these in place of the built-in cases, the first with the first of the other lists.
