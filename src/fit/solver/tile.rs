@@ -2,7 +2,8 @@
 //!
 //! Blocks book a pixel at the one texel it covers most. Here diffuse reflectance is solved with the footprints inside the
 //! tile, pixels are relieved of what they cover of the neighbours, of their diffuse reflectance and of what their lobes
-//! send, and what is left tells of the lobe of the one texel (`tile_lobes`).
+//! send, and what is left tells of the lobe of the one texel (`tile_lobes`). At the end both reflectances of all texels are
+//! solved together (`tile_reflectances`), by pixels among which highlights are no outliers (`tile_highlights`).
 
 use super::block::PixelTerms;
 use super::lobe_evidence::LobeBelief;
@@ -175,8 +176,14 @@ impl Tile {
             self.weigh(mean_radiance);
             self.solve_lobes(map_size, self.independence(independence), prior);
         }
+        self.end(mean_radiance, independence);
+    }
+
+    /// Once lobes are known: F0 of each texel by itself as far as its pixels tell it, highlights counted as such.
+    pub(super) fn end(&mut self, mean_radiance: f32, independence: f64) {
         self.set_lobes();
         self.solve_diffuse();
+        self.trust_highlights(mean_radiance);
         self.solve_reflectances(independence);
         self.set_lobes();
     }

@@ -95,9 +95,7 @@ impl TileAlternatives {
             tile.solve_diffuse();
             tile.weigh(mean_radiance);
             tile.solve_lobes(map_size, tile.independence(independence), prior);
-            tile.set_lobes();
-            tile.solve_reflectances(independence);
-            tile.set_lobes();
+            tile.end(mean_radiance, independence);
         }
         let withheld_seconds = began.elapsed().as_secs_f64();
         let own: Vec<Lobe> = tile.lobes.iter().map(|lobe| lobe.mean.map(|value| value as f32)).collect();
