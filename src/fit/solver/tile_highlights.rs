@@ -66,7 +66,7 @@ mod tests {
     #[test]
     fn highlights_count_and_what_no_lobe_explains_does_not() {
         let mut tile = doubted();
-        // Brighter than a mirror would be; on average as far off as the others, so that views do not tell them apart.
+        // Brighter than a mirror would be. Each pixel is of a view of its own, so that no errors go together.
         let beyond: Vec<usize> = (0..tile.pixels.len()).step_by(50).collect();
         for &index in &beyond {
             tile.pixels[index].terms.radiance = [1e3; 3];
@@ -86,6 +86,32 @@ mod tests {
             raised += usize::from(weight > 0.01);
         }
         assert!(raised > 20, "{raised} of {}", tile.pixels.len());
+    }
+
+    #[test]
+    fn where_errors_of_a_view_go_together_highlights_count_less() {
+        let weights_of = |shared: bool| {
+            let mut tile = doubted();
+            for (index, pixel) in tile.pixels.iter_mut().enumerate() {
+                let sign = if shared { pixel.view % 2 } else { index as u32 / 20 % 2 };
+                pixel.view = index as u32 % 20;
+                pixel.terms.weight = 0.5;
+                pixel.terms.radiance = pixel.lobe;
+                pixel.terms.radiance[1] += if sign == 0 { 0.01 } else { -0.01 };
+            }
+            tile.rho.fill([0.0; 3]);
+            tile.trust_highlights(MEAN_RADIANCE);
+            tile.pixels.iter().map(|pixel| pixel.terms.weight).collect::<Vec<f32>>()
+        };
+        // All of a view's twenty pixels, of half weight, err alike: a design effect of 10, half of the trust.
+        let raised: Vec<(f32, f32)> = weights_of(false)
+            .into_iter()
+            .zip(weights_of(true))
+            .map(|(apart, together)| (apart - 0.5, together - 0.5))
+            .filter(|(apart, _)| *apart > 0.0)
+            .collect();
+        assert!(raised.len() > 20, "{}", raised.len());
+        assert!(raised.iter().all(|(apart, together)| (together / apart - 0.5).abs() < 0.01), "{raised:?}");
     }
 
     #[test]
