@@ -94,9 +94,8 @@ impl Tile {
             }
             // Of each half how far F0 has to go, diffuse reflectance being free to follow, and how precisely it knows.
             let [(first, first_precision), (second, second_precision)] = halves.map(|half| {
-                let keep = 1.0 / (half.ee + lean);
-                let precision = half.ss - half.es * half.es * keep;
-                ((half.sy - half.es * half.ey * keep) / precision, precision)
+                let System { ss, sy, .. } = half.without_deviation(lean);
+                (sy / ss, ss)
             });
             if first_precision > LEAST_PRECISION && second_precision > LEAST_PRECISION {
                 let doubt = lobe.square[c];
