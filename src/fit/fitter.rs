@@ -13,7 +13,7 @@ use super::held_out::held_out_targets;
 use super::schedule::{Stage, stages};
 use super::settings::{FitSettings, Start};
 use super::solver::light_evidence::LightKnown;
-use super::solver::{Choices, SolverScene};
+use super::solver::{Choices, LobeTails, SolverScene};
 use super::start;
 use super::state::{FitState, LossRow};
 use super::targets::{Target, targets};
@@ -59,6 +59,8 @@ pub struct Fitter {
     pub(super) light_known: LightKnown,
     /// What judging views say of the model's freedoms; `None` under Adam and before the maps of full size.
     pub(super) choices: Option<Arc<Choices>>,
+    /// What the last maps that the solver made say of tails of lobes.
+    pub(super) tails: Option<LobeTails>,
 }
 
 impl Fitter {
@@ -156,6 +158,7 @@ impl Fitter {
             solver_photo_level: 0,
             light_known: LightKnown::default(),
             choices: None,
+            tails: None,
         })
     }
 
@@ -252,7 +255,20 @@ impl Fitter {
             )
             .remedy("they were left out; look at that place of the photo or the mesh")
         });
-        events.chain(counts).chain(self.setting_findings()).collect()
+        events.chain(counts).chain(self.setting_findings()).chain(self.tail_finding()).collect()
+    }
+
+    /// That lobes have tails which the model's do not have, where the solver's maps show them.
+    pub fn tail_finding(&self) -> Option<Finding> {
+        let tails = self.tails.filter(LobeTails::are_there)?;
+        let message = format!(
+            "highlights reach further than the model's lobes: as if {:.0} ± {:.0} % of each were three times as wide",
+            100.0 * tails.share,
+            100.0 * tails.error
+        );
+        Some(Finding::new(Severity::Warning, "lobes-with-tails", message).remedy(
+            "specular and roughness maps are the nearest that Blinn-Phong lobes come to, and their intervals do not know of it; measured surfaces and GGX have such tails",
+        ))
     }
 
     /// What the settings ask for that this scene does not have.

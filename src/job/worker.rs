@@ -180,6 +180,9 @@ impl Worker {
         }
         self.put_snapshot();
         self.save();
+        if let Some(finding) = self.fitter.tail_finding() {
+            self.teller.send(Event::Finding(finding));
+        }
         prepared.timings.push(StageTime { stage: "fit".into(), seconds: self.fitter.state().seconds });
         let folder = self.saver.folder();
         let tell = |event: Event| self.teller.send(event);

@@ -81,6 +81,7 @@ impl SolverScene {
             light_unknowns: if self.settings.fixed_light { 0 } else { shape.count() },
             view_errors: errors.of_views(&self.views),
             choices: None,
+            tails: None,
         })
     }
 

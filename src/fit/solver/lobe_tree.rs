@@ -15,6 +15,9 @@
 use super::lobe_evidence::{Evidence, LobeBelief, LobeSumsOfGroup, log_sum};
 use super::lobe_prior::LobePrior;
 use super::lobe_widths::LOBE_WIDTHS;
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
 
 /// A texel of a tile: where it lies and what tells it from others.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,13 +38,26 @@ const LEAST_SIDE_TO_CLUSTER: usize = 8;
 /// squares of one texel maps of `toys` were the same, and three quarters of all groups are such squares.
 const SMALLEST: usize = 2;
 
+/// Texels along the side of the largest squares whose groups are kept, to be found again: as many as a mask has bits.
+const MOST_SIDE_TO_KEEP: usize = 8;
+
 struct Node {
     texels: Vec<u32>,
     leaf: LobeBelief,
     log_leaf: f64,
     /// Cuts, each with its parts.
-    cuts: Vec<Vec<Node>>,
+    cuts: Vec<Vec<Rc<Node>>>,
     log_evidence: f64,
+}
+
+/// What makes a group of texels of a small square: the square, which of its texels they are, and whether colours may cut
+/// it.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+struct GroupKey {
+    corner: (u16, u16),
+    side: usize,
+    mask: u64,
+    by_colour: bool,
 }
 
 /// The beliefs of all texels of a tile of `side` texels (a power of two), and what would be believed of one lobe that all
@@ -62,7 +78,7 @@ pub fn beliefs(
     let evidence = Evidence::new(around, log_widths, prior);
     let unseen = evidence.shared_lobe(&LobeSumsOfGroup::default());
     let is_seen = sums.iter().map(|sums| !sums.is_empty()).collect();
-    let tree = Tree { texels, sums, is_seen, unseen, evidence, prior };
+    let tree = Tree { texels, sums, is_seen, unseen, evidence, prior, kept: RefCell::default() };
     let root = tree.grow((0..texels.len() as u32).collect(), (0, 0), side, true);
     let mut made = vec![LobeBelief::default(); texels.len()];
     tree.spread(&root, 1.0, &mut made);
@@ -84,10 +100,32 @@ struct Tree<'a> {
     unseen: (f64, LobeBelief),
     evidence: Evidence,
     prior: &'a LobePrior,
+    /// Small groups that were grown. Cuts by colour of all sizes lead to them again and again: where a colour fills a
+    /// square, they are those of the square itself. On photographs of a statue a third of all groups are left to grow.
+    kept: RefCell<HashMap<GroupKey, Rc<Node>>>,
 }
 
 impl Tree<'_> {
-    fn grow(&self, texels: Vec<u32>, corner: (u16, u16), side: usize, by_colour: bool) -> Node {
+    /// The tree below a group of texels of a square.
+    fn grow(&self, texels: Vec<u32>, corner: (u16, u16), side: usize, by_colour: bool) -> Rc<Node> {
+        let by_colour = by_colour && side >= LEAST_SIDE_TO_CLUSTER;
+        if side > MOST_SIDE_TO_KEEP {
+            return Rc::new(self.grown(texels, corner, side, by_colour));
+        }
+        let mask = texels.iter().fold(0u64, |mask, &texel| {
+            let TreeTexel { row, column, .. } = self.texels[texel as usize];
+            mask | 1 << (usize::from(row - corner.0) * side + usize::from(column - corner.1))
+        });
+        let key = GroupKey { corner, side, mask, by_colour };
+        let kept = self.kept.borrow().get(&key).cloned();
+        kept.unwrap_or_else(|| {
+            let node = Rc::new(self.grown(texels, corner, side, by_colour));
+            self.kept.borrow_mut().insert(key, node.clone());
+            node
+        })
+    }
+
+    fn grown(&self, texels: Vec<u32>, corner: (u16, u16), side: usize, by_colour: bool) -> Node {
         // Maps may be finer than photos: what has no pixels adds nothing.
         let mut seen = texels.iter().map(|&texel| texel as usize).filter(|&texel| self.is_seen[texel]);
         let (log_leaf, leaf) = match seen.next() {
@@ -107,7 +145,7 @@ impl Tree<'_> {
                 let which = usize::from(own.row >= corner.0 + half) * 2 + usize::from(own.column >= corner.1 + half);
                 quarters[which].push(texel);
             }
-            let parts: Vec<Node> = quarters
+            let parts: Vec<Rc<Node>> = quarters
                 .into_iter()
                 .enumerate()
                 .filter(|(_, quarter)| !quarter.is_empty())
@@ -118,7 +156,6 @@ impl Tree<'_> {
                 .collect();
             cuts.push(parts);
             if by_colour
-                && side >= LEAST_SIDE_TO_CLUSTER
                 && texels.len() >= LEAST_TO_CLUSTER
                 && let Some(clusters) = self.two_colours(&texels)
             {

@@ -8,6 +8,7 @@ use super::diffuse_system::{DiffuseRow, DiffuseSystem};
 use super::estimate::Estimate;
 use super::lobe_families;
 use super::lobe_prior::LobePrior;
+use super::lobe_tails::TailSums;
 use super::plan::Block;
 use super::report::{ErrorSums, StepReport, median};
 use super::round::{BlockWork, Round, open_prior};
@@ -26,10 +27,17 @@ const LEANING: Leaning = Leaning { start: 0.01, neighbours: 0.02 };
 /// Iterations of conjugate gradients.
 const ITERATIONS: usize = 20;
 
+/// Tiles that are solved before what they leave is put together, so that few of their pixels' rows wait.
+const TILES_AT_ONCE: usize = 128;
+
 /// What a tile leaves.
 struct TileResult {
+    /// Without its pixels.
     tile: Tile,
     residuals: Vec<f32>,
+    /// What its pixels say of diffuse reflectance, by observation.
+    rows: Vec<(u32, DiffuseRow)>,
+    tails: TailSums,
     /// With less, where that is judged.
     alternatives: Option<TileAlternatives>,
     /// Seconds of one processor until blocks were solved.
@@ -48,9 +56,9 @@ impl SolverScene {
         let mut residuals = Vec::new();
         let mut made: Vec<Tile> = Vec::new();
         let mut undecided: Vec<Undecided> = Vec::new();
-        // Few tiles at a time: their terms are large.
+        let mut tails = TailSums::new(self.views.len());
         let tiles = self.tiles();
-        for group in tiles.chunks(16) {
+        for group in tiles.chunks(TILES_AT_ONCE) {
             let results: Vec<TileResult> = group
                 .par_iter()
                 .map(|(first, blocks)| self.solve_tile(&round, *first, blocks, &prior, check.as_ref(), stop))
@@ -58,18 +66,12 @@ impl SolverScene {
             if stop.load(Ordering::Relaxed) {
                 return None;
             }
-            for mut result in results {
+            for result in results {
                 residuals.extend(result.residuals);
-                for (index, lobe, weight, _) in result.tile.pixels() {
-                    let observation = &self.observations.list[index as usize];
-                    let gain = (-estimate.log_gains[observation.view as usize]).exp();
-                    rows[index as usize] = DiffuseRow {
-                        arriving: self.interpolate(&at_points.arriving, index as usize),
-                        radiance: [0, 1, 2].map(|c| observation.radiance[c] * gain - lobe[c]),
-                        weight,
-                    };
+                for (index, row) in result.rows {
+                    rows[index as usize] = row;
                 }
-                result.tile.drop_pixels();
+                tails.add(&result.tails);
                 if let (Some(check), Some(mut alternatives)) = (&mut check, result.alternatives) {
                     check.add(&alternatives, result.block_seconds, result.tile.seconds);
                     if self.settings.apply_choices {
@@ -119,6 +121,7 @@ impl SolverScene {
             light_unknowns: 0,
             view_errors: errors.of_views(&self.views),
             choices,
+            tails: tails.tails(),
         })
     }
 
@@ -172,7 +175,23 @@ impl SolverScene {
         let mut tile = Tile::new(round, first, self.settings.map_size, solved);
         tile.solve(self.settings.map_size, self.observations.mean, self.settings.independence, lobes);
         let alternatives = check.map(|check| check.of_tile(self, &mut tile));
-        TileResult { tile, residuals, alternatives, block_seconds }
+        let rows =
+            tile.pixels().map(|(index, lobe, weight, _)| (index, self.row(round, index, lobe, weight))).collect();
+        let tails = tile.tail_sums(self.views.len());
+        // They are large.
+        tile.drop_pixels();
+        TileResult { tile, residuals, rows, tails, alternatives, block_seconds }
+    }
+
+    /// What an observation says of diffuse reflectance, where its lobes send this.
+    fn row(&self, round: &Round, index: u32, lobe: [f32; 3], weight: f32) -> DiffuseRow {
+        let observation = &self.observations.list[index as usize];
+        let gain = (-round.log_gains[observation.view as usize]).exp();
+        DiffuseRow {
+            arriving: self.interpolate(&round.at_points.arriving, index as usize),
+            radiance: [0, 1, 2].map(|c| observation.radiance[c] * gain - lobe[c]),
+            weight,
+        }
     }
 
     /// Squared errors of the pixels that tiles used.

@@ -16,7 +16,8 @@
 //!    footprints of pixels, where the evidence, as far as it is independent (`tile_independence`), decides which texels
 //!    share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_prior`], [`lobe_widths`], [`lobe_families`]), then
 //!    [`mod@diffuse`]: all diffuse texels together ([`diffuse_system`]), until the light between surfaces stays (`settle`).
-//! 6. [`choice`]: views that took no part say what lobes, light between surfaces and the light's resolution bought.
+//! 6. [`choice`]: views that took no part say what lobes, light between surfaces and the light's resolution bought;
+//!    `lobe_tails` says whether highlights reach further than the model's lobes.
 //! 7. [`solver`]: the steps in their order. A fit does them one by one, as [`crate::fit::Fitter`] does those of Adam: on
 //!    photos and maps of half size first, whose light and maps the full size begins from ([`crate::fit::schedule`]).
 //! 8. [`transport_check`]: how far its model is from the path tracer's, once it is done.
@@ -41,6 +42,7 @@ pub mod lobe_evidence;
 pub mod lobe_families;
 mod lobe_kind;
 pub mod lobe_prior;
+mod lobe_tails;
 pub mod lobe_tree;
 pub mod lobe_widths;
 pub mod maps;
@@ -67,6 +69,7 @@ mod tests;
 
 pub use choice::Choices;
 pub use estimate::Estimate;
+pub use lobe_tails::LobeTails;
 pub use report::StepReport;
 pub use scene::SolverScene;
 pub use settings::SolverSettings;

@@ -3,6 +3,7 @@
 use super::block::PixelTerms;
 use super::choice::Choices;
 use super::estimate::Estimate;
+use super::lobe_tails::LobeTails;
 use super::round::{BlockWork, Round};
 use super::scene::SolverScene;
 use crate::render::cached::{CachedTransport, LightPlanes, PointLight};
@@ -23,6 +24,8 @@ pub struct StepReport {
     pub view_errors: Vec<(usize, f32)>,
     /// What judging views say of the model's freedoms; only where maps were made and that was asked for.
     pub choices: Option<Choices>,
+    /// What pixels say of tails of lobes; only where maps were made and enough views see lobes.
+    pub tails: Option<LobeTails>,
 }
 
 /// Squared errors, view by view.
