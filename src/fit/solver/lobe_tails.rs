@@ -5,7 +5,7 @@
 //! share of its lobe went into one three times as wide. What reflectances and the width could have done themselves is
 //! taken out of that, texel by texel and tile by tile; what is left is held against the residuals, and gives the share by
 //! least squares. Errors of a view go together (its camera, its gain), so views make the error of the share (White 1980,
-//! with clusters).
+//! with clusters), and so do the few pixels that count as independent.
 
 use super::lobe_widths::{KeptStencil, WidthStencil};
 use super::round::log_widths;
@@ -17,10 +17,14 @@ const TAIL: f64 = 3.0;
 const STEP: f64 = 0.1;
 /// Determinants smaller than this, relative, do not tell diffuse reflectance from F0.
 const LEAST_DETERMINANT: f64 = 1e-6;
-/// From this share on lobes have tails: scenes whose lobes are the model's had at most .03, one with GGX .34.
-const LEAST_SHARE: f64 = 0.1;
-/// And from so many standard errors on.
-const LEAST_ERRORS: f64 = 3.0;
+/// From this share on lobes have tails. Seven scenes of the model's own lobes had -.08 to .01 on photos of 128 pixels and
+/// more, one with GGX .34. On those of the hard cases (48 pixels, eight seeds) these three tell five of eight with GGX and none of 160 others;
+/// they were chosen there.
+const LEAST_SHARE: f64 = 0.2;
+/// And from so many standard errors on,
+const LEAST_ERRORS: f64 = 2.5;
+/// where the error is at most this: what is less sure has hardly seen a lobe that may have a tail.
+const MOST_ERROR: f64 = 0.25;
 /// Fewer views do not tell how they differ.
 const LEAST_VIEWS: usize = 4;
 
@@ -36,7 +40,7 @@ pub struct LobeTails {
 impl LobeTails {
     /// Whether lobes have tails, beyond doubt and enough to matter.
     pub fn are_there(&self) -> bool {
-        self.share >= LEAST_SHARE && self.share >= LEAST_ERRORS * self.error
+        self.share >= LEAST_SHARE && self.share >= LEAST_ERRORS * self.error && self.error <= MOST_ERROR
     }
 }
 
@@ -57,8 +61,9 @@ impl TailSums {
         }
     }
 
-    /// The share. `None` where hardly any view sees a lobe.
-    pub(super) fn tails(&self) -> Option<LobeTails> {
+    /// The share. `None` where hardly any view sees a lobe. `independence` is the share of pixels that count as independent
+    /// evidence: lobes as wide as can be have no tails, and what little they say of them is what else is wrong.
+    pub(super) fn tails(&self, independence: f64) -> Option<LobeTails> {
         let seeing: Vec<[f64; 2]> = self.0.iter().copied().filter(|own| own[1] > 0.0).collect();
         let [pull, precision] = seeing.iter().fold([0.0; 2], |sum, own| [sum[0] + own[0], sum[1] + own[1]]);
         let share = pull / precision;
@@ -67,7 +72,8 @@ impl TailSums {
         }
         let count = seeing.len() as f64;
         let squares: f64 = seeing.iter().map(|own| (own[0] - share * own[1]).powi(2)).sum();
-        Some(LobeTails { share, error: (squares * count / (count - 1.0)).sqrt() / precision })
+        let of_views = (squares * count / (count - 1.0)).sqrt() / precision;
+        Some(LobeTails { share, error: of_views.hypot(1.0 / (independence * precision).sqrt()) })
     }
 }
 
@@ -187,7 +193,7 @@ mod tests {
     /// and widths that are a little off, seen by eight views.
     fn tile_with_tails(share: f64) -> Tile {
         let mut tile = tile(TRUTH);
-        tile.noise = 1e-4;
+        tile.noise = 1e-6;
         let nodes = log_widths();
         for pixel in &mut tile.pixels {
             let (rho, specular, log_width) = TRUTH[pixel.texel];
@@ -219,7 +225,7 @@ mod tests {
     #[test]
     fn the_share_of_tails_is_found_whatever_reflectances_and_widths_are_off_by() {
         for share in [0.0, 0.05, 0.3] {
-            let tails = tile_with_tails(share).tail_sums(8).tails().unwrap();
+            let tails = tile_with_tails(share).tail_sums(8).tails(0.05).unwrap();
             assert!((tails.share - share).abs() < 0.02, "{share}: {tails:?}");
             assert!(tails.error < 0.02, "{tails:?}");
             assert_eq!(tails.are_there(), share == 0.3);
@@ -229,14 +235,17 @@ mod tests {
     #[test]
     fn what_few_views_say_is_doubted() {
         // Three of eight views see tails, the others none.
-        let (with, without) = (tile_with_tails(0.8), tile_with_tails(0.0));
+        let (with, without) = (tile_with_tails(1.5), tile_with_tails(0.0));
         let mut sums = without.tail_sums(8);
         sums.0[..3].copy_from_slice(&with.tail_sums(8).0[..3]);
-        let tails = sums.tails().unwrap();
-        assert!(tails.share > LEAST_SHARE && tails.error > 0.3 * tails.share && !tails.are_there(), "{tails:?}");
+        let tails = sums.tails(0.05).unwrap();
+        assert!(tails.share > LEAST_SHARE && tails.error > 0.4 * tails.share && !tails.are_there(), "{tails:?}");
         // Three views alone are too few to tell, and so are those that see nothing.
         let mut few = TailSums::new(8);
         few.0[..3].copy_from_slice(&sums.0[..3]);
-        assert_eq!((few.tails(), TailSums::new(8).tails(), Tile::default().tail_sums(4).tails()), (None, None, None));
+        assert_eq!(
+            (few.tails(0.05), TailSums::new(8).tails(0.05), Tile::default().tail_sums(4).tails(0.05)),
+            (None, None, None)
+        );
     }
 }

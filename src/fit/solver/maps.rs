@@ -121,7 +121,7 @@ impl SolverScene {
             light_unknowns: 0,
             view_errors: errors.of_views(&self.views),
             choices,
-            tails: tails.tails(),
+            tails: tails.tails(self.settings.independence),
         })
     }
 
