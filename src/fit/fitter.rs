@@ -59,7 +59,7 @@ pub struct Fitter {
     pub(super) light_known: LightKnown,
     /// What judging views say of the model's freedoms; `None` under Adam and before the maps of full size.
     pub(super) choices: Option<Arc<Choices>>,
-    /// What the last maps that the solver made say of tails of lobes.
+    /// What the last maps that the solver made say of tails of lobes; no checkpoint holds it.
     pub(super) tails: Option<LobeTails>,
 }
 
@@ -258,7 +258,8 @@ impl Fitter {
         events.chain(counts).chain(self.setting_findings()).chain(self.tail_finding()).collect()
     }
 
-    /// That lobes have tails which the model's do not have, where the solver's maps show them.
+    /// That lobes have tails which the model's do not have, where maps that the solver made since the fit was started or
+    /// taken up show them.
     pub fn tail_finding(&self) -> Option<Finding> {
         let tails = self.tails.filter(LobeTails::are_there)?;
         let message = format!(

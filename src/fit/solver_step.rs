@@ -58,7 +58,9 @@ impl Fitter {
         if let Some(choices) = report.choices.take() {
             self.choices = Some(Arc::new(choices));
         }
-        self.tails = report.tails.or(self.tails);
+        if stage.kind == StageKind::Maps {
+            self.tails = report.tails;
+        }
         self.figures.keep_errors(&report.view_errors);
         self.figures.keep_errors(&of_views);
         self.state.seconds += began.elapsed().as_secs_f64();
