@@ -17,7 +17,7 @@ const TAIL: f64 = 3.0;
 const STEP: f64 = 0.1;
 /// Determinants smaller than this, relative, do not tell diffuse reflectance from F0.
 const LEAST_DETERMINANT: f64 = 1e-6;
-/// From this share on lobes have tails. Seven scenes of the model's own lobes had -.08 to .01 on photos of 128 pixels and
+/// From this share on lobes have tails. Seven scenes of the model's own lobes had -.08 to .01 on photos of 120 pixels and
 /// more, one with GGX .34. On the hard cases (48 pixels, eight seeds) this and the next two tell five of eight with GGX and
 /// none of 160 others; they were chosen there.
 const LEAST_SHARE: f64 = 0.2;
@@ -165,6 +165,7 @@ impl Tile {
         sums
     }
 
+    /// Those of pixels, with the lobe of the texel that each covers most.
     fn tail_regressors(&self, pixels: &[&TilePixel]) -> Vec<[Regressors; 3]> {
         let nodes = log_widths();
         let mut stencils = vec![LobeStencils::default(); self.texels.len()];
@@ -198,7 +199,7 @@ mod tests {
         for pixel in &mut tile.pixels {
             let (rho, specular, log_width) = TRUTH[pixel.texel];
             pixel.view %= 8;
-            // As much light in each view as another: views differ, but not in their tails.
+            // Views differ in how bright lobes are, but not in their tails.
             let bright = 1.0 + 0.1 * pixel.view as f32;
             for terms in pixel.terms.base.iter_mut().chain(&mut pixel.terms.grazing) {
                 terms.iter_mut().for_each(|value| *value *= bright);

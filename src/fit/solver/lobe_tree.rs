@@ -101,12 +101,12 @@ struct Tree<'a> {
     evidence: Evidence,
     prior: &'a LobePrior,
     /// Small groups that were grown. Cuts by colour of all sizes lead to them again and again: where a colour fills a
-    /// square, they are those of the square itself. On photographs of a statue a third of all groups are left to grow.
+    /// square, they are those of the square itself. On photographs of a statue that halves what asking all groups takes.
     kept: RefCell<HashMap<GroupKey, Rc<Node>>>,
 }
 
 impl Tree<'_> {
-    /// The tree below a group of texels of a square.
+    /// The tree below a group of texels of a square, kept or grown.
     fn grow(&self, texels: Vec<u32>, corner: (u16, u16), side: usize, by_colour: bool) -> Rc<Node> {
         let by_colour = by_colour && side >= LEAST_SIDE_TO_CLUSTER;
         if side > MOST_SIDE_TO_KEEP {
