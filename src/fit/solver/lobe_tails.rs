@@ -7,6 +7,7 @@
 //! least squares. Errors of a view go together (its camera, its gain), so views make the error of the share (White 1980,
 //! with clusters), and so do the few pixels that count as independent.
 
+use super::choice::clustered::ClusteredMean;
 use super::lobe_widths::{KeptStencil, WidthStencil};
 use super::round::log_widths;
 use super::tile::{Tile, TilePixel};
@@ -64,16 +65,11 @@ impl TailSums {
     /// The share. `None` where hardly any view sees a lobe. `independence` is the share of pixels that count as independent
     /// evidence: lobes as wide as can be have no tails, and what little they say of them is what else is wrong.
     pub(super) fn tails(&self, independence: f64) -> Option<LobeTails> {
-        let seeing: Vec<[f64; 2]> = self.0.iter().copied().filter(|own| own[1] > 0.0).collect();
-        let [pull, precision] = seeing.iter().fold([0.0; 2], |sum, own| [sum[0] + own[0], sum[1] + own[1]]);
-        let share = pull / precision;
-        if seeing.len() < LEAST_VIEWS || !share.is_finite() {
-            return None;
-        }
-        let count = seeing.len() as f64;
-        let squares: f64 = seeing.iter().map(|own| (own[0] - share * own[1]).powi(2)).sum();
-        let of_views = (squares * count / (count - 1.0)).sqrt() / precision;
-        Some(LobeTails { share, error: of_views.hypot(1.0 / (independence * precision).sqrt()) })
+        let mut mean = ClusteredMean::default();
+        self.0.iter().for_each(|&[pull, precision]| mean.add_view(pull, precision));
+        let by_pixels = 1.0 / (independence * mean.pixels()).sqrt();
+        let tails = LobeTails { share: mean.mean(), error: mean.deviation().hypot(by_pixels) };
+        (mean.views() >= LEAST_VIEWS && tails.share.is_finite()).then_some(tails)
     }
 }
 

@@ -45,19 +45,24 @@ impl ClusteredMean {
         if self.pixels > 0.0 { self.sum / self.pixels } else { 0.0 }
     }
 
-    /// The standard error of the mean: the true mean lies within one of it with a probability of 0.68. Infinite with less
-    /// than two views.
-    ///
-    /// With few views the deviation itself is known badly, so it is as much larger as the middle 68 % of Student's
-    /// distribution are wider than those of the normal one.
-    pub fn standard_error(&self) -> f64 {
+    /// The standard deviation of the mean, as views differ; infinite with less than two.
+    pub fn deviation(&self) -> f64 {
         if self.views < 2 {
             return f64::INFINITY;
         }
         let (mean, views) = (self.mean(), self.views as f64);
         let deviations = self.sum_squared - 2.0 * mean * self.sum_times_pixels + mean * mean * self.pixels_squared;
         let variance = views / (views - 1.0) * deviations.max(0.0) / (self.pixels * self.pixels);
-        variance.sqrt() * widening(self.views - 1)
+        variance.sqrt()
+    }
+
+    /// The standard error of the mean: the true mean lies within one of it with a probability of 0.68. Infinite with less
+    /// than two views.
+    ///
+    /// With few views the deviation itself is known badly, so it is as much larger as the middle 68 % of Student's
+    /// distribution are wider than those of the normal one.
+    pub fn standard_error(&self) -> f64 {
+        if self.views < 2 { f64::INFINITY } else { self.deviation() * widening(self.views - 1) }
     }
 }
 
