@@ -27,7 +27,7 @@ pub struct JobHandle {
     pub commands: Sender<Command>,
     /// Where events come from.
     pub events: Receiver<Event>,
-    /// The newest maps and light.
+    /// The newest maps and light; while a fit runs, newer ones are put once these were looked at.
     pub snapshot: Arc<Slot<Snapshot>>,
     pub(super) stop: Arc<AtomicBool>,
     pub(super) thread: Option<JoinHandle<()>>,

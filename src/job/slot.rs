@@ -1,29 +1,47 @@
-//! A cell for the newest value: writing replaces, reading clones a pointer, nobody waits for work.
+//! A cell for the newest value: writing replaces, reading clones a pointer, nobody waits for work. Who writes can ask
+//! whether the last value was looked at, so that no value is made for nobody.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A cell that holds the newest of a series of values.
 #[derive(Debug)]
-pub struct Slot<T>(Mutex<(u64, Option<Arc<T>>)>);
+pub struct Slot<T>(Mutex<Cell<T>>);
+
+#[derive(Debug)]
+struct Cell<T> {
+    number: u64,
+    value: Option<Arc<T>>,
+    is_seen: bool,
+}
 
 impl<T> Default for Slot<T> {
     fn default() -> Self {
-        Slot(Mutex::new((0, None)))
+        Slot(Mutex::new(Cell { number: 0, value: None, is_seen: true }))
     }
 }
 
 impl<T> Slot<T> {
     /// Replaces the value.
     pub fn put(&self, value: T) {
-        // A panic elsewhere cannot leave a pointer half-written, so a poisoned lock is still good.
-        let mut cell = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        *cell = (cell.0 + 1, Some(Arc::new(value)));
+        let mut cell = self.cell();
+        *cell = Cell { number: cell.number + 1, value: Some(Arc::new(value)), is_seen: false };
     }
 
     /// The newest value and its number in the series, from 1; `None` before the first.
     pub fn newest(&self) -> Option<(u64, Arc<T>)> {
-        let cell = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        cell.1.as_ref().map(|value| (cell.0, Arc::clone(value)))
+        let mut cell = self.cell();
+        cell.is_seen = true;
+        cell.value.as_ref().map(|value| (cell.number, Arc::clone(value)))
+    }
+
+    /// Whether somebody has looked since the last value was put; true before the first.
+    pub fn is_seen(&self) -> bool {
+        self.cell().is_seen
+    }
+
+    fn cell(&self) -> MutexGuard<'_, Cell<T>> {
+        // A panic elsewhere cannot leave a pointer half-written, so a poisoned lock is still good.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -38,5 +56,17 @@ mod tests {
         slot.put(1);
         slot.put(2);
         assert_eq!(slot.newest().map(|(number, value)| (number, *value)), Some((2, 2)));
+    }
+
+    #[test]
+    fn a_value_is_seen_once_somebody_has_looked() {
+        let slot = Slot::default();
+        assert!(slot.is_seen());
+        slot.put(1);
+        assert!(!slot.is_seen());
+        slot.newest();
+        assert!(slot.is_seen());
+        slot.put(2);
+        assert!(!slot.is_seen());
     }
 }

@@ -173,7 +173,8 @@ impl SolverScene {
         let block_seconds = began.elapsed().as_secs_f64();
         let residuals = solved.iter().map(|(_, work)| work.solution.residual).collect();
         let mut tile = Tile::new(round, first, self.settings.map_size, solved);
-        tile.solve(self.settings.map_size, self.observations.mean, self.settings.independence, lobes);
+        let beliefs = (lobes, self.settings.lobe_trees);
+        tile.solve(self.settings.map_size, self.observations.mean, self.settings.independence, beliefs);
         let alternatives = check.map(|check| check.of_tile(self, &mut tile));
         let rows =
             tile.pixels().map(|(index, lobe, weight, _)| (index, self.row(round, index, lobe, weight))).collect();

@@ -165,16 +165,24 @@ impl Tile {
     }
 
     /// Solves reflectances and lobes in turn, and at the end F0 of each texel by itself as far as its pixels tell it.
-    /// `independence` is the share of pixels that count as independent evidence, at most (`tile_independence`).
-    pub fn solve(&mut self, map_size: usize, mean_radiance: f32, independence: f64, prior: &LobePrior) {
+    /// `independence` is the share of pixels that count as independent evidence, at most (`tile_independence`), `trees`
+    /// how many trees tell which texels share a lobe at the end ([`super::lobe_tree`]).
+    pub fn solve(
+        &mut self,
+        map_size: usize,
+        mean_radiance: f32,
+        independence: f64,
+        (prior, trees): (&LobePrior, usize),
+    ) {
         if self.pixels.is_empty() {
             return;
         }
-        for _ in 0..PASSES {
+        for pass in 0..PASSES {
             self.set_lobes();
             self.solve_diffuse();
             self.weigh(mean_radiance);
-            self.solve_lobes(map_size, self.independence(independence), prior);
+            let trees = if pass + 1 < PASSES { 1 } else { trees };
+            self.solve_lobes(map_size, self.independence(independence), (prior, trees));
         }
         self.end(mean_radiance, independence);
     }
