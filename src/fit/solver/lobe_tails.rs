@@ -23,7 +23,7 @@ const LEAST_DETERMINANT: f64 = 1e-6;
 /// none of 160 others; they were chosen there.
 const LEAST_SHARE: f64 = 0.2;
 /// And from so many standard errors on,
-const LEAST_ERRORS: f64 = 2.5;
+const LEAST_ERRORS: f64 = 2.3;
 /// where the error is at most this: what is less sure has hardly seen a lobe that may have a tail.
 const MOST_ERROR: f64 = 0.25;
 /// Fewer views do not tell how they differ.
