@@ -2,8 +2,8 @@
 //!
 //! A job owns a thread. [`Command`]s go in, [`Event`]s come out, and a [`Slot`] holds the newest [`Snapshot`] of maps and
 //! light: a watcher that is slow misses steps, never the last state, and never slows the fit; without one none are made
-//! between the first and the last. The command line
-//! and the window drive the same job, so neither can do what the other cannot.
+//! between the first and the last. The command line and the window drive the same job, so neither can do what the other
+//! cannot.
 //!
 //! [`open`] opens scenes and runs, begins fits and takes them up; [`prepare`] turns a scene into a surface with an atlas,
 //! [`worker`] is the thread and [`handle`] what a watcher holds of it, `save` keeps the run folder whole while it runs,

@@ -172,7 +172,7 @@ impl Worker {
                 self.set_paused(true);
             }
             // While it holds, what is seen is what a single step did. Else nothing is made for nobody: without a window
-            // pictures of a fit of photographs took 6 of its 100 s. The solver's steps are few, and each is shown.
+            // pictures of a fit of photographs took 4 of its 96 s. The solver's steps are few, and each is shown.
             let is_large_step = self.fitter.stage().is_some_and(|stage| stage.kind.is_of_solver());
             let is_due = is_large_step || last_snapshot.elapsed() > SNAPSHOT_INTERVAL;
             if self.paused || (is_due && self.snapshot.is_seen()) {

@@ -137,19 +137,16 @@ pub fn with_families_of(estimate: &Estimate) -> LobePrior {
     let samples: Vec<Sample> = known.into_iter().step_by(step).collect();
     let clusters = clusters(&samples);
     let Some(log_width) = widths_of_scene(estimate) else { return any };
-    let LobePrior { mut families, keep } = any;
-    let of_scene = families.iter().map(|family| LobeFamily { log_width, reach: REACH, ..family.scaled(SCENE_SHARE) });
-    let of_scene: Vec<LobeFamily> = of_scene.collect();
-    families.iter_mut().for_each(|family| *family = family.scaled(1.0 - SCENE_SHARE));
-    families.extend(of_scene);
     // Texels that are known well are no fair sample of the surface: shares go with the root of their number.
     let total: f64 = clusters.iter().map(|cluster| cluster.count.sqrt()).sum();
-    if total > 0.0 {
-        families.iter_mut().for_each(|family| *family = family.scaled(ANY_SHARE));
-        let share = |cluster: &Sums| (1.0 - ANY_SHARE) * cluster.count.sqrt() / total;
-        families.extend(clusters.iter().map(|cluster| cluster.family(share(cluster))));
-    }
-    LobePrior { families, keep }
+    let of_any = if total > 0.0 { ANY_SHARE } else { 1.0 };
+    let both = |family: &LobeFamily| {
+        let of_scene = LobeFamily { log_width, reach: REACH, ..family.scaled(of_any * SCENE_SHARE) };
+        [family.scaled(of_any * (1.0 - SCENE_SHARE)), of_scene]
+    };
+    let of_cluster = |cluster: &Sums| cluster.family((1.0 - ANY_SHARE) * cluster.count.sqrt() / total);
+    let families = any.families.iter().flat_map(both).chain(clusters.iter().map(of_cluster)).collect();
+    LobePrior { families, keep: any.keep }
 }
 
 impl LobeFamily {
