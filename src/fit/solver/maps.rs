@@ -173,7 +173,7 @@ impl SolverScene {
         let block_seconds = began.elapsed().as_secs_f64();
         let residuals = solved.iter().map(|(_, work)| work.solution.residual).collect();
         let mut tile = Tile::new(round, first, self.settings.map_size, solved);
-        let beliefs = (lobes, self.settings.lobe_trees);
+        let beliefs = (lobes, self.settings.lobe_sharing);
         tile.solve(self.settings.map_size, self.observations.mean, self.settings.independence, beliefs);
         let alternatives = check.map(|check| check.of_tile(self, &mut tile));
         let rows =

@@ -8,6 +8,7 @@
 use super::block::PixelTerms;
 use super::lobe_evidence::LobeBelief;
 use super::lobe_prior::LobePrior;
+use super::lobe_tree::LobeSharing;
 use super::round::{BlockWork, Round};
 use std::ops::Range;
 
@@ -165,14 +166,14 @@ impl Tile {
     }
 
     /// Solves reflectances and lobes in turn, and at the end F0 of each texel by itself as far as its pixels tell it.
-    /// `independence` is the share of pixels that count as independent evidence, at most (`tile_independence`), `trees`
-    /// how many trees tell which texels share a lobe at the end ([`super::lobe_tree`]).
+    /// `independence` is the share of pixels that count as independent evidence, at most (`tile_independence`), `sharing`
+    /// which ways of sharing lobes are looked at in the end; before that it is one tree.
     pub fn solve(
         &mut self,
         map_size: usize,
         mean_radiance: f32,
         independence: f64,
-        (prior, trees): (&LobePrior, usize),
+        (prior, sharing): (&LobePrior, LobeSharing),
     ) {
         if self.pixels.is_empty() {
             return;
@@ -181,8 +182,8 @@ impl Tile {
             self.set_lobes();
             self.solve_diffuse();
             self.weigh(mean_radiance);
-            let trees = if pass + 1 < PASSES { 1 } else { trees };
-            self.solve_lobes(map_size, self.independence(independence), (prior, trees));
+            let trees = if pass + 1 < PASSES { 1 } else { sharing.trees };
+            self.solve_lobes(map_size, self.independence(independence), (prior, LobeSharing { trees, ..sharing }));
         }
         self.end(mean_radiance, independence);
     }

@@ -6,7 +6,7 @@
 use super::cell_sums::System;
 use super::lobe_evidence::{LobeBelief, LobeSumsOfGroup};
 use super::lobe_prior::LobePrior;
-use super::lobe_tree::{TreeTexel, beliefs};
+use super::lobe_tree::{LobeSharing, TreeTexel, beliefs};
 use super::lobe_widths::{KeptStencil, LOBE_WIDTHS, weighed_log_widths, weighed_stencils};
 use super::round::log_widths;
 use super::tile::{TILE, Tile};
@@ -52,8 +52,13 @@ impl Tile {
     }
 
     /// What is believed of the lobes, from what is left of the pixels. `independence` is the share of pixels that count as
-    /// independent evidence, `trees` how many trees tell which texels share a lobe.
-    pub(super) fn solve_lobes(&mut self, map_size: usize, independence: f64, (prior, trees): (&LobePrior, usize)) {
+    /// independent evidence, `sharing` which ways of sharing lobes are looked at.
+    pub(super) fn solve_lobes(
+        &mut self,
+        map_size: usize,
+        independence: f64,
+        (prior, sharing): (&LobePrior, LobeSharing),
+    ) {
         let began = Instant::now();
         let scale = independence / self.noise;
         let count = self.texels.len();
@@ -104,7 +109,7 @@ impl Tile {
             .collect();
         self.seconds[0] += began.elapsed().as_secs_f64();
         let began = Instant::now();
-        (self.lobes, self.one_lobe) = beliefs(&texels, &sums, (TILE, trees), &widths, prior);
+        (self.lobes, self.one_lobe) = beliefs(&texels, &sums, TILE, &widths, (prior, sharing));
         self.seconds[1] += began.elapsed().as_secs_f64();
         for (LobeBelief { mean, square, .. }, rho) in self.lobes.iter_mut().zip(&self.rho) {
             for c in 0..3 {
@@ -198,7 +203,7 @@ pub(super) mod tests {
     fn a_metal_beside_paint_is_found_from_pixels_that_show_both() {
         let mut tile = tile([(0.3, 0.2, -0.7); 2]);
         for _ in 0..3 {
-            tile.solve(TILE, 1.0, 1.0, (&LobePrior::default(), 1));
+            tile.solve(TILE, 1.0, 1.0, (&LobePrior::default(), LobeSharing::QUICK));
         }
         for (texel, (rho, specular, log_width)) in TRUTH.into_iter().enumerate() {
             let (found, lobe) = (tile.rho[texel], tile.lobes[texel].mean);

@@ -8,6 +8,7 @@
 
 use super::super::block::MOST_NODES;
 use super::super::lobe_prior::LobePrior;
+use super::super::lobe_tree::LobeSharing;
 use super::super::tile::{Tile, forgiven, least_noise};
 use super::apply::ChosenLobe;
 use super::student::StudentNoise;
@@ -28,8 +29,8 @@ pub struct TileTerms<'a> {
     pub independence: f64,
     /// What is believed of lobes.
     pub prior: &'a LobePrior,
-    /// How many trees tell which texels share a lobe.
-    pub lobe_trees: usize,
+    /// Which ways of sharing lobes are looked at.
+    pub lobe_sharing: LobeSharing,
     /// Whether an observation, by its index, takes no part.
     pub is_withheld: &'a (dyn Fn(u32) -> bool + Sync),
     /// The light that reaches an observation directly; `None` where there is no other.
@@ -60,7 +61,7 @@ pub struct TileAlternatives {
 impl TileAlternatives {
     /// Solves the alternatives of a tile that is solved; it is left as it was.
     pub fn of(tile: &mut Tile, terms: &TileTerms) -> Self {
-        let &TileTerms { map_size, mean_radiance, independence, prior, lobe_trees, is_withheld, direct, keep_lobes } =
+        let &TileTerms { map_size, mean_radiance, independence, prior, lobe_sharing, is_withheld, direct, keep_lobes } =
             terms;
         let kept: Vec<_> =
             tile.pixels.iter().map(|pixel| (pixel.terms.weight, pixel.terms.arriving, pixel.lobe)).collect();
@@ -97,7 +98,7 @@ impl TileAlternatives {
         if any_withheld {
             tile.solve_diffuse();
             tile.weigh(mean_radiance);
-            tile.solve_lobes(map_size, tile.independence(independence), (prior, lobe_trees));
+            tile.solve_lobes(map_size, tile.independence(independence), (prior, lobe_sharing));
             tile.end(mean_radiance, independence);
         }
         let withheld_seconds = began.elapsed().as_secs_f64();

@@ -68,7 +68,7 @@ impl<'a> Check<'a> {
             mean_radiance: scene.observations.mean,
             independence: scene.settings.independence,
             prior: self.prior,
-            lobe_trees: scene.settings.lobe_trees,
+            lobe_sharing: scene.settings.lobe_sharing,
             is_withheld: &is_withheld,
             direct: has_bounces.then_some(&direct),
             keep_lobes: scene.settings.apply_choices,

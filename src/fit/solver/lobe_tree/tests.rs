@@ -17,10 +17,16 @@ fn sums(specular: f64, log_width: f64, precision: f64) -> LobeSumsOfGroup {
 }
 
 fn tile(of: impl Fn(usize, usize) -> (f64, f64, [f32; 3]), precision: f64) -> Vec<LobeBelief> {
-    by_trees(of, precision, 1)
+    shared(of, precision, LobeSharing::QUICK)
 }
 
+/// The same, with this many trees.
 fn by_trees(of: impl Fn(usize, usize) -> (f64, f64, [f32; 3]), precision: f64, trees: usize) -> Vec<LobeBelief> {
+    shared(of, precision, LobeSharing { trees, ..LobeSharing::QUICK })
+}
+
+/// Beliefs of 8 by 8 texels of F0, logarithm of the width and diffuse reflectance by row and column.
+fn shared(of: impl Fn(usize, usize) -> (f64, f64, [f32; 3]), precision: f64, sharing: LobeSharing) -> Vec<LobeBelief> {
     let mut texels = Vec::new();
     let mut all = Vec::new();
     for row in 0..8 {
@@ -30,7 +36,7 @@ fn by_trees(of: impl Fn(usize, usize) -> (f64, f64, [f32; 3]), precision: f64, t
             all.push(sums(specular, log_width, precision));
         }
     }
-    beliefs(&texels, &all, (8, trees), &weighed_log_widths(), &LobePrior::default()).0
+    beliefs(&texels, &all, 8, &weighed_log_widths(), (&LobePrior::default(), sharing)).0
 }
 
 #[test]
@@ -82,6 +88,42 @@ fn a_border_of_colour_that_no_quarter_follows_is_found() {
     }
 }
 
+/// Three materials in stripes, of the colours given.
+fn three_stripes(colours: [[f32; 3]; 3]) -> impl Fn(usize, usize) -> (f64, f64, [f32; 3]) {
+    let lobes = [(0.7, -0.5), (0.05, -2.0), (0.3, -1.2)];
+    move |row, column| {
+        let which = (row + column) % 3;
+        let (specular, log_width) = lobes[which];
+        (specular, log_width, colours[which])
+    }
+}
+
+const CUT_ONCE: LobeSharing = LobeSharing::QUICK;
+const CUT_TWICE: LobeSharing = LobeSharing { colour_cuts: 2, ..LobeSharing::QUICK };
+
+#[test]
+fn three_hues_are_told_apart_by_cutting_twice() {
+    let of = three_stripes([[0.1, 0.1, 0.1], [0.6, 0.2, 0.1], [0.1, 0.3, 0.6]]);
+    let error = |sharing: LobeSharing| {
+        let beliefs = shared(&of, 60.0, sharing);
+        let errors = beliefs.iter().enumerate().map(|(index, belief)| {
+            let (specular, _, _) = of(index / 8, index % 8);
+            (belief.mean[0] - specular).powi(2)
+        });
+        (errors.sum::<f64>() / 64.0).sqrt()
+    };
+    let (once, twice) = (error(CUT_ONCE), error(CUT_TWICE));
+    println!("cut once {once:.4}, twice {twice:.4}");
+    assert!(twice < 0.02 && once > 3.0 * twice, "cut once {once}, twice {twice}");
+}
+
+/// Grain is no material of its own: of one hue the lighter and the darker are told apart by the first cut alone.
+#[test]
+fn parts_of_one_hue_are_not_cut_again() {
+    let of = three_stripes([[0.1; 3], [0.5; 3], [0.7; 3]]);
+    assert_eq!(shared(&of, 60.0, CUT_ONCE), shared(&of, 60.0, CUT_TWICE));
+}
+
 #[test]
 fn a_lobe_does_not_outshine_what_is_seen() {
     // Light arrives alike through the lobe and diffusely, so pixels say how much is sent back in all, 0.1, and no more.
@@ -97,7 +139,7 @@ fn a_lobe_does_not_outshine_what_is_seen() {
         let family = LobeFamily { kinds: vec![kind], ..families[0] };
         let prior = LobePrior { families: vec![family], keep };
         let sums = vec![LobeSumsOfGroup(grey); texels.len()];
-        for belief in beliefs(&texels, &sums, (8, 1), &weighed_log_widths(), &prior).0 {
+        for belief in beliefs(&texels, &sums, 8, &weighed_log_widths(), (&prior, LobeSharing::QUICK)).0 {
             assert!(belief.mean[0] < 0.105, "{kind:?}: {belief:?}");
         }
     }
