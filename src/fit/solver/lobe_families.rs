@@ -6,24 +6,21 @@
 //! together by F0 and width, and each cluster that covers enough of the surface becomes a family of its own beside the one
 //! for any scene, with the diffuse reflectance that its texels have (empirical Bayes: Efron and Morris 1973).
 //!
-//! Widths of all texels, known well or not, tell besides how rough the scene is as a whole: their mean and spread are those
-//! of one more family, of the kinds that any scene has. That is a step of expectation maximisation on what is believed of
-//! widths, each time that maps are made (Dempster, Laird and Rubin 1977). Without it roughness leans on what other
-//! scenes have wherever pixels say little.
+//! All texels together tell besides what lobes of this scene are like as a whole (`lobe_scene`): one more family,
+//! of the kinds that any scene has.
 //!
 //! That uses what a texel's own pixels say twice, once in the cluster. So clusters are wide, and families of what any scene
 //! has keep half of what is believed.
 
 use super::estimate::Estimate;
 use super::lobe_prior::{LobeFamily, LobeKind, LobePrior};
+use super::lobe_scene::SceneLobes;
 use crate::material::texels::Texel;
 
 /// Share of the prior that is left to kinds of surface that any scene has,
 const ANY_SHARE: f64 = 0.5;
-/// and the share of that with the widths that this scene has shown.
+/// and the share of that for lobes as this scene has shown them.
 const SCENE_SHARE: f64 = 0.8;
-/// Least standard deviation of the logarithm of the width over a scene. Maps that lean on what is believed differ too little.
-const LEAST_SCENE_SPREAD: f64 = 0.2;
 /// Most families.
 const MOST: usize = 6;
 /// Texels from which clusters are made, at most.
@@ -39,7 +36,7 @@ const SIZE: (f64, f64) = (0.12, 0.3);
 /// Least standard deviations of a family: of F0 relative to itself, of diffuse reflectance, of the logarithm of the width.
 const LEAST: (f64, f64, f64) = (0.08, 0.06, 0.15);
 /// Standard deviations from its middle within which a family's widths are looked at.
-const REACH: f64 = 3.0;
+pub(super) const REACH: f64 = 3.0;
 /// Texels that each cluster is begun from, of which the best is taken.
 const SEEDS: usize = 64;
 /// Rounds in which clusters find their middle.
@@ -123,7 +120,7 @@ impl Sums {
     }
 }
 
-/// What is believed of lobes once maps were made: the prior for any scene, the same with the widths of this one, and a
+/// What is believed of lobes once maps were made: the prior for any scene, the same with lobes as this one has them, and a
 /// family for each kind of surface that maps show. Without maps it is the prior for any scene.
 pub fn with_families_of(estimate: &Estimate) -> LobePrior {
     let any = LobePrior::default();
@@ -136,13 +133,12 @@ pub fn with_families_of(estimate: &Estimate) -> LobePrior {
     let step = known.len().div_ceil(SAMPLES).max(1);
     let samples: Vec<Sample> = known.into_iter().step_by(step).collect();
     let clusters = clusters(&samples);
-    let Some(log_width) = widths_of_scene(estimate) else { return any };
+    let Some(scene) = SceneLobes::of(estimate) else { return any };
     // Texels that are known well are no fair sample of the surface: shares go with the root of their number.
     let total: f64 = clusters.iter().map(|cluster| cluster.count.sqrt()).sum();
     let of_any = if total > 0.0 { ANY_SHARE } else { 1.0 };
     let both = |family: &LobeFamily| {
-        let of_scene = LobeFamily { log_width, reach: REACH, ..family.scaled(of_any * SCENE_SHARE) };
-        [family.scaled(of_any * (1.0 - SCENE_SHARE)), of_scene]
+        [family.scaled(of_any * (1.0 - SCENE_SHARE)), scene.family(family).scaled(of_any * SCENE_SHARE)]
     };
     let of_cluster = |cluster: &Sums| cluster.family((1.0 - ANY_SHARE) * cluster.count.sqrt() / total);
     let families = any.families.iter().flat_map(both).chain(clusters.iter().map(of_cluster)).collect();
@@ -155,51 +151,6 @@ impl LobeFamily {
         let scaled = |kind: &LobeKind| LobeKind { share: share * kind.share, ..*kind };
         LobeFamily { kinds: self.kinds.iter().map(scaled).collect(), ..*self }
     }
-}
-
-/// Mean and standard deviation of the logarithm of the width over all texels that have a lobe. `None` without any.
-fn widths_of_scene(estimate: &Estimate) -> Option<(f64, f64)> {
-    let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
-    for (texel, variance) in estimate.texels.iter().zip(&estimate.variances).filter(|(_, variance)| variance[7] > 0.0) {
-        let log_width = f64::from(texel[6]);
-        count += 1.0;
-        sum += log_width;
-        squares += log_width * log_width + f64::from(variance[6]);
-    }
-    if count == 0.0 {
-        return None;
-    }
-    let mean = sum / count;
-    let (mean, deviation) = normal_with_moments_below_zero(mean, squares / count - mean * mean);
-    Some((mean, deviation.max(LEAST_SCENE_SPREAD)))
-}
-
-/// Mean and standard deviation of the normal distribution whose part below zero has this mean and variance: no lobe is
-/// wider than 1.
-fn normal_with_moments_below_zero(mean: f64, variance: f64) -> (f64, f64) {
-    // Logarithms of widths from minus this on are summed over.
-    const SPAN: f64 = 5.0;
-    const STEPS: usize = 500;
-    const ROUNDS: usize = 50;
-    // As narrow as the steps tell apart.
-    const LEAST_VARIANCE: f64 = 1e-4;
-    let variance = variance.max(LEAST_VARIANCE);
-    let (mut own_mean, mut own_variance) = (mean, variance);
-    for _ in 0..ROUNDS {
-        let [mut total, mut sum, mut squares] = [0.0; 3];
-        for step in 0..STEPS {
-            let x = -SPAN * (step as f64 + 0.5) / STEPS as f64;
-            let weight = (-0.5 * (x - own_mean).powi(2) / own_variance).exp();
-            total += weight;
-            sum += weight * x;
-            squares += weight * x * x;
-        }
-        let below = sum / total;
-        own_mean = (own_mean + mean - below).clamp(-SPAN, 0.0);
-        let of_part = (squares / total - below * below).max(1e-9);
-        own_variance = (own_variance * variance / of_part).clamp(LEAST_VARIANCE, 1.0);
-    }
-    (own_mean, own_variance.sqrt())
 }
 
 /// Clusters of at most a given size, the largest first: each begins where most texels are that no other has.
@@ -234,14 +185,14 @@ fn clusters(samples: &[Sample]) -> Vec<Sums> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::image::Image;
     use crate::light::Environment;
     use glam::Vec3;
 
     /// Maps of two materials in stripes, and texels whose lobe is not known.
-    fn estimate() -> Estimate {
+    pub(in super::super) fn estimate() -> Estimate {
         let light = Environment { radiance: Image::filled(4, 2, Vec3::ONE) };
         let mut estimate = Estimate::start(32, &light, 1);
         for texel in 0..32 * 32 {
@@ -273,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn the_widths_of_all_texels_are_a_family_of_the_scene() {
+    fn all_texels_together_are_a_family_of_the_scene() {
         // A quarter at -0.7, half at -1.2, a quarter at -0.3 that is hardly known (a variance of 0.5): all together -0.85 with
         // a deviation of 0.52 below zero, so a whole normal distribution is wider and lies further up.
         let families = with_families_of(&estimate()).families;
@@ -282,20 +233,9 @@ mod tests {
         assert!((-0.75..-0.6).contains(&mean) && (0.6..0.7).contains(&deviation), "{scene:?}");
         assert_eq!(any.log_width, LobePrior::default().families[0].log_width);
         for (own, whole) in any.kinds.iter().zip(&scene.kinds) {
-            assert_eq!(LobeKind { share: 0.0, ..*own }, LobeKind { share: 0.0, ..*whole });
+            assert_eq!(own.diffuse, whole.diffuse);
             assert!((own.share / whole.share - (1.0 - SCENE_SHARE) / SCENE_SHARE).abs() < 1e-9);
         }
-    }
-
-    #[test]
-    fn a_normal_distribution_is_known_by_its_part_below_zero() {
-        // The part below zero of (-0.6, 0.5): by the density and the distribution at 1.2, phi / Phi = 0.21942.
-        let ratio = 0.21942f64;
-        let (mean, variance) = (-0.6 - 0.5 * ratio, 0.25 * (1.0 - 1.2 * ratio - ratio * ratio));
-        let (own_mean, deviation) = normal_with_moments_below_zero(mean, variance);
-        assert!((own_mean + 0.6).abs() < 2e-3 && (deviation - 0.5).abs() < 2e-3, "{own_mean} {deviation}");
-        let (own_mean, deviation) = normal_with_moments_below_zero(-2.0, 0.04);
-        assert!((own_mean + 2.0).abs() < 1e-3 && (deviation - 0.2).abs() < 1e-3, "{own_mean} {deviation}");
     }
 
     #[test]
