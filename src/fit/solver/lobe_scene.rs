@@ -11,7 +11,8 @@ use super::lobe_prior::{LobeFamily, LobeKind};
 
 /// Least standard deviation of the logarithm of the width over a scene. Maps that lean on what is believed differ too little.
 const LEAST_WIDTH_SPREAD: f64 = 0.2;
-/// A texel of a mean F0 below this is a dielectric: diamond has 0.17, glass 0.04.
+/// A texel of a mean F0 below this counts as a dielectric. Glass has 0.04; the few that have more, as diamond with 0.17, are
+/// no part of it, and metals have 0.4 and more.
 const MOST_OF_DIELECTRIC: f64 = 0.15;
 /// Least and most standard deviation of F0 among the dielectrics of a scene.
 const DIELECTRIC_SPREAD: [f64; 2] = [0.015, 0.04];

@@ -165,9 +165,8 @@ impl Tile {
         tile
     }
 
-    /// Solves reflectances and lobes in turn, and at the end F0 of each texel by itself as far as its pixels tell it.
-    /// `independence` is the share of pixels that count as independent evidence, at most (`tile_independence`), `sharing`
-    /// which ways of sharing lobes are looked at in the end; before that it is one tree.
+    /// Solves reflectances and lobes in turn, F0 of each texel by itself in the end. `independence` is the share of pixels
+    /// that count as independent evidence, at most, `sharing` how lobes are shared in the end; before it is one tree.
     pub fn solve(
         &mut self,
         map_size: usize,
