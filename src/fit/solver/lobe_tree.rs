@@ -104,7 +104,7 @@ struct GroupKey {
     corner: (u16, u16),
     side: usize,
     mask: u64,
-    colour_cuts: u8,
+    cuts_left: u8,
 }
 
 /// The beliefs of all texels of a tile of `side` texels (a power of two, 8 at least), and what would be believed of one
@@ -166,26 +166,26 @@ struct Tree<'a> {
 }
 
 impl Tree<'_> {
-    /// The tree below a group of texels of a square, kept or grown.
-    fn grow(&self, texels: Vec<u32>, corner: (u16, u16), side: usize, colour_cuts: u8) -> Rc<Node> {
-        let colour_cuts = if side >= LEAST_SIDE_TO_CLUSTER { colour_cuts } else { 0 };
+    /// The tree below a group of texels of a square, kept or grown, with so many cuts by colour left.
+    fn grow(&self, texels: Vec<u32>, corner: (u16, u16), side: usize, cuts_left: u8) -> Rc<Node> {
+        let cuts_left = if side >= LEAST_SIDE_TO_CLUSTER { cuts_left } else { 0 };
         if side > MOST_SIDE_TO_KEEP {
-            return Rc::new(self.grown(texels, corner, side, colour_cuts));
+            return Rc::new(self.grown(texels, corner, side, cuts_left));
         }
         let mask = texels.iter().fold(0u64, |mask, &texel| {
             let TreeTexel { row, column, .. } = self.texels[texel as usize];
             mask | 1 << (usize::from(row - corner.0) * side + usize::from(column - corner.1))
         });
-        let key = GroupKey { corner, side, mask, colour_cuts };
+        let key = GroupKey { corner, side, mask, cuts_left };
         let kept = self.kept.borrow().get(&key).cloned();
         kept.unwrap_or_else(|| {
-            let node = Rc::new(self.grown(texels, corner, side, colour_cuts));
+            let node = Rc::new(self.grown(texels, corner, side, cuts_left));
             self.kept.borrow_mut().insert(key, node.clone());
             node
         })
     }
 
-    fn grown(&self, texels: Vec<u32>, corner: (u16, u16), side: usize, colour_cuts: u8) -> Node {
+    fn grown(&self, texels: Vec<u32>, corner: (u16, u16), side: usize, cuts_left: u8) -> Node {
         // Maps may be finer than photos: what has no pixels adds nothing.
         let mut seen = texels.iter().map(|&texel| texel as usize).filter(|&texel| self.is_seen[texel]);
         let (log_leaf, leaf) = match seen.next() {
@@ -211,16 +211,16 @@ impl Tree<'_> {
                 .filter(|(_, quarter)| !quarter.is_empty())
                 .map(|(which, quarter)| {
                     let corner = (corner.0 + half * (which / 2) as u16, corner.1 + half * (which % 2) as u16);
-                    self.grow(quarter, corner, side / 2, colour_cuts)
+                    self.grow(quarter, corner, side / 2, cuts_left)
                 })
                 .collect();
             cuts.push(parts);
-            let cut = if colour_cuts == self.colour_cuts { FIRST_CUT } else { INNER_CUT };
-            if colour_cuts > 0
+            let cut = if cuts_left == self.colour_cuts { FIRST_CUT } else { INNER_CUT };
+            if cuts_left > 0
                 && texels.len() >= LEAST_TO_CLUSTER
                 && let Some(clusters) = self.two_colours(&texels, &cut)
             {
-                cuts.push(clusters.into_iter().map(|part| self.grow(part, corner, side, colour_cuts - 1)).collect());
+                cuts.push(clusters.into_iter().map(|part| self.grow(part, corner, side, cuts_left - 1)).collect());
             }
         }
         let log_evidence = if cuts.is_empty() {

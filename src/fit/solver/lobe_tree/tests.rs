@@ -39,6 +39,15 @@ fn shared(of: impl Fn(usize, usize) -> (f64, f64, [f32; 3]), precision: f64, sha
     beliefs(&texels, &all, 8, &weighed_log_widths(), (&LobePrior::default(), sharing)).0
 }
 
+/// Root mean squared error of F0 over 8 by 8 texels.
+fn error_of_specular(beliefs: &[LobeBelief], of: impl Fn(usize, usize) -> (f64, f64, [f32; 3])) -> f64 {
+    let errors = beliefs.iter().enumerate().map(|(index, belief)| {
+        let (specular, _, _) = of(index / 8, index % 8);
+        (belief.mean[0] - specular).powi(2)
+    });
+    (errors.sum::<f64>() / 64.0).sqrt()
+}
+
 #[test]
 fn texels_that_agree_share_a_lobe_and_are_surer_together() {
     let beliefs = tile(|_, _| (0.3, -1.2, [0.5; 3]), 20.0);
@@ -54,14 +63,7 @@ fn texels_that_agree_share_a_lobe_and_are_surer_together() {
 #[test]
 fn trees_whose_squares_end_elsewhere_find_a_border_that_one_misses() {
     let of = |_, column| (if column < 3 { 0.6 } else { 0.1 }, -1.2, [0.5; 3]);
-    let error = |trees: usize| {
-        let beliefs = by_trees(of, 60.0, trees);
-        let errors = beliefs.iter().enumerate().map(|(index, belief)| {
-            let (specular, _, _) = of(index / 8, index % 8);
-            (belief.mean[0] - specular).powi(2)
-        });
-        (errors.sum::<f64>() / 64.0).sqrt()
-    };
+    let error = |trees: usize| error_of_specular(&by_trees(of, 60.0, trees), of);
     let (one, four) = (error(1), error(MOST_TREES));
     println!("one tree {one:.4}, four {four:.4}");
     assert!(four < 0.8 * one, "one tree {one}, four {four}");
@@ -104,14 +106,7 @@ const CUT_TWICE: LobeSharing = LobeSharing { colour_cuts: 2, ..LobeSharing::QUIC
 #[test]
 fn three_hues_are_told_apart_by_cutting_twice() {
     let of = three_stripes([[0.1, 0.1, 0.1], [0.6, 0.2, 0.1], [0.1, 0.3, 0.6]]);
-    let error = |sharing: LobeSharing| {
-        let beliefs = shared(&of, 60.0, sharing);
-        let errors = beliefs.iter().enumerate().map(|(index, belief)| {
-            let (specular, _, _) = of(index / 8, index % 8);
-            (belief.mean[0] - specular).powi(2)
-        });
-        (errors.sum::<f64>() / 64.0).sqrt()
-    };
+    let error = |sharing: LobeSharing| error_of_specular(&shared(&of, 60.0, sharing), &of);
     let (once, twice) = (error(CUT_ONCE), error(CUT_TWICE));
     println!("cut once {once:.4}, twice {twice:.4}");
     assert!(twice < 0.02 && once > 3.0 * twice, "cut once {once}, twice {twice}");
