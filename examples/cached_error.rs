@@ -92,13 +92,7 @@ fn main() -> Result<()> {
                         &surface,
                         &transport.grid,
                         &scene.views[view].camera,
-                        view as u32,
-                        &FootprintSettings {
-                            map_size,
-                            coarse_side,
-                            lobe_rays: max_bounces > 1,
-                            ..FootprintSettings::default()
-                        },
+                        &FootprintSettings { map_size, coarse_side, ..FootprintSettings::default() },
                     );
                     hits += began.elapsed().as_secs_f64();
                     let began = Instant::now();

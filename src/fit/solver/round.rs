@@ -7,7 +7,7 @@ use super::observations::{Observation, Observations};
 use super::plan::Block;
 use crate::render::cached::irradiance::add_irradiance_row;
 use crate::render::cached::lobe_sum::{LobeSums, add_lobe_row, lobe_sums, lobe_with_derivative, wide_from};
-use crate::render::cached::{CachedTransport, LightPlanes, PointLight, ShadingPoint, ViewFootprints};
+use crate::render::cached::{CachedTransport, LightPlanes, PointLight, ShadingPoint, SurfaceLight, ViewFootprints};
 
 /// Widths that are looked at: evenly in the logarithm, closer where lobes are wide.
 pub const WIDTHS: [f32; MOST_NODES] = [0.02, 0.04, 0.075, 0.12, 0.18, 0.26, 0.37, 0.52, 0.73, 1.0];
@@ -61,6 +61,17 @@ pub fn open_prior(mean_radiance: f32, openness: f64) -> BlockPrior {
     }
 }
 
+/// Sum of products, in lanes that processors add at once.
+fn dot(a: &[f32], b: &[f32]) -> f32 {
+    const LANES: usize = 16;
+    let mut sums = [0.0f32; LANES];
+    for (a, b) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
+        (0..LANES).for_each(|lane| sums[lane] += a[lane] * b[lane]);
+    }
+    let rest = a.len() - a.len() % LANES;
+    sums.iter().sum::<f32>() + a[rest..].iter().zip(&b[rest..]).map(|(a, b)| a * b).sum::<f32>()
+}
+
 /// Logarithms of [`WIDTHS`].
 pub fn log_widths() -> [f64; MOST_NODES] {
     WIDTHS.map(|width| f64::from(width).ln())
@@ -108,17 +119,14 @@ impl Round<'_> {
     /// Fills in the lobe's integrals at these nodes.
     fn fill(&self, work: &mut BlockWork, nodes: std::ops::Range<usize>) {
         let mut sums = [LobeSums::default(); MOST_NODES];
+        let mut surface = SurfaceLight::default();
         for (&used, term) in work.used.iter().zip(&mut work.terms) {
             let point = self.point(&self.observations.list[used as usize]);
-            let place = self.transport.lobe_place(point);
-            let around = self.transport.lobe_surroundings(self.at_points, point);
+            let place = self.transport.lobe_place(point, self.at_points, &mut surface);
             let widths = &WIDTHS[nodes.clone()];
             lobe_sums(&self.transport.basis, &place, self.light, widths, &mut sums[..widths.len()]);
             for (node, sums) in nodes.clone().zip(&sums) {
-                for c in 0..3 {
-                    term.base[node][c] = sums.base[c] + sums.hidden[0] * around[c];
-                    term.grazing[node][c] = sums.grazing[c] + sums.hidden[1] * around[c];
-                }
+                (term.base[node], term.grazing[node]) = (sums.base, sums.grazing);
             }
         }
         work.nodes = if work.nodes.is_empty() {
@@ -214,6 +222,7 @@ impl Round<'_> {
         let solution = &work.solution;
         let width = solution.log_width.exp();
         let mut full = vec![0.0f32; basis.padded()];
+        let mut surface = SurfaceLight::default();
         let mut reduced = [(); 3].map(|()| vec![0.0f32; count]);
         for (row, &index) in used.iter().enumerate() {
             let term = &work.terms[index];
@@ -228,28 +237,27 @@ impl Round<'_> {
                 add_irradiance_row(basis, normal, self.transport.visibility.of(at as usize), weight, &mut full);
             }
             shape.reduce(&full, &mut reduced[0]);
-            let place = self.transport.lobe_place(point);
+            let place = self.transport.lobe_place(point, self.at_points, &mut surface);
             let mut sums = LobeSums::default();
+            // What the lobe sends of other surface: what is left of it without the light.
+            let mut of_surface = [[0.0f32; 3]; 2];
             if self.has_lobe {
+                sums = lobe_with_derivative(basis, &place, self.light, width);
                 for (which, scales) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
                     full.fill(0.0);
                     add_lobe_row(basis, &place, width, scales, &mut full);
                     shape.reduce(&full, &mut reduced[1 + which]);
+                    let all = [&sums.base, &sums.grazing][which];
+                    of_surface[which] = [0, 1, 2].map(|c| all[c] - dot(&full, &self.light.channels[c]));
                 }
-                sums = lobe_with_derivative(basis, &place, self.light, width);
             }
-            let around = self.transport.lobe_surroundings(self.at_points, point);
             let direct = self.interpolate(&self.at_points.direct, observation);
             let scale = f64::from(term.weight.sqrt()) / prior.noise;
             for (c, rows) in made.iter_mut().enumerate() {
                 let rho = solution.cells[usize::from(term.cell)][c];
                 let specular = solution.specular[c];
-                let base = sums.base[c] + sums.hidden[0] * around[c];
-                let d_width = specular * (sums.d_base[c] + sums.d_hidden[0] * around[c])
-                    + sums.d_grazing[c]
-                    + sums.d_hidden[1] * around[c];
-                let known =
-                    rho * (term.arriving[c] - direct[c]) + (specular * sums.hidden[0] + sums.hidden[1]) * around[c];
+                let d_width = specular * sums.d_base[c] + sums.d_grazing[c];
+                let known = rho * (term.arriving[c] - direct[c]) + specular * of_surface[0][c] + of_surface[1][c];
                 rows.right[row] = scale * f64::from(term.radiance[c] - known);
                 let scale32 = scale as f32;
                 let lobe = reduced[1].iter().zip(&reduced[2]).map(|(&b, &g)| scale32 * (specular * b + g));
@@ -257,7 +265,7 @@ impl Round<'_> {
                 let arriving = f64::from(term.arriving[c]);
                 rows.set_unknown(row, 0, scale * arriving);
                 rows.set_unknown(row, 1 + usize::from(term.cell), scale * arriving);
-                rows.set_unknown(row, 1 + cells, scale * f64::from(base));
+                rows.set_unknown(row, 1 + cells, scale * f64::from(sums.base[c]));
                 rows.set_unknown(row, 2 + cells, scale * f64::from(d_width));
             }
         }

@@ -90,6 +90,7 @@ impl SolverScene {
         let cached = CachedSettings {
             grid: settings.grid.min(settings.map_size),
             bounce_rays: settings.bounce_rays,
+            surface_rows: CachedSettings::default().surface_rows,
             max_bounces: settings.max_bounces,
             fine_shadows: settings.fine_edges,
             lobe_strength: 1.0,
@@ -101,16 +102,14 @@ impl SolverScene {
         };
         let first_hits = FootprintSettings {
             map_size: settings.map_size,
-            lobe_rays: settings.max_bounces > 1,
-            seed: settings.seed,
             ..if settings.fine_edges { FootprintSettings::default() } else { FootprintSettings::COARSE }
         };
         let traced = |target: &Target, sieve: Option<&Sieve>| {
-            let (grid, view) = (&transport.grid, target.view as u32);
+            let grid = &transport.grid;
             let wants = sieve.map(|sieve| move |pixel: u32, uv: Vec2| sieve.wants(pixel, uv));
             let wants = wants.as_ref().map(|wants| wants as &(dyn Fn(u32, Vec2) -> bool + Sync));
             (!stop.load(Ordering::Relaxed))
-                .then(|| ViewFootprints::trace_where(surface, grid, &target.camera, view, &first_hits, wants))
+                .then(|| ViewFootprints::trace_where(surface, grid, &target.camera, &first_hits, wants))
         };
         let mut sieve = Sieve::new(settings.map_size);
         let mut escaped = Vec::with_capacity(targets.len());

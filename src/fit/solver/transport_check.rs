@@ -68,9 +68,7 @@ impl SolverScene {
             let (view, camera) = (target.view as u32, &target.camera);
             let footprints = match footprints {
                 Some(footprints) => Cow::Borrowed(footprints),
-                None => {
-                    Cow::Owned(ViewFootprints::trace(surface, &self.transport.grid, camera, view, &self.first_hits))
-                }
+                None => Cow::Owned(ViewFootprints::trace(surface, &self.transport.grid, camera, &self.first_hits)),
             };
             let footprints = footprints.as_ref();
             let picture = self.transport.picture(footprints, &estimate.texels, &planes, &at);

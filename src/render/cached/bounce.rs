@@ -92,7 +92,8 @@ impl BounceMatrix {
     }
 
     /// Share of a point's rays that meet surface, in [0, 1].
-    pub fn row_sum(&self, point: usize) -> f32 {
+    #[cfg(test)]
+    fn row_sum(&self, point: usize) -> f32 {
         (self.offsets[point + 1] - self.offsets[point]) as f32 * self.share
     }
 }

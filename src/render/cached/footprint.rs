@@ -14,21 +14,14 @@
 mod pieces;
 
 use self::pieces::{Piece, corners_of_pixels, pieces_of_pixel, uv_at_middle};
-use super::bounce::point_hit;
 use super::points::{NO_POINT, VisibilityGrid};
-use crate::math::frame::Frame;
-use crate::math::random::{SampleStream, StreamKey, mix};
+use crate::math::random::mix;
 use crate::render::Surface;
 use crate::scene::Camera;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 #[cfg(test)]
 use std::ops::Range;
-
-/// Rays of a shading point that look for other surface in its lobe.
-pub const LOBE_RAYS: usize = 4;
-/// Width of the lobe those rays are drawn from: what a lobe meets changes slowly with its width.
-const LOBE_RAY_WIDTH: f32 = 0.35;
 
 /// A piece of surface behind a pixel.
 #[derive(Clone, Copy, Debug)]
@@ -45,8 +38,6 @@ pub struct ShadingPoint {
     pub to_viewer: Vec3,
     /// The point of the visibility grid that covers most of it: it serves the lobe.
     pub lobe_point: u32,
-    /// Points that rays in its lobe meet, or [`NO_POINT`].
-    pub lobe_hits: [u32; LOBE_RAYS],
     /// Where its texels begin in [`ViewFootprints::texels`].
     pub first_texel: u32,
     /// Number of its texels.
@@ -68,7 +59,6 @@ impl ShadingPoint {
             normal_variance: 0.0,
             to_viewer: Vec3::Z,
             lobe_point: 0,
-            lobe_hits: [NO_POINT; LOBE_RAYS],
             first_texel: texels.start,
             texel_count: texels.len() as u32,
             first_lit: lit.start,
@@ -105,16 +95,11 @@ pub struct FootprintSettings {
     pub coarse_side: usize,
     /// The same where those at first and the corners do not agree.
     pub fine_side: usize,
-    /// Whether rays look for other surface in the lobe.
-    pub lobe_rays: bool,
-    /// Seed of the lobe's rays.
-    pub seed: u64,
 }
 
 impl FootprintSettings {
     /// One ray a pixel, through its middle.
-    pub const COARSE: FootprintSettings =
-        FootprintSettings { map_size: 512, coarse_side: 1, fine_side: 1, lobe_rays: true, seed: 1 };
+    pub const COARSE: FootprintSettings = FootprintSettings { map_size: 512, coarse_side: 1, fine_side: 1 };
 }
 
 impl Default for FootprintSettings {
@@ -124,15 +109,9 @@ impl Default for FootprintSettings {
 }
 
 impl ViewFootprints {
-    /// Traces the footprints of a camera. `view` sets the random numbers of the lobe's rays apart.
-    pub fn trace(
-        surface: &Surface,
-        grid: &VisibilityGrid,
-        camera: &Camera,
-        view: u32,
-        settings: &FootprintSettings,
-    ) -> Self {
-        Self::trace_where(surface, grid, camera, view, settings, None)
+    /// Traces the footprints of a camera.
+    pub fn trace(surface: &Surface, grid: &VisibilityGrid, camera: &Camera, settings: &FootprintSettings) -> Self {
+        Self::trace_where(surface, grid, camera, settings, None)
     }
 
     /// The same but for pixels that are not wanted, by their number and the texture coordinate that their middle shows:
@@ -141,7 +120,6 @@ impl ViewFootprints {
         surface: &Surface,
         grid: &VisibilityGrid,
         camera: &Camera,
-        view: u32,
         settings: &FootprintSettings,
         is_wanted: Option<&(dyn Fn(u32, Vec2) -> bool + Sync)>,
     ) -> Self {
@@ -168,7 +146,7 @@ impl ViewFootprints {
                     let escaped = pieces_of_pixel(surface, camera, row, column, settings, around, &mut pieces);
                     made.escaped.push(escaped);
                     for piece in &pieces {
-                        made.add(surface, grid, piece, pixel as u32, view, settings);
+                        made.add(grid, piece, pixel as u32);
                     }
                 }
                 made
@@ -241,16 +219,7 @@ impl ViewFootprints {
         ViewFootprints { width, height, points: Vec::new(), texels: Vec::new(), lit: Vec::new(), escaped: Vec::new() }
     }
 
-    fn add(
-        &mut self,
-        surface: &Surface,
-        grid: &VisibilityGrid,
-        piece: &Piece,
-        pixel: u32,
-        view: u32,
-        settings: &FootprintSettings,
-    ) {
-        let count = piece.samples as f32;
+    fn add(&mut self, grid: &VisibilityGrid, piece: &Piece, pixel: u32) {
         let normal = piece.normal.normalize_or(Vec3::Y);
         let to_viewer = piece.to_viewer.normalize_or(Vec3::Y);
         // A mean of normals may turn away from a mean of directions at the very rim.
@@ -269,20 +238,6 @@ impl ViewFootprints {
             return;
         }
         merge(piece.texels.clone(), &mut self.texels);
-        let mut lobe_hits = [NO_POINT; LOBE_RAYS];
-        if settings.lobe_rays {
-            let mut stream = SampleStream::new(StreamKey::new(settings.seed, u32::MAX - 2, view, pixel), 0);
-            for (index, hit) in lobe_hits.iter_mut().enumerate() {
-                let [u, v] = stream.next_pair();
-                let place = [(index as f32 + u) / LOBE_RAYS as f32, v];
-                if let Some(direction) = lobe_direction(normal, to_viewer, place)
-                    && let Some(point) =
-                        point_hit(surface, grid, piece.position / count, piece.geometric_normal, direction)
-                {
-                    *hit = point;
-                }
-            }
-        }
         self.points.push(ShadingPoint {
             pixel,
             share: piece.share,
@@ -290,7 +245,6 @@ impl ViewFootprints {
             normal_variance: piece.normal_variance(),
             to_viewer,
             lobe_point,
-            lobe_hits,
             first_texel,
             texel_count: self.texels.len() as u32 - first_texel,
             first_lit,
@@ -311,13 +265,4 @@ fn merge(mut list: Vec<(u32, f32)>, merged: &mut Vec<(u32, f32)>) {
             _ => merged.push((name, weight)),
         }
     }
-}
-
-fn lobe_direction(normal: Vec3, to_viewer: Vec3, [u, v]: [f32; 2]) -> Option<Vec3> {
-    let ln_cos = 0.5 * LOBE_RAY_WIDTH * LOBE_RAY_WIDTH * (1.0 - u).max(1e-6).ln();
-    let sin = (-(2.0 * ln_cos).exp_m1()).max(0.0).sqrt();
-    let (sin_phi, cos_phi) = (std::f32::consts::TAU * v).sin_cos();
-    let half = Frame::around(normal).outer_from_local(Vec3::new(sin * cos_phi, sin * sin_phi, ln_cos.exp()));
-    let direction = half * (2.0 * half.dot(to_viewer)) - to_viewer;
-    (direction.dot(normal) > 0.0).then_some(direction)
 }

@@ -112,9 +112,8 @@ pub(super) fn sums_in<V: Vector>(
     let lobe = Lobe::<V>::new(place, width, count);
     let mut next = Next::default();
     let shares = &place.shares[..light.texels.len()];
-    // Red, green, blue and a white light over what is seen.
+    let surface = &place.surface.texels[..light.texels.len()];
     let (mut base, mut grazing) = (Vec4::ZERO, Vec4::ZERO);
-    let mut whole = [0.0f32; 2];
     for at in (0..count).step_by(V::LANES) {
         if !lobe.find(basis, places, at, &mut next) {
             continue;
@@ -124,21 +123,14 @@ pub(super) fn sums_in<V: Vector>(
             let mut arriving = Vec4::ZERO;
             for k in 0..4 {
                 let texel = next.taps.texel(k, lane);
-                arriving += light.texels[texel] * (next.taps.weights[k][lane] * f32::from(shares[texel]));
+                let seen = light.texels[texel] * (f32::from(shares[texel]) * (1.0 / 255.0));
+                arriving += (seen + surface[texel]) * next.taps.weights[k][lane];
             }
             base += arriving * own_base;
             grazing += arriving * own_grazing;
-            whole[0] += own_base;
-            whole[1] += own_grazing;
         }
     }
-    let (base, grazing) = (base * (1.0 / 255.0), grazing * (1.0 / 255.0));
-    LobeSums {
-        base: base.truncate().to_array(),
-        grazing: grazing.truncate().to_array(),
-        hidden: [(whole[0] - base.w).max(0.0), (whole[1] - grazing.w).max(0.0)],
-        ..LobeSums::default()
-    }
+    LobeSums { base: base.truncate().to_array(), grazing: grazing.truncate().to_array(), ..LobeSums::default() }
 }
 
 /// [`add_lobe_row`](super::half_vector::add_lobe_row) with vectors of any kind.

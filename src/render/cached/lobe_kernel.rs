@@ -94,23 +94,21 @@ pub(super) fn sums_in<V: Vector, const DERIVATIVE: bool>(
         *lobe = Lobe::new(width, cos_out);
     }
     let zero = V::splat(0.0);
-    // Per width: three channels whole, three weighted with Schlick's factor, and the same two for what is hidden.
-    let mut totals = [[zero; 8]; MOST_AT_ONCE];
-    let mut slopes = [[zero; 8]; MOST_AT_ONCE];
+    // Per width: three channels whole, three weighted with Schlick's factor.
+    let mut totals = [[zero; 6]; MOST_AT_ONCE];
+    let mut slopes = [[zero; 6]; MOST_AT_ONCE];
     let normal = place.normal.to_array().map(V::splat);
     let viewer = place.to_viewer.to_array().map(V::splat);
     let cos_out_all = V::splat(cos_out);
-    let light = &light.channels;
+    let (light, surface) = (&light.channels, &place.surface.channels);
     for at in (0..basis.padded()).step_by(V::LANES) {
         let Some(hats) = hats(basis, normal, viewer, cos_out_all, at) else { continue };
         let share = V::load_bytes(&place.shares[at..at + V::LANES]).mul(V::splat(1.0 / 255.0));
-        let seen = hats.weight.mul(share);
-        let arriving = [
-            seen.mul(V::load(&light[0][at..at + V::LANES])),
-            seen.mul(V::load(&light[1][at..at + V::LANES])),
-            seen.mul(V::load(&light[2][at..at + V::LANES])),
-            hats.weight.sub(seen),
-        ];
+        let mut arriving = [zero; 3];
+        for (c, value) in arriving.iter_mut().enumerate() {
+            let (light, surface) = (V::load(&light[c][at..at + V::LANES]), V::load(&surface[c][at..at + V::LANES]));
+            *value = share.mul_add(light, surface).mul(hats.weight);
+        }
         let mut grazing = arriving;
         for value in &mut grazing {
             *value = value.mul(hats.schlick);
@@ -121,18 +119,18 @@ pub(super) fn sums_in<V: Vector, const DERIVATIVE: bool>(
             let q_in = hats.cos_in.mul_add(V::splat(1.0 - lobe.k), V::splat(lobe.k));
             let value = power.div(q_in);
             let total = &mut totals[which];
-            for k in 0..4 {
+            for k in 0..3 {
                 total[k] = value.mul_add(arriving[k], total[k]);
-                total[4 + k] = value.mul_add(grazing[k], total[4 + k]);
+                total[3 + k] = value.mul_add(grazing[k], total[3 + k]);
             }
             if DERIVATIVE {
                 let shadowing = V::splat(1.0).sub(hats.cos_in).mul(V::splat(lobe.k)).div(q_in);
                 let slope = hats.log_cos_squared.mul_add(V::splat(lobe.slope_of_log), V::splat(lobe.slope));
                 let slope = slope.sub(shadowing).mul(value);
                 let total = &mut slopes[which];
-                for k in 0..4 {
+                for k in 0..3 {
                     total[k] = slope.mul_add(arriving[k], total[k]);
-                    total[4 + k] = slope.mul_add(grazing[k], total[4 + k]);
+                    total[3 + k] = slope.mul_add(grazing[k], total[3 + k]);
                 }
             }
         }
@@ -140,14 +138,12 @@ pub(super) fn sums_in<V: Vector, const DERIVATIVE: bool>(
     for which in 0..count {
         let scale = lobes[which].scale;
         let whole = totals[which].map(|value| value.sum() * scale);
-        let moved = if DERIVATIVE { slopes[which].map(|value| value.sum() * scale) } else { [0.0; 8] };
+        let moved = if DERIVATIVE { slopes[which].map(|value| value.sum() * scale) } else { [0.0; 6] };
         sums[which] = LobeSums {
-            base: [0, 1, 2].map(|c| whole[c] - whole[4 + c]),
-            grazing: [whole[4], whole[5], whole[6]],
-            hidden: [whole[3] - whole[7], whole[7]],
-            d_base: [0, 1, 2].map(|c| moved[c] - moved[4 + c]),
-            d_grazing: [moved[4], moved[5], moved[6]],
-            d_hidden: [moved[3] - moved[7], moved[7]],
+            base: [0, 1, 2].map(|c| whole[c] - whole[3 + c]),
+            grazing: [whole[3], whole[4], whole[5]],
+            d_base: [0, 1, 2].map(|c| moved[c] - moved[3 + c]),
+            d_grazing: [moved[3], moved[4], moved[5]],
         };
     }
 }

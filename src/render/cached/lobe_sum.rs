@@ -14,6 +14,7 @@
 use super::half_vector;
 use super::light_basis::{LightBasis, LightPlanes};
 use super::lobe_kernel::{MOST_AT_ONCE, row_in, sums_in};
+use super::surroundings::SurfaceLight;
 use crate::math::vector::versions;
 use glam::Vec3;
 
@@ -35,6 +36,8 @@ pub struct LobePlace<'a> {
     pub to_viewer: Vec3,
     /// Visible shares of the hats.
     pub shares: &'a [u8],
+    /// Other surface around.
+    pub surface: &'a SurfaceLight,
     /// Variance of the normal over the footprint, of both axes together, in squared radians.
     pub normal_variance: f32,
 }
@@ -66,22 +69,17 @@ pub struct LobeSums {
     pub base: [f32; 3],
     /// `S5` per channel.
     pub grazing: [f32; 3],
-    /// `S0 - S5` and `S5` of a white light over what is hidden: the part of the lobe that meets other surface.
-    pub hidden: [f32; 2],
     /// Derivative of `base` by the logarithm of the width; zero where it was not asked for.
     pub d_base: [f32; 3],
     /// Derivative of `grazing`.
     pub d_grazing: [f32; 3],
-    /// Derivative of `hidden`.
-    pub d_hidden: [f32; 2],
 }
 
 impl LobeSums {
-    /// What a lobe of this F0 sends, in radiance per channel, where `around` is the radiance of what hides the light.
+    /// What a lobe of this F0 sends, in radiance per channel.
     #[inline]
-    pub fn radiance(&self, specular: [f32; 3], around: [f32; 3]) -> [f32; 3] {
-        let LobeSums { base, grazing, hidden, .. } = self;
-        [0, 1, 2].map(|c| specular[c] * (base[c] + hidden[0] * around[c]) + grazing[c] + hidden[1] * around[c])
+    pub fn radiance(&self, specular: [f32; 3]) -> [f32; 3] {
+        [0, 1, 2].map(|c| specular[c] * self.base[c] + self.grazing[c])
     }
 }
 
@@ -120,11 +118,10 @@ pub fn lobe_with_derivative(basis: &LightBasis, place: &LobePlace, light: &Light
         LobeSums {
             d_base: std::array::from_fn(|c| slope(above.base[c], below.base[c])),
             d_grazing: std::array::from_fn(|c| slope(above.grazing[c], below.grazing[c])),
-            d_hidden: std::array::from_fn(|k| slope(above.hidden[k], below.hidden[k])),
             ..sum
         }
     };
-    for slope in sum.d_base.iter_mut().chain(&mut sum.d_grazing).chain(&mut sum.d_hidden) {
+    for slope in sum.d_base.iter_mut().chain(&mut sum.d_grazing) {
         *slope *= slope_of_width;
     }
     sum
@@ -206,7 +203,7 @@ mod tests {
     fn sums_are_the_integrals_of_the_lobe_at_all_widths() {
         let basis = LightBasis::new(64, 32);
         let light = light_of(&basis, 2);
-        let shares = vec![255u8; basis.padded()];
+        let (shares, surface) = (vec![255u8; basis.padded()], SurfaceLight::none(&basis));
         let sun = basis.direction_of(8 * 64 + 20);
         let normal = Vec3::new(0.1, 0.95, 0.2).normalize_or(Vec3::Y);
         // Beside the highlight only the tail of a narrow lobe reaches the sun, and few places lie there: what counts is
@@ -216,7 +213,8 @@ mod tests {
             [(Vec3::ZERO, "highlight", 0.025), (Vec3::new(0.2, 0.1, -0.3), "beside", 0.025)]
         {
             let mirrored = (normal * (2.0 * normal.dot(sun)) - sun + offset).normalize_or(Vec3::Y);
-            let place = LobePlace { normal, to_viewer: mirrored, shares: &shares, normal_variance: 0.0 };
+            let place =
+                LobePlace { normal, to_viewer: mirrored, shares: &shares, surface: &surface, normal_variance: 0.0 };
             for (index, width) in [0.01f32, 0.05, 0.1, 0.17, 0.24, 0.26, 0.4, 0.7, 1.0].into_iter().enumerate() {
                 let (base, grazing) = truth(&light, normal, mirrored, width);
                 if offset == Vec3::ZERO {
@@ -242,7 +240,7 @@ mod tests {
     fn a_curved_footprint_sends_what_its_normals_send_on_average() {
         let basis = LightBasis::new(64, 32);
         let light = light_of(&basis, 2);
-        let shares = vec![255u8; basis.padded()];
+        let (shares, surface) = (vec![255u8; basis.padded()], SurfaceLight::none(&basis));
         let sun = basis.direction_of(8 * 64 + 20);
         let normal = Vec3::new(0.1, 0.95, 0.2).normalize_or(Vec3::Y);
         let to_viewer = normal * (2.0 * normal.dot(sun)) - sun;
@@ -255,14 +253,15 @@ mod tests {
                 let tilted = normal + across * place(index % SIDE) + along * place(index / SIDE);
                 let tilted = tilted.normalize_or(Vec3::Y);
                 sum += tilted;
-                let place = LobePlace { normal: tilted, to_viewer, shares: &shares, normal_variance: 0.0 };
+                let place =
+                    LobePlace { normal: tilted, to_viewer, shares: &shares, surface: &surface, normal_variance: 0.0 };
                 let mut sums = [LobeSums::default()];
                 lobe_sums(&basis, &place, &light, &[width], &mut sums);
                 mean += f64::from(sums[0].base[1]) / (SIDE * SIDE) as f64;
             }
             let normal_variance = 1.0 - (sum / (SIDE * SIDE) as f32).length_squared();
             let of = |normal_variance: f32| {
-                let place = LobePlace { normal, to_viewer, shares: &shares, normal_variance };
+                let place = LobePlace { normal, to_viewer, shares: &shares, surface: &surface, normal_variance };
                 let mut sums = [LobeSums::default()];
                 lobe_sums(&basis, &place, &light, &[width], &mut sums);
                 f64::from(sums[0].base[1]) / mean - 1.0
@@ -276,15 +275,40 @@ mod tests {
         }
     }
 
+    /// Surface that sends what the light would send where it hides it is not seen.
+    #[test]
+    fn surface_as_bright_as_the_light_it_hides_changes_nothing() {
+        let basis = LightBasis::new(64, 32);
+        let light = basis.planes(&vec![[1.0; 3]; basis.count()]);
+        let mut random = SequentialRandom::new(4);
+        let some: Vec<u8> = (0..basis.padded()).map(|_| random.below(256) as u8).collect();
+        let (all, none) = (vec![255u8; basis.padded()], SurfaceLight::none(&basis));
+        let surface = SurfaceLight::filled(&basis, |hat| 1.0 - f32::from(some[hat]) / 255.0);
+        let to_viewer = Vec3::new(-0.5, 0.6, 0.4).normalize_or(Vec3::Y);
+        let open = LobePlace { normal: Vec3::Y, to_viewer, shares: &all, surface: &none, normal_variance: 0.0 };
+        let closed = LobePlace { shares: &some, surface: &surface, ..open };
+        for width in [0.03f32, 0.2, 0.3, 0.55, 1.0] {
+            let [open, closed] = [open, closed].map(|place| {
+                let mut sums = [LobeSums::default()];
+                lobe_sums(&basis, &place, &light, &[width], &mut sums);
+                sums[0]
+            });
+            assert!((closed.base[1] / open.base[1] - 1.0).abs() < 1e-5, "{width}: {closed:?} {open:?}");
+            assert!((closed.grazing[1] / open.grazing[1] - 1.0).abs() < 1e-5, "{width}: {closed:?} {open:?}");
+        }
+    }
+
     #[test]
     fn versions_rows_and_derivatives_agree() {
         let basis = LightBasis::new(64, 32);
         let light = light_of(&basis, 5);
         let mut random = SequentialRandom::new(9);
         let shares: Vec<u8> = (0..basis.padded()).map(|_| (random.next_number() * 255.0) as u8).collect();
+        let surface = SurfaceLight::filled(&basis, |_| random.next_number());
+        let none = SurfaceLight::none(&basis);
         let normal = Vec3::new(0.3, 0.9, -0.1).normalize_or(Vec3::Y);
         let to_viewer = Vec3::new(-0.5, 0.6, 0.4).normalize_or(Vec3::Y);
-        let place = LobePlace { normal, to_viewer, shares: &shares, normal_variance: 0.004 };
+        let place = LobePlace { normal, to_viewer, shares: &shares, surface: &surface, normal_variance: 0.004 };
         for width in [0.03f32, 0.2, 0.3, 0.55, 1.0] {
             let sums = lobe_with_derivative(&basis, &place, &light, width);
             let mut plain = [LobeSums::default()];
@@ -302,7 +326,6 @@ mod tests {
                 for (a, b) in [
                     (sums.base[channel], plain[0].base[channel]),
                     (sums.grazing[channel], plain[0].grazing[channel]),
-                    (sums.hidden[channel / 2], plain[0].hidden[channel / 2]),
                     (sums.d_base[channel], plain[0].d_base[channel]),
                 ] {
                     assert!((a - b).abs() < 2e-5 * sums.base[channel], "{width}: {a} {b}");
@@ -313,7 +336,9 @@ mod tests {
                 add_lobe_row(&basis, &place, width, [0.3, 1.0], &mut row);
                 let by_row: f64 =
                     row.iter().zip(&light.channels[channel]).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum();
-                let direct = f64::from(0.3 * sums.base[channel] + sums.grazing[channel]);
+                let mut of_light = [LobeSums::default()];
+                lobe_sums(&basis, &LobePlace { surface: &none, ..place }, &light, &[width], &mut of_light);
+                let direct = f64::from(0.3 * of_light[0].base[channel] + of_light[0].grazing[channel]);
                 assert!((by_row / direct - 1.0).abs() < 2e-6, "{width}: {by_row} {direct}");
             }
             let step = 0.01f32;
@@ -326,8 +351,6 @@ mod tests {
                 let (below, above) = (at(width * (-step).exp()), at(width * step.exp()));
                 let difference = (above.base[1] - below.base[1]) / (2.0 * step);
                 assert!((difference - sums.d_base[1]).abs() < 3e-3 * sums.base[1], "{width}: {difference}");
-                let difference = (above.hidden[0] - below.hidden[0]) / (2.0 * step);
-                assert!((difference - sums.d_hidden[0]).abs() < 2e-3 * sums.hidden[0], "{width}: {difference}");
             }
         }
     }

@@ -5,7 +5,7 @@
 //! 2. [`points`] and [`visibility`]: points of the surface on a grid over the atlas, and which share of each hat they see.
 //! 3. [`mod@irradiance`]: diffuse light, a masked sum. [`lobe_sum`] and [`half_vector`]: the specular integrals `S0 - S5`
 //!    and `S5`, and their derivative by the width.
-//! 4. [`bounce`]: light between surfaces as a sparse matrix with its transpose.
+//! 4. [`bounce`]: light between surfaces as a sparse matrix with its transpose; [`surroundings`]: the same as lobes see it.
 //! 5. [`footprint`]: what a camera sees, as shading points with lists of texels.
 //! 6. [`transport`]: all of it together, and the radiance it gives. Sums run on several numbers at a time
 //!    ([`crate::math::vector`]).
@@ -16,9 +16,9 @@
 //! What is approximate, and judged against the path tracer by the tests of this folder and by `examples/cached_error.rs`:
 //! * visibility between points of the grid is interpolated for diffuse light and taken from the nearest for the lobe;
 //! * a surface that lights another does so as if its lobe were diffuse, with the right amount of energy;
-//! * the lobe sees other surface as one mean colour, from four rays, weighted by how much of the lobe is hidden.
+//! * the lobe sees other surface as coarsely as cells of the light ([`surroundings`]).
 //!
-//! What it refuses to do: mirrors that show other surface sharply (the mean colour is all they get), and moving anything.
+//! What it refuses to do: mirrors that show other surface more sharply than that, and moving anything.
 
 pub mod bounce;
 pub mod footprint;
@@ -29,6 +29,7 @@ pub mod light_basis;
 mod lobe_kernel;
 pub mod lobe_sum;
 pub mod points;
+pub mod surroundings;
 pub mod transport;
 pub mod visibility;
 
@@ -38,4 +39,5 @@ mod tests;
 pub use footprint::{FootprintSettings, ShadingPoint, ViewFootprints};
 pub use light_basis::{LightBasis, LightPlanes};
 pub use points::VisibilityGrid;
+pub use surroundings::SurfaceLight;
 pub use transport::{CachedSettings, CachedTransport, PointLight};

@@ -37,7 +37,7 @@ fn error(small: &Small, settings: CachedSettings, samples: usize) -> f64 {
     for view in 0..2 {
         let camera = &scene.views[view].camera;
         let first_hits = FootprintSettings { map_size: 128, ..FootprintSettings::default() };
-        let footprints = ViewFootprints::trace(surface, &transport.grid, camera, view as u32, &first_hits);
+        let footprints = ViewFootprints::trace(surface, &transport.grid, camera, &first_hits);
         let picture = transport.picture(&footprints, texels, &light, &at);
         let references = [1, 2].map(|seed| {
             let settings = PictureSettings {
@@ -157,7 +157,7 @@ fn one_ray_a_pixel_makes_one_whole_shading_point_of_what_its_middle_shows() {
     let grid = VisibilityGrid::new(&small.surface, 64);
     let camera = &small.scene.views[0].camera;
     let settings = FootprintSettings { map_size: 128, ..FootprintSettings::COARSE };
-    let footprints = ViewFootprints::trace(&small.surface, &grid, camera, 0, &settings);
+    let footprints = ViewFootprints::trace(&small.surface, &grid, camera, &settings);
     let mut points = footprints.points.iter().peekable();
     for pixel in 0..camera.width * camera.height {
         let middle = glam::Vec2::new((pixel % camera.width) as f32 + 0.5, (pixel / camera.width) as f32 + 0.5);
@@ -187,7 +187,7 @@ fn the_number_of_threads_changes_no_bit() {
             let at = transport.point_light(&light, &transport.reflectance_of_points(texels, 128));
             let first_hits = FootprintSettings { map_size: 128, ..FootprintSettings::default() };
             let camera = &small.scene.views[1].camera;
-            let footprints = ViewFootprints::trace(&small.surface, &transport.grid, camera, 1, &first_hits);
+            let footprints = ViewFootprints::trace(&small.surface, &transport.grid, camera, &first_hits);
             let d_light = transport.direct_backward(&at.arriving);
             (transport.picture(&footprints, texels, &light, &at), d_light)
         })
@@ -200,7 +200,7 @@ fn footprints_cover_pixels_with_weights_that_sum_to_one() {
     let small = small();
     let grid = VisibilityGrid::new(&small.surface, 64);
     let first_hits = FootprintSettings { map_size: 128, ..FootprintSettings::default() };
-    let footprints = ViewFootprints::trace(&small.surface, &grid, &small.scene.views[0].camera, 0, &first_hits);
+    let footprints = ViewFootprints::trace(&small.surface, &grid, &small.scene.views[0].camera, &first_hits);
     let mut share = footprints.escaped.clone();
     for point in &footprints.points {
         share[point.pixel as usize] += point.share;
@@ -222,14 +222,14 @@ fn pixels_that_are_not_wanted_or_left_out_have_no_shading_points_and_others_keep
     let grid = VisibilityGrid::new(&small.surface, 64);
     let first_hits = FootprintSettings { map_size: 128, ..FootprintSettings::default() };
     let camera = &small.scene.views[0].camera;
-    let all = ViewFootprints::trace(&small.surface, &grid, camera, 0, &first_hits);
+    let all = ViewFootprints::trace(&small.surface, &grid, camera, &first_hits);
     let of_pixel = |footprints: &ViewFootprints, pixel: u32| {
         let own = footprints.points.iter().filter(|point| point.pixel == pixel);
         let lists = |point| (footprints.texels_of(point).to_vec(), footprints.lit_of(point).to_vec());
         own.map(|point| (point.share, point.normal, lists(point))).collect::<Vec<_>>()
     };
     let wants = |pixel: u32, uv: glam::Vec2| pixel.is_multiple_of(3) && uv.x > 0.3;
-    let wanted = ViewFootprints::trace_where(&small.surface, &grid, camera, 0, &first_hits, Some(&wants));
+    let wanted = ViewFootprints::trace_where(&small.surface, &grid, camera, &first_hits, Some(&wants));
     let mut kept = all.clone();
     kept.keep_one_in(4);
     let (mut left_out, mut fewer) = (0, 0);

@@ -6,7 +6,8 @@ use super::half_vector;
 use super::irradiance::{irradiance, irradiance_backward};
 use super::light_basis::{LightBasis, LightPlanes};
 use super::lobe_sum::{LobePlace, LobeSums, lobe_sums};
-use super::points::{NO_POINT, VisibilityGrid};
+use super::points::VisibilityGrid;
+use super::surroundings::{SurfaceLight, Surroundings};
 use super::visibility::Visibility;
 use crate::material::texels::Texel;
 use crate::render::Surface;
@@ -22,6 +23,8 @@ pub struct CachedSettings {
     pub grid: usize,
     /// Rays from each of its points to other surface.
     pub bounce_rays: usize,
+    /// Cells of the light from pole to pole, at most: in each of them lobes see one point of other surface.
+    pub surface_rows: usize,
     /// Number of surface hits on the longest path: 1 is direct light only.
     pub max_bounces: usize,
     /// Whether four rays look at a texel of the light that an edge of a shadow crosses, and not one.
@@ -34,7 +37,15 @@ pub struct CachedSettings {
 
 impl Default for CachedSettings {
     fn default() -> Self {
-        CachedSettings { grid: 256, bounce_rays: 64, max_bounces: 3, fine_shadows: true, lobe_strength: 1.0, seed: 1 }
+        CachedSettings {
+            grid: 256,
+            bounce_rays: 64,
+            surface_rows: 16,
+            max_bounces: 3,
+            fine_shadows: true,
+            lobe_strength: 1.0,
+            seed: 1,
+        }
     }
 }
 
@@ -51,6 +62,8 @@ pub struct CachedTransport {
     pub visibility: Visibility,
     /// What each point sees of other points; `None` for direct light only.
     pub bounces: Option<BounceMatrix>,
+    /// What hides the light from each point; `None` for direct light only.
+    pub surroundings: Option<Surroundings>,
     /// Seconds that tracing what points see of other points took.
     pub bounce_seconds: f64,
     /// Share of light that lobes send back on average, without and with Schlick's factor, over log width.
@@ -66,8 +79,6 @@ pub struct PointLight {
     pub direct: Vec<[f32; 3]>,
     /// Radiance that points send to others, as far as paths are long enough to bring it to the camera.
     pub leaving: Vec<[f32; 3]>,
-    /// Mean radiance of the surface that points see; zero where they see none.
-    pub around: Vec<[f32; 3]>,
 }
 
 impl CachedTransport {
@@ -84,9 +95,12 @@ impl CachedTransport {
         let began = Instant::now();
         let bounces = (settings.max_bounces > 1)
             .then(|| BounceMatrix::trace(surface, &grid, settings.bounce_rays, settings.seed, stop));
+        let side = basis.height.div_ceil(settings.surface_rows.max(1));
+        let surroundings = (settings.max_bounces > 1 && settings.lobe_strength > 0.0)
+            .then(|| Surroundings::trace(surface, &grid, &basis, &visibility, side, stop));
         let bounce_seconds = began.elapsed().as_secs_f64();
         let albedo = lobe_albedo();
-        let made = CachedTransport { settings, basis, grid, visibility, bounces, bounce_seconds, albedo };
+        let made = CachedTransport { settings, basis, grid, visibility, bounces, surroundings, bounce_seconds, albedo };
         (!stop.load(Ordering::Relaxed)).then_some(made)
     }
 
@@ -97,7 +111,9 @@ impl CachedTransport {
 
     /// Bytes it takes.
     pub fn memory_bytes(&self) -> usize {
-        self.visibility.shares.len() + self.grid.points.len() * 60
+        self.visibility.shares.len()
+            + self.grid.points.len() * 60
+            + self.surroundings.as_ref().map_or(0, Surroundings::memory_bytes)
     }
 
     /// Direct light at all points: irradiance over pi.
@@ -175,7 +191,7 @@ impl CachedTransport {
         };
         let Some(bounces) = &self.bounces else {
             let nothing = vec![[0.0; 3]; direct.len()];
-            return PointLight { arriving: direct.clone(), direct, leaving: nothing.clone(), around: nothing };
+            return PointLight { arriving: direct.clone(), direct, leaving: nothing };
         };
         let mut leaving = reflect(&direct);
         let add = |indirect: Vec<[f32; 3]>| -> Vec<[f32; 3]> {
@@ -185,12 +201,7 @@ impl CachedTransport {
             leaving = reflect(&add(bounces.apply(&leaving)));
         }
         let indirect = bounces.apply(&leaving);
-        let around = indirect
-            .iter()
-            .enumerate()
-            .map(|(index, value)| value.map(|value| value / bounces.row_sum(index).max(1e-6)))
-            .collect();
-        PointLight { arriving: add(indirect), direct, leaving, around }
+        PointLight { arriving: add(indirect), direct, leaving }
     }
 
     /// The derivative by direct light of what [`CachedTransport::with_bounces`] returns as arriving, at fixed
@@ -226,31 +237,24 @@ impl CachedTransport {
         sum
     }
 
-    /// Where the lobe of a shading point is integrated.
+    /// Where the lobe of a shading point is integrated, among surface that sends this. `surface` is kept from place to
+    /// place, as long as `at` is the same.
     #[inline]
-    pub fn lobe_place(&self, point: &ShadingPoint) -> LobePlace<'_> {
+    pub fn lobe_place<'a>(
+        &'a self,
+        point: &ShadingPoint,
+        at: &PointLight,
+        surface: &'a mut SurfaceLight,
+    ) -> LobePlace<'a> {
+        let shares = self.visibility.of(point.lobe_point as usize);
+        surface.turn_to(point.lobe_point, self.surroundings.as_ref(), shares, &at.leaving);
         LobePlace {
             normal: point.normal,
             to_viewer: point.to_viewer,
-            shares: self.visibility.of(point.lobe_point as usize),
+            shares,
+            surface,
             normal_variance: point.normal_variance,
         }
-    }
-
-    /// Mean radiance of the surface that a shading point's lobe meets: of what its rays hit, and with the weight of one
-    /// ray of what is around the point. Without that, the colour of a small hidden part of a lobe would be black whenever
-    /// all rays miss it, and pictures of polished things two per cent too dark.
-    #[inline]
-    pub fn lobe_surroundings(&self, at: &PointLight, point: &ShadingPoint) -> [f32; 3] {
-        let mut sum = at.around[point.lobe_point as usize];
-        let mut count = 1.0;
-        for &hit in point.lobe_hits.iter().filter(|&&hit| hit != NO_POINT) {
-            for channel in 0..3 {
-                sum[channel] += at.leaving[hit as usize][channel];
-            }
-            count += 1.0;
-        }
-        sum.map(|value| value / count)
     }
 
     /// Radiance of a shading point with a material of seven numbers.
@@ -261,6 +265,7 @@ impl CachedTransport {
         footprints: &ViewFootprints,
         point: &ShadingPoint,
         material: &[f32; 7],
+        surface: &mut SurfaceLight,
     ) -> [f32; 3] {
         let arriving = Self::interpolate(&at.arriving, footprints, point);
         let diffuse = [0, 1, 2].map(|c| material[c] * arriving[c]);
@@ -269,9 +274,8 @@ impl CachedTransport {
             return diffuse;
         }
         let mut sums = [LobeSums::default()];
-        lobe_sums(&self.basis, &self.lobe_place(point), light, &[material[6].exp()], &mut sums);
-        let around = self.lobe_surroundings(at, point);
-        let lobe = sums[0].radiance([material[3], material[4], material[5]], around);
+        lobe_sums(&self.basis, &self.lobe_place(point, at, surface), light, &[material[6].exp()], &mut sums);
+        let lobe = sums[0].radiance([material[3], material[4], material[5]]);
         [0, 1, 2].map(|c| diffuse[c] + strength * lobe[c])
     }
 
@@ -299,7 +303,10 @@ impl CachedTransport {
             .points
             .par_iter()
             .with_min_len(256)
-            .map(|point| self.shade(light, at, footprints, point, &Self::material_of(footprints, point, texels)))
+            .map_init(SurfaceLight::default, |surface, point| {
+                let material = Self::material_of(footprints, point, texels);
+                self.shade(light, at, footprints, point, &material, surface)
+            })
             .collect();
         let mut picture = vec![[0.0f32; 3]; footprints.width * footprints.height];
         for (point, radiance) in footprints.points.iter().zip(shaded) {
@@ -327,7 +334,7 @@ const ALBEDO_SPAN: f32 = 5.0;
 fn lobe_albedo() -> Vec<[f32; 2]> {
     let constant = LightBasis::new(1, 1);
     let light = constant.planes(&[[1.0; 3]]);
-    let shares = vec![255u8; constant.padded()];
+    let (shares, surface) = (vec![255u8; constant.padded()], SurfaceLight::none(&constant));
     (0..=20)
         .map(|step| {
             let width = (ALBEDO_SPAN * (step as f32 / 20.0 - 1.0)).exp();
@@ -337,7 +344,8 @@ fn lobe_albedo() -> Vec<[f32; 2]> {
                 // Equal steps of cos^2: the cosine's density.
                 let cosine = ((angle as f32 + 0.5) / ANGLES as f32).sqrt();
                 let to_viewer = Vec3::new((1.0 - cosine * cosine).sqrt(), cosine, 0.0);
-                let place = LobePlace { normal: Vec3::Y, to_viewer, shares: &shares, normal_variance: 0.0 };
+                let place =
+                    LobePlace { normal: Vec3::Y, to_viewer, shares: &shares, surface: &surface, normal_variance: 0.0 };
                 let sums = half_vector::lobe_sums(&constant, &place, &light, width, 256);
                 sum[0] += sums.base[0] / ANGLES as f32;
                 sum[1] += sums.grazing[0] / ANGLES as f32;

@@ -8,7 +8,7 @@ use super::clustered::ClusteredMean;
 use super::student::StudentNoise;
 use super::{ALTERNATIVES, Alternative, LOBE_ALTERNATIVES};
 use crate::render::cached::lobe_sum::{LobeSums, lobe_sums};
-use crate::render::cached::{CachedTransport, LightPlanes, PointLight, ViewFootprints};
+use crate::render::cached::{CachedTransport, LightPlanes, PointLight, SurfaceLight, ViewFootprints};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -145,7 +145,10 @@ impl SolverScene {
                 .par_iter()
                 .step_by(step)
                 .with_min_len(64)
-                .filter_map(|pixel| self.judged(surface, footprints, pixel, light, coarse))
+                .map_init(Default::default, |around, pixel| {
+                    self.judged(surface, footprints, pixel, [light, coarse], around)
+                })
+                .flatten_iter()
                 .collect();
             made.add_view(surface, &judged, self.observations.mean, self.settings.exposure);
         }
@@ -158,8 +161,8 @@ impl SolverScene {
         surface: &SurfaceAlternatives,
         footprints: &ViewFootprints,
         pixel: &Observation,
-        light: JudgedLight,
-        coarse: JudgedLight,
+        [light, coarse]: [JudgedLight; 2],
+        around: &mut [SurfaceLight; 2],
     ) -> Option<Judged> {
         let point = &footprints.points[pixel.point as usize];
         let mut rho = [[0.0f32; 3]; ALTERNATIVES];
@@ -181,9 +184,8 @@ impl SolverScene {
         if !is_solved || surface.regions[region].is_none() {
             return None;
         }
-        let place = self.transport.lobe_place(point);
-        let lobes = |(planes, at): JudgedLight, lobes: [Lobe; 2]| -> [[f32; 3]; 2] {
-            let around = self.transport.lobe_surroundings(at, point);
+        let lobes = |(planes, at): JudgedLight, around: &mut SurfaceLight, lobes: [Lobe; 2]| -> [[f32; 3]; 2] {
+            let place = self.transport.lobe_place(point, at, around);
             let swap = usize::from(lobes[0][3] > lobes[1][3]);
             let widths = [lobes[swap][3].exp(), lobes[1 - swap][3].exp()];
             let mut sums = [LobeSums::default(); 2];
@@ -194,14 +196,15 @@ impl SolverScene {
             }
             [0, 1].map(|which| {
                 let [red, green, blue, _] = lobes[which];
-                sums[which ^ swap].radiance([red, green, blue], around)
+                sums[which ^ swap].radiance([red, green, blue])
             })
         };
         let arriving = |values: &[[f32; 3]]| CachedTransport::interpolate(values, footprints, point);
         let (all, straight, smooth) =
             (arriving(&light.1.arriving), arriving(&light.1.direct), arriving(&coarse.1.arriving));
-        let [of_one, of_own] = lobes(light, [one, own]);
-        let [of_coarse, _] = lobes(coarse, [own, own]);
+        let [around, around_coarse] = around;
+        let [of_one, of_own] = lobes(light, around, [one, own]);
+        let [of_coarse, _] = lobes(coarse, around_coarse, [own, own]);
         let none = [0.0; 3];
         let own_rho = rho[Alternative::OwnLobes.index()];
         let models = Alternative::ALL.map(|alternative| {

@@ -7,7 +7,7 @@ use super::judge::region_of;
 use crate::image::Image;
 use crate::math::random::SequentialRandom;
 use crate::render::Surface;
-use crate::render::cached::{CachedTransport, ViewFootprints};
+use crate::render::cached::{CachedTransport, SurfaceLight, ViewFootprints};
 use crate::scene::{Scene, demo};
 use glam::Vec3;
 use std::sync::atomic::AtomicBool;
@@ -56,14 +56,15 @@ fn photograph(held_out: usize, noise: f32, lobe_of: impl Fn(usize) -> Option<[f3
     let mut normal = move || random.next_normal();
     for target in cache.targets.iter().chain(cache.held_out.iter().map(|(target, _)| target)) {
         let (view, grid) = (target.view, &cache.transport.grid);
-        let footprints = ViewFootprints::trace(&made.surface, grid, &target.camera, view as u32, &cache.first_hits);
+        let footprints = ViewFootprints::trace(&made.surface, grid, &target.camera, &cache.first_hits);
         let mut picture = vec![Vec3::ZERO; 64 * 48];
+        let mut around = SurfaceLight::default();
         for point in &footprints.points {
             let texel = footprints.texels_of(point)[0].0 as usize;
             let radiance = match lobe_of(region_of(texel, SIZE)) {
                 Some([a, b, c, width]) => {
                     let material = [0.4, 0.4, 0.4, a, b, c, width];
-                    cache.transport.shade(&planes, &at, &footprints, point, &material)
+                    cache.transport.shade(&planes, &at, &footprints, point, &material, &mut around)
                 }
                 None => CachedTransport::interpolate(&at.arriving, &footprints, point).map(|arriving| 0.4 * arriving),
             };

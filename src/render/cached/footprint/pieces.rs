@@ -17,8 +17,6 @@ pub(super) struct Piece {
     pub(super) share: f32,
     pub(super) normal: Vec3,
     pub(super) to_viewer: Vec3,
-    pub(super) position: Vec3,
-    pub(super) geometric_normal: Vec3,
     pub(super) texels: Vec<(u32, f32)>,
     pub(super) places: Vec<SurfacePoint>,
     pub(super) first: SurfacePoint,
@@ -132,8 +130,6 @@ pub(super) fn pieces_of_pixel(
                         share: 0.0,
                         normal: Vec3::ZERO,
                         to_viewer: Vec3::ZERO,
-                        position: Vec3::ZERO,
-                        geometric_normal: point.geometric_normal,
                         texels: Vec::with_capacity(16),
                         places: Vec::with_capacity(4),
                         first: point,
@@ -146,7 +142,6 @@ pub(super) fn pieces_of_pixel(
             piece.samples += 1;
             piece.normal += point.shading_normal;
             piece.to_viewer -= direction;
-            piece.position += point.position;
             piece.places.push(point);
             piece.texels.extend(tap.index.into_iter().zip(tap.weight).filter(|&(_, weight)| weight > 0.0));
         }
