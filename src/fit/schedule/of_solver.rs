@@ -63,8 +63,8 @@ impl SolverShare {
     }
 }
 
-/// Light and maps on the coarsest level, twice where there is a finer one; on each of those some rounds more, and maps
-/// anew. What is done there is cheap, and the second maps know which lobes the first have shown.
+/// Light and maps on the coarsest level, twice; on each finer one some rounds more, and maps anew. What is done on the
+/// coarsest is cheap, and the second maps know which lobes the first have shown.
 pub(super) fn positions_of_solver(settings: &FitSettings, share: SolverShare) -> Vec<Position> {
     let SolverShare { finest, coarse_maps } = share;
     let mut positions: Vec<Position> = Vec::new();
@@ -86,10 +86,8 @@ pub(super) fn positions_of_solver(settings: &FitSettings, share: SolverShare) ->
     add(StageKind::WideLight, wide, coarsest);
     add(StageKind::NarrowLight, settings.solver_rounds - wide, coarsest);
     add(StageKind::Maps, 1, coarsest);
-    if coarsest > 0 {
-        add(StageKind::NarrowLight, ROUNDS_AFTER_MAPS, coarsest);
-        add(StageKind::Maps, 1, coarsest);
-    }
+    add(StageKind::NarrowLight, ROUNDS_AFTER_MAPS, coarsest);
+    add(StageKind::Maps, 1, coarsest);
     let finest = usize::from(finest == Finest::Polish);
     for level in (finest..coarsest).rev() {
         add(StageKind::NarrowLight, FINER_ROUNDS, level);
