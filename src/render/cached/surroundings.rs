@@ -198,11 +198,11 @@ impl SurfaceLight {
         if self.point == point && self.texels.len() == shares.len() {
             return;
         }
-        self.resize(shares.len());
         for hat in self.lit.drain(..) {
             self.channels.iter_mut().for_each(|plane| plane[hat as usize] = 0.0);
             self.texels[hat as usize] = Vec4::ZERO;
         }
+        self.resize(shares.len());
         self.point = point;
         let Some(surroundings) = surroundings else { return };
         for &Hiding { cell, point } in surroundings.of(point as usize) {
