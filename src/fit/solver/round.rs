@@ -281,3 +281,17 @@ impl Round<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_are_summed_to_the_last_one() {
+        for count in [0usize, 5, 16, 45] {
+            let numbers: Vec<f32> = (1..=count).map(|number| number as f32).collect();
+            let squares = (count * (count + 1) * (2 * count + 1) / 6) as f32;
+            assert_eq!(dot(&numbers, &numbers), squares, "{count}");
+        }
+    }
+}
