@@ -27,3 +27,33 @@ pub fn evenly_spread<T: Copy>(list: &[T], most: usize) -> Vec<T> {
 pub fn luminance(rgb: glam::Vec3) -> f32 {
     rgb.dot(glam::Vec3::new(0.2126, 0.7152, 0.0722))
 }
+
+/// The sum of products of two lists of one length, in so many lanes that processors add at once: in a fixed order, which
+/// the number of lanes decides.
+#[inline]
+pub fn sum_of_products<const LANES: usize>(a: &[f32], b: &[f32]) -> f32 {
+    let mut lanes = [0.0f32; LANES];
+    let (a_parts, b_parts) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest: f32 = a_parts.remainder().iter().zip(b_parts.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in a_parts.zip(b_parts) {
+        for lane in 0..LANES {
+            lanes[lane] += a[lane] * b[lane];
+        }
+    }
+    lanes.iter().sum::<f32>() + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_are_summed_to_the_last_one() {
+        for count in [0usize, 5, 16, 45] {
+            let numbers: Vec<f32> = (1..=count).map(|number| number as f32).collect();
+            let squares = (count * (count + 1) * (2 * count + 1) / 6) as f32;
+            assert_eq!(sum_of_products::<16>(&numbers, &numbers), squares, "{count}");
+            assert_eq!(sum_of_products::<8>(&numbers, &numbers), squares, "{count}");
+        }
+    }
+}

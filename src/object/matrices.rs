@@ -5,6 +5,7 @@
 
 use super::nodes::{NodeReader, NodeTable};
 use super::transport::Transport;
+use crate::math::sum_of_products;
 use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
 
@@ -149,7 +150,7 @@ impl LightChunk {
                 let (first, length) = (usize::from(first), usize::from(length));
                 for channel in 0..3 {
                     let values = &self.values[at..at + length];
-                    sums[channel] += f64::from(dot(values, &light[channel][first..first + length]));
+                    sums[channel] += f64::from(sum_of_products::<8>(values, &light[channel][first..first + length]));
                     at += length;
                 }
             }
@@ -176,20 +177,6 @@ impl LightChunk {
             }
         }
     }
-}
-
-/// A sum of products in eight lanes, in a fixed order.
-#[inline]
-fn dot(a: &[f32], b: &[f32]) -> f32 {
-    let mut lanes = [0.0f32; 8];
-    let (a_parts, b_parts) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f32 = a_parts.remainder().iter().zip(b_parts.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in a_parts.zip(b_parts) {
-        for lane in 0..8 {
-            lanes[lane] += a[lane] * b[lane];
-        }
-    }
-    lanes.iter().sum::<f32>() + rest
 }
 
 /// The image of some pixels as a sparse matrix on the values at nodes, for a light that is held.

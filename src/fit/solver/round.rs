@@ -5,6 +5,7 @@ use super::eliminate::BlockRows;
 use super::light_shape::LightShape;
 use super::observations::{Observation, Observations};
 use super::plan::Block;
+use crate::math::sum_of_products;
 use crate::render::cached::irradiance::add_irradiance_row;
 use crate::render::cached::lobe_sum::{LobeSums, add_lobe_row, lobe_sums, lobe_with_derivative, wide_from};
 use crate::render::cached::{CachedTransport, LightPlanes, PointLight, ShadingPoint, SurfaceLight, ViewFootprints};
@@ -59,17 +60,6 @@ pub fn open_prior(mean_radiance: f32, openness: f64) -> BlockPrior {
         noise: 0.05 * f64::from(mean_radiance).max(1e-6),
         spread: 0.1,
     }
-}
-
-/// Sum of products, in lanes that processors add at once.
-fn dot(a: &[f32], b: &[f32]) -> f32 {
-    const LANES: usize = 16;
-    let mut sums = [0.0f32; LANES];
-    for (a, b) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
-        (0..LANES).for_each(|lane| sums[lane] += a[lane] * b[lane]);
-    }
-    let rest = a.len() - a.len() % LANES;
-    sums.iter().sum::<f32>() + a[rest..].iter().zip(&b[rest..]).map(|(a, b)| a * b).sum::<f32>()
 }
 
 /// Logarithms of [`WIDTHS`].
@@ -248,7 +238,8 @@ impl Round<'_> {
                     add_lobe_row(basis, &place, width, scales, &mut full);
                     shape.reduce(&full, &mut reduced[1 + which]);
                     let all = [&sums.base, &sums.grazing][which];
-                    of_surface[which] = [0, 1, 2].map(|c| all[c] - dot(&full, &self.light.channels[c]));
+                    of_surface[which] =
+                        [0, 1, 2].map(|c| all[c] - sum_of_products::<16>(&full, &self.light.channels[c]));
                 }
             }
             let direct = self.interpolate(&self.at_points.direct, observation);
@@ -278,20 +269,6 @@ impl Round<'_> {
             let (mean, deviation) = prior.log_width;
             rows.set_prior(2 + cells, 1.0 / deviation, mean - f64::from(solution.log_width));
             rows.eliminate();
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn products_are_summed_to_the_last_one() {
-        for count in [0usize, 5, 16, 45] {
-            let numbers: Vec<f32> = (1..=count).map(|number| number as f32).collect();
-            let squares = (count * (count + 1) * (2 * count + 1) / 6) as f32;
-            assert_eq!(dot(&numbers, &numbers), squares, "{count}");
         }
     }
 }
