@@ -12,7 +12,7 @@
 //!    ([`light_shape`]), with a weak wish for smoothness. [`light_round`] is the round as a whole,
 //!    [`light_evidence`] says what each texel of the light is known by, `light_holes` fills what lies between texels that
 //!    photos show.
-//! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`, `tile_reflectances`, `tile_highlights`) with the
+//! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`, `tile_texels`, `tile_spread`, `tile_highlights`) with the
 //!    footprints of pixels, where the evidence, as far as it is independent (`tile_independence`), decides which texels
 //!    share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_prior`], [`lobe_widths`], [`lobe_families`], `lobe_scene`), then
 //!    [`mod@diffuse`]: all diffuse texels together ([`diffuse_system`]), until the light between surfaces stays (`settle`).
@@ -58,11 +58,13 @@ mod settle;
 mod sieve;
 #[allow(clippy::module_inception)]
 pub mod solver;
+mod texel_system;
 pub mod tile;
 mod tile_highlights;
 mod tile_independence;
 mod tile_lobes;
-mod tile_reflectances;
+mod tile_spread;
+mod tile_texels;
 pub mod transport_check;
 
 #[cfg(test)]

@@ -2,8 +2,8 @@
 //!
 //! Blocks book a pixel at the one texel it covers most. Here diffuse reflectance is solved with the footprints inside the
 //! tile, pixels are relieved of what they cover of the neighbours, of their diffuse reflectance and of what their lobes
-//! send, and what is left tells of the lobe of the one texel (`tile_lobes`). At the end both reflectances of all texels are
-//! solved together (`tile_reflectances`), by pixels among which highlights are no outliers (`tile_highlights`).
+//! send, and what is left tells of the lobe of the one texel (`tile_lobes`). At the end all that is unknown of the texels is
+//! solved together (`tile_texels`), by pixels among which highlights are no outliers (`tile_highlights`).
 
 use super::block::PixelTerms;
 use super::lobe_evidence::LobeBelief;
@@ -165,7 +165,7 @@ impl Tile {
         tile
     }
 
-    /// Solves reflectances and lobes in turn, F0 of each texel by itself in the end. `independence` is the share of pixels
+    /// Solves reflectances and lobes in turn, each texel by itself in the end. `independence` is the share of pixels
     /// that count as independent evidence, at most, `sharing` how lobes are shared in the end; before it is one tree.
     pub fn solve(
         &mut self,
@@ -187,13 +187,12 @@ impl Tile {
         self.end(mean_radiance, independence);
     }
 
-    /// Once lobes are known: F0 of each texel by itself as far as its pixels tell it, highlights counted as such.
+    /// Once lobes are known: each texel by itself as far as its pixels tell it, highlights counted as such.
     pub(super) fn end(&mut self, mean_radiance: f32, independence: f64) {
         self.set_lobes();
         self.solve_diffuse();
         self.trust_highlights(mean_radiance);
-        self.solve_reflectances(independence);
-        self.set_lobes();
+        self.solve_texels(mean_radiance, independence);
     }
 
     /// The pixels: observation, what the lobe sends, weight, squared error.
