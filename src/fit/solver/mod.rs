@@ -12,10 +12,11 @@
 //!    ([`light_shape`]), with a weak wish for smoothness. [`light_round`] is the round as a whole,
 //!    [`light_evidence`] says what each texel of the light is known by, `light_holes` fills what lies between texels that
 //!    photos show.
-//! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`, `tile_texels`, `tile_spread`, `tile_highlights`) with the
-//!    footprints of pixels, where the evidence, as far as it is independent (`tile_independence`), decides which texels
-//!    share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_prior`], [`lobe_widths`], [`lobe_families`], `lobe_scene`), then
-//!    [`mod@diffuse`]: all diffuse texels together ([`diffuse_system`]), until the light between surfaces stays (`settle`).
+//! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`, `tile_texels`, `tile_spread`,
+//!    `tile_highlights`) with the footprints of pixels, where the evidence, as far as it is independent
+//!    (`tile_independence`), decides which texels share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_prior`],
+//!    [`lobe_widths`], [`lobe_families`], `lobe_scene`), then [`mod@diffuse`]: all diffuse texels together
+//!    ([`diffuse_system`]), until the light between surfaces stays (`settle`).
 //! 6. [`choice`]: views that took no part say what lobes, light between surfaces and the light's resolution bought;
 //!    `lobe_tails` says whether highlights reach further than the model's lobes.
 //! 7. [`solver`]: the steps in their order. A fit does them one by one, as [`crate::fit::Fitter`] does those of Adam: on

@@ -2,8 +2,8 @@
 //!
 //! Blocks book a pixel at the one texel it covers most. Here diffuse reflectance is solved with the footprints inside the
 //! tile, pixels are relieved of what they cover of the neighbours, of their diffuse reflectance and of what their lobes
-//! send, and what is left tells of the lobe of the one texel (`tile_lobes`). At the end all that is unknown of the texels is
-//! solved together (`tile_texels`), by pixels among which highlights are no outliers (`tile_highlights`).
+//! send, and what is left tells of the lobe of the one texel (`tile_lobes`). At the end all that is unknown of the texels
+//! is solved together (`tile_texels`), by pixels among which highlights are no outliers (`tile_highlights`).
 
 use super::block::PixelTerms;
 use super::lobe_evidence::LobeBelief;

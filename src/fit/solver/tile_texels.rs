@@ -81,8 +81,10 @@ impl Tile {
                     }
                 }
                 let [at_once, in_all] = WIDTH_REACH;
+                // `max` and `min`: `clamp` would panic where what is believed is not a number.
                 let log_width = (old[3] + sums.width().0.clamp(-at_once, at_once))
-                    .clamp(mean[3] - in_all, mean[3] + in_all)
+                    .max(mean[3] - in_all)
+                    .min(mean[3] + in_all)
                     .clamp(narrowest, 0.0);
                 let wider = log_width - old[3];
                 self.lobes[texel].mean[3] = log_width;
@@ -108,19 +110,19 @@ impl Tile {
         let widths = log_widths();
         let of_texels = self.pixels_of_texels();
         let of_texel = |texel: usize| {
-            let specular = self.lobes[texel].mean;
+            let lobe = self.lobes[texel].mean;
             let mut kept = [KeptStencil::default(); 3];
             let part = |&(pixel, weight): &(u32, f32)| {
                 let own = &self.pixels[pixel as usize];
                 let mut stencil_at = |place: usize, off: f64| -> WidthStencil {
-                    kept[place].of(&widths, specular[3] + off, own.nodes.0..own.nodes.1)
+                    kept[place].of(&widths, lobe[3] + off, own.nodes.0..own.nodes.1)
                 };
                 let (middle, narrower, wider) = (stencil_at(0, 0.0), stencil_at(1, -STEP), stencil_at(2, STEP));
                 let slope = |c: usize| {
-                    let lobe = |stencil: &WidthStencil| {
-                        specular[c] as f32 * stencil.of(&own.terms.base, c) + stencil.of(&own.terms.grazing, c)
+                    let sent = |stencil: &WidthStencil| {
+                        lobe[c] as f32 * stencil.of(&own.terms.base, c) + stencil.of(&own.terms.grazing, c)
                     };
-                    weight * (lobe(&wider) - lobe(&narrower)) / (2.0 * STEP) as f32
+                    weight * (sent(&wider) - sent(&narrower)) / (2.0 * STEP) as f32
                 };
                 Part {
                     pixel,
