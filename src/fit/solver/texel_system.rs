@@ -37,6 +37,12 @@ impl TexelSystem {
         self.width_y += weight * slope * y;
     }
 
+    /// Adds what is believed of a channel's reflectances: their means, and one over their variances.
+    pub(super) fn believe_reflectances(&mut self, channel: usize, precisions: [f64; 2], [rho, specular]: [f64; 2]) {
+        self.channels[channel].observe(precisions[0], 1.0, 0.0, rho);
+        self.channels[channel].observe(precisions[1], 0.0, 1.0, specular);
+    }
+
     /// Adds what is believed of the change of the width: its mean, and one over its variance.
     pub(super) fn believe_width(&mut self, precision: f64, mean: f64) {
         self.width_width += precision;
@@ -151,8 +157,7 @@ mod tests {
         let mut sums = TexelSystem::default();
         sums.observe(1.0, 0, TexelTerms { arriving: 1.0, base: 0.5, slope: 0.25 }, 0.75);
         assert_eq!(sums.width(), (0.0, 0.0));
-        sums.channels[0].observe(1e-3, 1.0, 0.0, 0.1);
-        sums.channels[0].observe(1e-3, 0.0, 1.0, 0.04);
+        sums.believe_reflectances(0, [1e-3; 2], [0.1, 0.04]);
         sums.believe_width(100.0, 0.0);
         let (change, precision) = sums.width();
         assert!(change.abs() < 1e-4 && (precision / 100.0 - 1.0).abs() < 1e-3, "{change} {precision}");

@@ -93,9 +93,8 @@ impl Tile {
         let mut log_width = Agreement::within(OF_WIDTH);
         for (halves, lobe) in halves.iter_mut().zip(&self.lobes) {
             let of_half = |half: &mut TexelSystem| {
-                for (c, sums) in half.channels.iter_mut().enumerate() {
-                    sums.observe(leans[c], 1.0, 0.0, 0.0);
-                    sums.observe(1.0 / (lobe.square[c] + specular[c]), 0.0, 1.0, 0.0);
+                for c in 0..3 {
+                    half.believe_reflectances(c, [leans[c], 1.0 / (lobe.square[c] + specular[c])], [0.0; 2]);
                 }
                 half.width()
             };
@@ -108,6 +107,7 @@ impl Tile {
 
 #[cfg(test)]
 mod tests {
+    use super::super::block::PixelTerms;
     use super::super::tile_lobes::tests::{TRUTH, tile};
     use super::*;
 
@@ -119,7 +119,7 @@ mod tests {
 
     /// The tile of two materials, with what `more` adds to the radiance of a pixel for the sign of its view: the same in all
     /// views, or one in two views and the other in the next two.
-    fn off_by(agrees: bool, more: impl Fn(&super::super::block::PixelTerms) -> [f32; 3]) -> Tile {
+    fn off_by(agrees: bool, more: impl Fn(&PixelTerms) -> [f32; 3]) -> Tile {
         let mut tile = tile(TRUTH);
         tile.noise = 1e-4;
         tile.set_lobes();
@@ -132,28 +132,25 @@ mod tests {
         tile
     }
 
+    /// The variance is the least unless views agree, and then well above it.
+    fn assert_agreement_counts([least, most]: [f64; 2], variance: impl Fn(bool) -> f64) {
+        assert!((variance(false).sqrt() - least).abs() < 1e-12);
+        let agreeing = variance(true).sqrt();
+        assert!(agreeing > 2.0 * least && agreeing <= most, "{agreeing}");
+    }
+
     /// Texels whose F0 is off in all views alike, and texels of which each view says something else: both as far.
     #[test]
     fn texture_spreads_and_what_single_views_say_does_not() {
-        let of = |agrees: bool| spread_of(&off_by(agrees, |terms| terms.base[4].map(|base| 0.2 * base))).specular[1];
-        let [least, most] = OF_SPECULAR;
-        assert!((of(false).sqrt() - least).abs() < 1e-12);
-        let agreeing = of(true).sqrt();
-        assert!(agreeing > 2.0 * least && agreeing <= most, "{agreeing}");
+        let brighter = |terms: &PixelTerms| terms.base[4].map(|base| 0.2 * base);
+        assert_agreement_counts(OF_SPECULAR, |agrees| spread_of(&off_by(agrees, brighter)).specular[1]);
     }
 
     #[test]
     fn widths_that_all_views_say_spread_as_well() {
         // A lobe of the same F0 that is wider than is believed.
-        let of = |agrees: bool| {
-            let wider =
-                |terms: &super::super::block::PixelTerms| [1; 3].map(|c: usize| terms.base[6][c] - terms.base[5][c]);
-            spread_of(&off_by(agrees, wider)).log_width
-        };
-        let [least, most] = OF_WIDTH;
-        assert!((of(false).sqrt() - least).abs() < 1e-12);
-        let agreeing = of(true).sqrt();
-        assert!(agreeing > 2.0 * least && agreeing <= most, "{agreeing}");
+        let wider = |terms: &PixelTerms| [1; 3].map(|c: usize| terms.base[6][c] - terms.base[5][c]);
+        assert_agreement_counts(OF_WIDTH, |agrees| spread_of(&off_by(agrees, wider)).log_width);
     }
 
     #[test]

@@ -68,8 +68,8 @@ impl Tile {
                 let LobeBelief { mean, square, .. } = &believed[texel];
                 let mut sums = TexelSystem::default();
                 for c in 0..3 {
-                    sums.channels[c].observe(leans[c], 1.0, 0.0, f64::from(start[texel][c]));
-                    sums.channels[c].observe(1.0 / (square[c] + spread.specular[c]), 0.0, 1.0, mean[c]);
+                    let precisions = [leans[c], 1.0 / (square[c] + spread.specular[c])];
+                    sums.believe_reflectances(c, precisions, [f64::from(start[texel][c]), mean[c]]);
                 }
                 sums.believe_width(1.0 / (square[3] + spread.log_width), mean[3] - old[3]);
                 for part in parts {
