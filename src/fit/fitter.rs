@@ -277,6 +277,17 @@ impl Fitter {
         unknown_names(&self.scene, &self.settings.exclude)
     }
 
+    /// Steps until the fit is done. Whether it is, and `stop` was not raised before; it may be gone on with then.
+    pub fn finish(&mut self, stop: &AtomicBool) -> Result<bool> {
+        loop {
+            match self.step(stop)? {
+                StepOutcome::Stepped(_) => {}
+                StepOutcome::Finished => return Ok(true),
+                StepOutcome::Interrupted => return Ok(false),
+            }
+        }
+    }
+
     /// Does one step. `stop` may be raised by another thread at any time: the step in progress is then dropped.
     pub fn step(&mut self, stop: &AtomicBool) -> Result<StepOutcome> {
         let began = Instant::now();

@@ -9,7 +9,7 @@ use super::contest::Contestant;
 use super::contest::judge::{COLUMNS, Judge};
 use super::demo::photograph;
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
-use crate::fit::{FitSettings, Fitter, StepOutcome};
+use crate::fit::{FitSettings, Fitter};
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::insight::capture;
 use crate::insight::intervals::{IntervalCoverage, WRONG, interval_coverage};
@@ -196,16 +196,12 @@ fn warnings(findings: &[Finding]) -> Vec<String> {
 fn fitted(given: &Scene, settings: FitSettings, stop: &AtomicBool) -> Result<Fitter> {
     let surface = Arc::new(Surface::new(given.mesh.clone())?);
     let mut fitter = Fitter::new(Arc::new(given.clone()), surface, settings, None)?;
-    loop {
-        match fitter.step(stop)? {
-            StepOutcome::Stepped(_) => {}
-            StepOutcome::Finished => return Ok(fitter),
-            StepOutcome::Interrupted => {
-                return Err(Error::new(ErrorKind::Stopped, "the hard cases were stopped")
-                    .remedy("the rows that were done are written"));
-            }
-        }
+    if !fitter.finish(stop)? {
+        return Err(
+            Error::new(ErrorKind::Stopped, "the hard cases were stopped").remedy("the rows that were done are written")
+        );
     }
+    Ok(fitter)
 }
 
 /// Aligned errors of the diffuse map over seen texels within one unit of the defect, and beyond.

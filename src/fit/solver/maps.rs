@@ -176,8 +176,7 @@ impl SolverScene {
         let beliefs = (lobes, self.settings.lobe_sharing);
         tile.solve(self.settings.map_size, self.observations.mean, self.settings.independence, beliefs);
         let alternatives = check.map(|check| check.of_tile(self, &mut tile));
-        let rows =
-            tile.pixels().map(|(index, lobe, weight, _)| (index, self.row(round, index, lobe, weight))).collect();
+        let rows = tile.pixels().map(|(index, lobe, weight)| (index, self.row(round, index, lobe, weight))).collect();
         let tails = tile.tail_sums(self.views.len());
         // They are large.
         tile.drop_pixels();

@@ -106,12 +106,23 @@ impl Round<'_> {
         work.nodes = 0..0;
     }
 
+    fn point_of(&self, work: &BlockWork, index: usize) -> &ShadingPoint {
+        self.point(&self.observations.list[work.used[index] as usize])
+    }
+
+    /// Terms of a block in the order of the points of the grid that serve their lobes: other surface around a point is
+    /// set up once then.
+    fn by_lobe_point(&self, work: &BlockWork, mut terms: Vec<usize>) -> Vec<usize> {
+        terms.sort_by_key(|&index| self.point_of(work, index).lobe_point);
+        terms
+    }
+
     /// Fills in the lobe's integrals at these nodes.
     fn fill(&self, work: &mut BlockWork, nodes: std::ops::Range<usize>) {
         let mut sums = [LobeSums::default(); MOST_NODES];
         let mut surface = SurfaceLight::default();
-        for (&used, term) in work.used.iter().zip(&mut work.terms) {
-            let point = self.point(&self.observations.list[used as usize]);
+        for index in self.by_lobe_point(work, (0..work.used.len()).collect()) {
+            let (point, term) = (self.point_of(work, index), &mut work.terms[index]);
             let place = self.transport.lobe_place(point, self.at_points, &mut surface);
             let widths = &WIDTHS[nodes.clone()];
             lobe_sums(&self.transport.basis, &place, self.light, widths, &mut sums[..widths.len()]);
@@ -214,8 +225,9 @@ impl Round<'_> {
         let mut full = vec![0.0f32; basis.padded()];
         let mut surface = SurfaceLight::default();
         let mut reduced = [(); 3].map(|()| vec![0.0f32; count]);
-        for (row, &index) in used.iter().enumerate() {
-            let term = &work.terms[index];
+        let row_of = |index: usize| used.partition_point(|&other| other < index);
+        for index in self.by_lobe_point(work, used.clone()) {
+            let (row, term) = (row_of(index), &work.terms[index]);
             let observation = &self.observations.list[work.used[index] as usize];
             let point = self.point(observation);
             for row in &mut reduced {

@@ -195,12 +195,9 @@ impl Tile {
         self.solve_texels(mean_radiance, independence);
     }
 
-    /// The pixels: observation, what the lobe sends, weight, squared error.
-    pub fn pixels(&self) -> impl Iterator<Item = (u32, [f32; 3], f32, f64)> + '_ {
-        self.pixels.iter().map(|pixel| {
-            let error = self.residual(pixel).map(|e| f64::from(e).powi(2)).iter().sum::<f64>() / 3.0;
-            (pixel.observation, pixel.lobe, pixel.terms.weight, error)
-        })
+    /// The pixels: observation, what the lobe sends, weight.
+    pub fn pixels(&self) -> impl Iterator<Item = (u32, [f32; 3], f32)> + '_ {
+        self.pixels.iter().map(|pixel| (pixel.observation, pixel.lobe, pixel.terms.weight))
     }
 
     /// Frees the pixels, which are large.

@@ -16,7 +16,7 @@ use super::demo::photograph;
 use super::prepare::{Prepared, RunSettings, prepare, read_scene};
 use crate::atlas::{AtlasSettings, KeepUv};
 use crate::error::{Error, ErrorKind, Place, Result};
-use crate::fit::{FitSettings, Fitter, StepOutcome};
+use crate::fit::{FitSettings, Fitter};
 use crate::insight::study::StudyTable;
 use crate::scene::study::{StudyKind, StudySettings, build};
 use crate::scene::{ReadSettings, Scene};
@@ -143,12 +143,8 @@ pub fn mvcl(options: &StudyOptions, stop: &AtomicBool, tell: &dyn Fn(&str)) -> R
 /// One fit and its scores, one a column of [`measure::COLUMNS`].
 fn run(prepared: &Prepared, fit: FitSettings, stop: &AtomicBool) -> Result<Vec<f64>> {
     let mut fitter = Fitter::new(Arc::clone(&prepared.scene), Arc::clone(&prepared.surface), fit, None)?;
-    loop {
-        match fitter.step(stop)? {
-            StepOutcome::Stepped(_) => {}
-            StepOutcome::Finished => break,
-            StepOutcome::Interrupted => return Err(stopped()),
-        }
+    if !fitter.finish(stop)? {
+        return Err(stopped());
     }
     let values = measure::measure(&fitter, stop)?;
     if stop.load(Ordering::Relaxed) { Err(stopped()) } else { Ok(values) }

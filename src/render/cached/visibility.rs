@@ -7,6 +7,9 @@
 //! Two things save rays. Within a point, three of four cells are traced only where neighbouring texels disagree. Between
 //! points, a texel that all coarser neighbours on the grid see wholly, or not at all, is taken over.
 
+mod alike;
+
+use self::alike::AlikeAround;
 use super::light_basis::LightBasis;
 use super::points::{NO_POINT, VisibilityGrid};
 use crate::math::sphere::direction_of_texel;
@@ -142,9 +145,18 @@ struct Cells {
     height: usize,
     /// Directions of the cells, twice as many along each axis as texels.
     directions: Vec<Vec3>,
+    /// Row by row of the light.
+    hats: Vec<HatWeights>,
     padded: usize,
     /// Whether the other three cells of a texel are traced where its neighbourhood is not of one mind.
     fine_edges: bool,
+}
+
+/// Weights of a hat over its 4 x 4 cells.
+struct HatWeights {
+    /// Row after row; 0 beyond a pole.
+    of_cells: [f32; 16],
+    total: f32,
 }
 
 #[derive(Default)]
@@ -153,6 +165,9 @@ struct Scratch {
     cells: Vec<u8>,
     /// Per texel: 0 hidden, 1 seen, 2 mixed, 3 not known yet.
     texels: Vec<u8>,
+    /// Per texel, whether what was looked at first is seen.
+    first: Vec<u8>,
+    alike: AlikeAround,
 }
 
 impl Cells {
@@ -161,7 +176,8 @@ impl Cells {
         let directions = (0..4 * width * height)
             .map(|cell| direction_of_texel(cell / (2 * width), cell % (2 * width), 2 * width, 2 * height))
             .collect();
-        Cells { width, height, directions, padded: basis.padded(), fine_edges }
+        let hats = (0..height).map(|row| HatWeights::of_row(row, height)).collect();
+        Cells { width, height, directions, hats, padded: basis.padded(), fine_edges }
     }
 
     /// Visible shares of all hats at a point, and the number of rays that took.
@@ -174,6 +190,7 @@ impl Cells {
         scratch: &mut Scratch,
     ) -> (Vec<u8>, u64) {
         let (width, height) = (self.width, self.height);
+        let Scratch { cells, texels, first, alike } = scratch;
         let point = &grid.points[index];
         let origin = surface.bvh().offset_origin(point.position, point.geometric_normal, point.geometric_normal);
         let mut rays = 0u64;
@@ -187,73 +204,54 @@ impl Cells {
             u8::from(!surface.bvh().is_occluded(&Ray { origin, direction, t_max: f32::INFINITY }))
         };
         let cell_of = |row: usize, column: usize, k: usize| (2 * row + k / 2) * 2 * width + 2 * column + k % 2;
-        scratch.cells.clear();
-        scratch.cells.resize(4 * width * height, 2);
-        scratch.texels.clear();
-        scratch.texels.resize(width * height, 3);
-        if let Some((first, others)) = parents.split_first() {
-            for texel in 0..width * height {
-                let value = first[texel];
-                if (value == 0 || value == 255) && others.iter().all(|other| other[texel] == value) {
-                    scratch.texels[texel] = u8::from(value == 255);
-                }
-            }
-        }
+        cells.clear();
+        cells.resize(4 * width * height, 2);
+        take_over(parents, width * height, texels);
         // One cell a texel, in a checkerboard, so that neighbours look at different places.
-        let mut first_cell = vec![2u8; width * height];
+        first.clear();
+        first.extend_from_slice(texels);
         for row in 0..height {
-            for column in 0..width {
-                let texel = row * width + column;
-                first_cell[texel] = match scratch.texels[texel] {
-                    3 => {
-                        let cell = cell_of(row, column, if (row + column) % 2 == 0 { 0 } else { 3 });
-                        let seen = trace(cell);
-                        scratch.cells[cell] = seen;
-                        seen
-                    }
-                    known => known,
-                };
+            for (column, first) in first[row * width..(row + 1) * width].iter_mut().enumerate() {
+                if *first == 3 {
+                    let cell = cell_of(row, column, if (row + column) % 2 == 0 { 0 } else { 3 });
+                    *first = trace(cell);
+                    cells[cell] = *first;
+                }
             }
         }
         // The other three where the neighbourhood is not of one mind.
+        alike.look_at(first, width);
         for row in 0..height {
             for column in 0..width {
                 let texel = row * width + column;
-                let own = first_cell[texel];
-                let mut agree = true;
-                for near_row in row.saturating_sub(1)..(row + 2).min(height) {
-                    for step in [width - 1, 0, 1] {
-                        agree &= first_cell[near_row * width + (column + step) % width] == own;
-                    }
+                let own = first[texel];
+                if alike.of[texel] || texels[texel] != 3 || !self.fine_edges {
+                    (0..4).for_each(|k| cells[cell_of(row, column, k)] = own);
+                    texels[texel] = own;
+                    continue;
                 }
-                let is_known = agree || scratch.texels[texel] != 3 || !self.fine_edges;
                 let mut sum = 0;
                 for k in 0..4 {
                     let cell = cell_of(row, column, k);
-                    if scratch.cells[cell] == 2 {
-                        scratch.cells[cell] = if is_known { own } else { trace(cell) };
+                    if cells[cell] == 2 {
+                        cells[cell] = trace(cell);
                     }
-                    sum += scratch.cells[cell];
+                    sum += cells[cell];
                 }
-                scratch.texels[texel] = match sum {
+                texels[texel] = match sum {
                     0 => 0,
                     4 => 1,
                     _ => 2,
                 };
             }
         }
+        alike.look_at(texels, width);
         let mut made = vec![0u8; self.padded];
         for row in 0..height {
             for column in 0..width {
-                let own = scratch.texels[row * width + column];
-                let mut uniform = own != 2;
-                for near_row in row.saturating_sub(1)..(row + 2).min(height) {
-                    for step in [width - 1, 0, 1] {
-                        uniform &= scratch.texels[near_row * width + (column + step) % width] == own;
-                    }
-                }
-                made[row * width + column] =
-                    if uniform { own * 255 } else { self.hat_share(&scratch.cells, row, column) };
+                let texel = row * width + column;
+                let is_uniform = alike.of[texel] && texels[texel] != 2;
+                made[texel] = if is_uniform { texels[texel] * 255 } else { self.hat_share(cells, row, column) };
             }
         }
         (made, rays)
@@ -262,7 +260,40 @@ impl Cells {
     /// Visible share of a hat that an edge crosses.
     fn hat_share(&self, cells: &[u8], row: usize, column: usize) -> u8 {
         let (width, height) = (2 * self.width, 2 * self.height);
-        let (mut seen, mut total) = (0.0f32, 0.0f32);
+        let HatWeights { of_cells, total } = &self.hats[row];
+        let columns = [0, 1, 2, 3].map(|k| (2 * column + width + k - 1) % width);
+        let mut seen = 0.0f32;
+        for (i, weights) in of_cells.chunks_exact(4).enumerate() {
+            // What lies beyond a pole has no weight.
+            let first = (2 * row + i).saturating_sub(1).min(height - 1) * width;
+            for (column, weight) in columns.iter().zip(weights) {
+                seen += weight * f32::from(cells[first + column]);
+            }
+        }
+        (255.0 * seen / total + 0.5) as u8
+    }
+}
+
+/// What all of the coarser neighbours see wholly, or not at all: 1 and 0, and 3 for what is not known.
+fn take_over(parents: &[&[u8]], count: usize, texels: &mut Vec<u8>) {
+    texels.clear();
+    let Some((first, others)) = parents.split_first() else { return texels.resize(count, 3) };
+    texels.extend(first[..count].iter().map(|share| match share {
+        0 => 0,
+        255 => 1,
+        _ => 3,
+    }));
+    for other in others {
+        for ((texel, first), other) in texels.iter_mut().zip(*first).zip(*other) {
+            *texel = if first == other { *texel } else { 3 };
+        }
+    }
+}
+
+impl HatWeights {
+    fn of_row(row: usize, height: usize) -> Self {
+        let (mut of_cells, mut total) = ([0.0; 16], 0.0f32);
+        let height = 2 * height;
         for (i, weight_row) in HAT.iter().enumerate() {
             let cell_row = 2 * row as i64 - 1 + i as i64;
             // Beyond a pole there is nothing; within half a texel of it a hat stays at its full height.
@@ -270,18 +301,27 @@ impl Cells {
                 continue;
             }
             let at_pole = cell_row == 0 || cell_row == height as i64 - 1;
-            let weight_row = if at_pole { 0.5 } else { *weight_row } * sine_of_row(cell_row as usize, height);
+            let sine = (std::f32::consts::PI * (cell_row as f32 + 0.5) / height as f32).sin();
+            let weight_row = if at_pole { 0.5 } else { *weight_row } * sine;
             for (k, weight_column) in HAT.iter().enumerate() {
-                let cell_column = (2 * column + width + k - 1) % width;
-                let weight = weight_row * weight_column;
-                total += weight;
-                seen += weight * f32::from(cells[cell_row as usize * width + cell_column]);
+                of_cells[4 * i + k] = weight_row * weight_column;
+                total += weight_row * weight_column;
             }
         }
-        (255.0 * seen / total + 0.5) as u8
+        HatWeights { of_cells, total }
     }
 }
 
-fn sine_of_row(row: usize, height: usize) -> f32 {
-    (std::f32::consts::PI * (row as f32 + 0.5) / height as f32).sin()
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_all_neighbours_see_alike_is_taken_over() {
+        let mut texels = vec![7];
+        take_over(&[&[0, 255, 255, 9, 0], &[0, 255, 0, 9, 1]], 4, &mut texels);
+        assert_eq!(texels, [0, 1, 3, 3]);
+        take_over(&[], 2, &mut texels);
+        assert_eq!(texels, [3, 3]);
+    }
 }
