@@ -317,6 +317,22 @@ mod tests {
     use super::*;
 
     #[test]
+    fn hats_weigh_their_cells_alike_in_all_rows_and_across_the_seam() {
+        let (width, height) = (8, 4);
+        let all = Cells::new(&LightBasis::new(width, height), true);
+        let (seen, mut edge) = (vec![1; 4 * width * height], vec![0; 4 * width * height]);
+        edge.iter_mut().skip(2 * width - 1).step_by(2 * width).for_each(|cell| *cell = 1);
+        for row in 0..height {
+            for column in 0..width {
+                assert_eq!(all.hat_share(&seen, row, column), 255, "{row} {column}");
+                // Of the last column of cells an eighth is of the first hats, three of the last.
+                let expected = [(0, 32), (width - 1, 96)].iter().find(|of| of.0 == column).map_or(0, |of| of.1);
+                assert_eq!(all.hat_share(&edge, row, column), expected, "{row} {column}");
+            }
+        }
+    }
+
+    #[test]
     fn what_all_neighbours_see_alike_is_taken_over() {
         let mut texels = vec![7];
         take_over(&[&[0, 255, 255, 9, 0], &[0, 255, 0, 9, 1]], 4, &mut texels);
