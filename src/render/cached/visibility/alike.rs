@@ -17,7 +17,7 @@ impl AlikeAround {
         self.of.clear();
         self.least.clear();
         self.most.clear();
-        let (Some(height @ 1..), true) = (values.len().checked_div(width), width > 0) else { return };
+        let Some(height) = values.len().checked_div(width) else { return };
         for values in values.chunks_exact(width) {
             self.row.clear();
             self.row.push(values[width - 1]);
