@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use glam::Vec3;
-use patina::fit::{FitSettings, Fitter, Method, StepOutcome};
+use patina::fit::{FitSettings, Fitter, Method};
 use patina::insight::capture::{Capture, check};
 use patina::job::demo::photograph;
 use patina::material::texels::texels_from_maps;
@@ -144,7 +144,7 @@ fn fits_to_spoiled_captures_tell_what_is_wrong() {
             ..Default::default()
         };
         let mut fitter = Fitter::new(given, surface, settings, None).unwrap();
-        while let StepOutcome::Stepped(_) = fitter.step(&GO).unwrap() {}
+        assert!(fitter.finish(&GO).unwrap());
         let told = codes(&check(&fitter, &GO));
         match expected {
             "" => assert!(told.is_empty(), "{}: {told:?}", case.name()),
