@@ -19,8 +19,9 @@
 //!
 //! [`super::lobe_evidence`] asks one group; here groups are made and weighed.
 
-use super::lobe_evidence::{Evidence, LobeBelief, LobeSumsOfGroup, log_sum};
+use super::lobe_evidence::{Evidence, LobeBelief, log_sum};
 use super::lobe_prior::LobePrior;
+use super::lobe_sums::LobeSumsOfGroup;
 use super::lobe_widths::LOBE_WIDTHS;
 use std::cell::RefCell;
 use std::collections::HashMap;

@@ -42,6 +42,11 @@ impl WidthStencil {
         stencil
     }
 
+    /// The integrated widths it takes, and what each counts.
+    pub(super) fn weights(&self) -> impl Iterator<Item = (usize, f32)> {
+        (self.first..self.first + self.count).zip(self.weights)
+    }
+
     /// The value at the width, of values at all integrated widths; not below zero, which no integral of a lobe is.
     pub fn of(&self, values: &[[f32; 3]; MOST_NODES], channel: usize) -> f32 {
         let known = &values[self.first..self.first + self.count];

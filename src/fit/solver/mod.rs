@@ -15,7 +15,7 @@
 //! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`, `tile_texels`, `tile_spread`,
 //!    `tile_highlights`) with the footprints of pixels, where the evidence, as far as it is independent
 //!    (`tile_independence`), decides which texels share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_prior`],
-//!    [`lobe_widths`], [`lobe_families`], `lobe_scene`), then [`mod@diffuse`]: all diffuse texels together
+//!    [`lobe_sums`], [`lobe_widths`], [`lobe_families`], `lobe_scene`), then [`mod@diffuse`]: all diffuse texels together
 //!    ([`diffuse_system`]), until the light between surfaces stays (`settle`).
 //! 6. [`choice`]: views that took no part say what lobes, light between surfaces and the light's resolution bought;
 //!    `lobe_tails` says whether highlights reach further than the model's lobes.
@@ -44,6 +44,7 @@ pub mod lobe_families;
 mod lobe_kind;
 pub mod lobe_prior;
 mod lobe_scene;
+pub mod lobe_sums;
 mod lobe_tails;
 pub mod lobe_tree;
 pub mod lobe_widths;

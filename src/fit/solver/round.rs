@@ -8,7 +8,7 @@ use super::plan::Block;
 use crate::math::sum_of_products;
 use crate::render::cached::irradiance::add_irradiance_row;
 use crate::render::cached::lobe_sum::{LobeSums, add_lobe_row, lobe_sums, lobe_with_derivative, wide_from};
-use crate::render::cached::{CachedTransport, LightPlanes, PointLight, ShadingPoint, SurfaceLight, ViewFootprints};
+use crate::render::cached::{CachedTransport, LightPlanes, PointLight, SeenLight, ShadingPoint, ViewFootprints};
 
 /// Widths that are looked at: evenly in the logarithm, closer where lobes are wide.
 pub const WIDTHS: [f32; MOST_NODES] = [0.02, 0.04, 0.075, 0.12, 0.18, 0.26, 0.37, 0.52, 0.73, 1.0];
@@ -110,8 +110,8 @@ impl Round<'_> {
         self.point(&self.observations.list[work.used[index] as usize])
     }
 
-    /// Terms of a block in the order of the points of the grid that serve their lobes: other surface around a point is
-    /// set up once then.
+    /// Terms of a block in the order of the points of the grid that serve their lobes: what a point sees is put
+    /// together once then.
     fn by_lobe_point(&self, work: &BlockWork, mut terms: Vec<usize>) -> Vec<usize> {
         terms.sort_by_key(|&index| self.point_of(work, index).lobe_point);
         terms
@@ -120,12 +120,12 @@ impl Round<'_> {
     /// Fills in the lobe's integrals at these nodes.
     fn fill(&self, work: &mut BlockWork, nodes: std::ops::Range<usize>) {
         let mut sums = [LobeSums::default(); MOST_NODES];
-        let mut surface = SurfaceLight::default();
+        let mut seen = SeenLight::default();
         for index in self.by_lobe_point(work, (0..work.used.len()).collect()) {
             let (point, term) = (self.point_of(work, index), &mut work.terms[index]);
-            let place = self.transport.lobe_place(point, self.at_points, &mut surface);
+            let place = self.transport.lobe_place(point, self.light, self.at_points, &mut seen);
             let widths = &WIDTHS[nodes.clone()];
-            lobe_sums(&self.transport.basis, &place, self.light, widths, &mut sums[..widths.len()]);
+            lobe_sums(&self.transport.basis, &place, widths, &mut sums[..widths.len()]);
             for (node, sums) in nodes.clone().zip(&sums) {
                 (term.base[node], term.grazing[node]) = (sums.base, sums.grazing);
             }
@@ -223,7 +223,7 @@ impl Round<'_> {
         let solution = &work.solution;
         let width = solution.log_width.exp();
         let mut full = vec![0.0f32; basis.padded()];
-        let mut surface = SurfaceLight::default();
+        let mut seen = SeenLight::default();
         let mut reduced = [(); 3].map(|()| vec![0.0f32; count]);
         let row_of = |index: usize| used.partition_point(|&other| other < index);
         for index in self.by_lobe_point(work, used.clone()) {
@@ -239,12 +239,12 @@ impl Round<'_> {
                 add_irradiance_row(basis, normal, self.transport.visibility.of(at as usize), weight, &mut full);
             }
             shape.reduce(&full, &mut reduced[0]);
-            let place = self.transport.lobe_place(point, self.at_points, &mut surface);
+            let place = self.transport.lobe_place(point, self.light, self.at_points, &mut seen);
             let mut sums = LobeSums::default();
             // What the lobe sends of other surface: what is left of it without the light.
             let mut of_surface = [[0.0f32; 3]; 2];
             if self.has_lobe {
-                sums = lobe_with_derivative(basis, &place, self.light, width);
+                sums = lobe_with_derivative(basis, &place, width);
                 for (which, scales) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
                     full.fill(0.0);
                     add_lobe_row(basis, &place, width, scales, &mut full);

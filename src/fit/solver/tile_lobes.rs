@@ -3,11 +3,11 @@
 //! A pixel tells of the lobe of the one texel it covers most, once it is relieved of what the others under it send: across
 //! the border of two materials gold would otherwise be fitted with the paint's highlights.
 
-use super::cell_sums::System;
-use super::lobe_evidence::{LobeBelief, LobeSumsOfGroup};
+use super::lobe_evidence::LobeBelief;
 use super::lobe_prior::LobePrior;
+use super::lobe_sums::{LobeSumsOfGroup, WidthWeights};
 use super::lobe_tree::{LobeSharing, TreeTexel, beliefs};
-use super::lobe_widths::{KeptStencil, LOBE_WIDTHS, weighed_log_widths, weighed_stencils};
+use super::lobe_widths::{KeptStencil, LOBE_WIDTHS, weighed_log_widths};
 use super::round::log_widths;
 use super::tile::{TILE, Tile};
 use std::time::Instant;
@@ -63,38 +63,30 @@ impl Tile {
         let scale = independence / self.noise;
         let count = self.texels.len();
         let widths = weighed_log_widths();
-        let stencils = weighed_stencils();
-        let mut raw = vec![[[System::default(); 3]; LOBE_WIDTHS]; count];
+        let weights = WidthWeights::new();
+        let integrated = log_widths();
+        let mut raw = vec![LobeSumsOfGroup::default(); count];
+        let mut first = vec![0usize; count];
         for pixel in &self.pixels {
+            first[pixel.texel] = first[pixel.texel].max(pixel.nodes.0);
             let weight = scale * f64::from(pixel.terms.weight);
             if weight == 0.0 {
                 continue;
             }
-            let own = &mut raw[pixel.texel];
-            for c in 0..3 {
-                let e = f64::from(pixel.terms.arriving[c]);
+            let radiance = [0, 1, 2].map(|c| {
                 let neighbours = self.under(pixel, c) - self.rho[pixel.texel][c];
                 let beside = pixel.beside[c] + pixel.terms.arriving[c] * neighbours;
-                let radiance = f64::from(pixel.terms.radiance[c] - beside);
-                // A width that was not looked at is the narrowest that was, and worse.
-                for (sums, stencil) in own.iter_mut().zip(&stencils[pixel.nodes.0]) {
-                    let s = f64::from(stencil.of(&pixel.terms.base, c));
-                    let y = radiance - f64::from(stencil.of(&pixel.terms.grazing, c));
-                    sums[c].observe(weight, e, s, y);
-                }
-            }
+                pixel.terms.radiance[c] - beside
+            });
+            // A width that was not looked at is the narrowest that was, and worse.
+            raw[pixel.texel].observe(weight, &pixel.terms, (pixel.nodes.0, &weights), radiance);
         }
-        let integrated = log_widths();
-        let first = self.pixels.iter().fold(vec![0usize; count], |mut first, pixel| {
-            first[pixel.texel] = first[pixel.texel].max(pixel.nodes.0);
-            first
-        });
         let sums: Vec<LobeSumsOfGroup> = raw
             .iter()
             .zip(&first)
             .map(|(raw, &first)| {
                 let worse = widths.map(|width| UNSEEN_WIDTH * (integrated[first] - width).max(0.0));
-                LobeSumsOfGroup::of_texel(raw, 1.0 / (TEXEL_SPREAD * TEXEL_SPREAD), &worse)
+                raw.without_deviation(1.0 / (TEXEL_SPREAD * TEXEL_SPREAD), &worse)
             })
             .collect();
         let texels: Vec<TreeTexel> = self
@@ -121,7 +113,7 @@ impl Tile {
         for (texel, lobe) in self.lobes.iter().enumerate() {
             let node = widths.partition_point(|&width| width < lobe.mean[3]).min(LOBE_WIDTHS - 1);
             self.variance[texel] = [0, 1, 2].map(|c| {
-                let System { ee, es, .. } = raw[texel][node][c];
+                let (ee, es) = raw[texel].diffuse(c, node);
                 (1.0 / (ee + ridge) + (es / (ee + ridge)).powi(2) * lobe.square[c]) as f32
             });
         }

@@ -8,7 +8,7 @@
 //! light is read one by one.
 
 use super::half_vector_kernel::{row_in, sums_in};
-use super::light_basis::{LightBasis, LightPlanes};
+use super::light_basis::LightBasis;
 use super::lobe_sum::{LobePlace, LobeSums};
 use crate::math::vector::{WIDEST, versions};
 use std::f32::consts::TAU;
@@ -56,8 +56,7 @@ pub(super) fn places(count: usize) -> &'static Places {
 versions! {
     /// The sums of a lobe over so many places, without derivatives. Sums that are subtracted from each other need the
     /// same number of places, see [`place_count`].
-    pub fn lobe_sums(basis: &LightBasis, place: &LobePlace, light: &LightPlanes, width: f32, count: usize) -> LobeSums
-        = sums_in;
+    pub fn lobe_sums(basis: &LightBasis, place: &LobePlace, width: f32, count: usize) -> LobeSums = sums_in;
     /// Adds the rows of `S0 - S5` and `S5`, times `scales`, to a row over the texels of the light.
     pub fn add_lobe_row(basis: &LightBasis, place: &LobePlace, width: f32, scales: [f32; 2], row: &mut [f32]) = row_in;
 }

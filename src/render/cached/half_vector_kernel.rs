@@ -4,7 +4,7 @@
 //! Written once over [`Vector`]; [`super::half_vector`] chooses the version at run time.
 
 use super::half_vector::{Places, place_count, places};
-use super::light_basis::{LightBasis, LightPlanes};
+use super::light_basis::LightBasis;
 use super::lobe_sum::{LobePlace, LobeSums};
 use crate::math::frame::Frame;
 use crate::math::vector::elementary::exp_minus_one;
@@ -100,19 +100,12 @@ impl<V: Vector> Lobe<V> {
 
 /// [`lobe_sums`](super::half_vector::lobe_sums) with vectors of any kind.
 #[inline(always)]
-pub(super) fn sums_in<V: Vector>(
-    basis: &LightBasis,
-    place: &LobePlace,
-    light: &LightPlanes,
-    width: f32,
-    count: usize,
-) -> LobeSums {
+pub(super) fn sums_in<V: Vector>(basis: &LightBasis, place: &LobePlace, width: f32, count: usize) -> LobeSums {
     let places = places(count);
     let count = places.log_rest.len();
     let lobe = Lobe::<V>::new(place, width, count);
     let mut next = Next::default();
-    let shares = &place.shares[..light.texels.len()];
-    let surface = &place.surface.texels[..light.texels.len()];
+    let seen = &place.seen.texels[..basis.count()];
     let (mut base, mut grazing) = (Vec4::ZERO, Vec4::ZERO);
     for at in (0..count).step_by(V::LANES) {
         if !lobe.find(basis, places, at, &mut next) {
@@ -122,9 +115,7 @@ pub(super) fn sums_in<V: Vector>(
             let (own_base, own_grazing) = (next.base[lane], next.grazing[lane]);
             let mut arriving = Vec4::ZERO;
             for k in 0..4 {
-                let texel = next.taps.texel(k, lane);
-                let seen = light.texels[texel] * (f32::from(shares[texel]) * (1.0 / 255.0));
-                arriving += (seen + surface[texel]) * next.taps.weights[k][lane];
+                arriving += seen[next.taps.texel(k, lane)] * next.taps.weights[k][lane];
             }
             base += arriving * own_base;
             grazing += arriving * own_grazing;

@@ -2,7 +2,7 @@
 //!
 //! Written once over [`Vector`]; [`super::lobe_sum`] chooses the version at run time.
 
-use super::light_basis::{LightBasis, LightPlanes};
+use super::light_basis::LightBasis;
 use super::lobe_sum::{LobePlace, LobeSums};
 use crate::math::vector::Vector;
 use std::f32::consts::{LN_2, PI};
@@ -83,7 +83,6 @@ impl Lobe {
 pub(super) fn sums_in<V: Vector, const DERIVATIVE: bool>(
     basis: &LightBasis,
     place: &LobePlace,
-    light: &LightPlanes,
     widths: &[f32],
     sums: &mut [LobeSums],
 ) {
@@ -100,14 +99,12 @@ pub(super) fn sums_in<V: Vector, const DERIVATIVE: bool>(
     let normal = place.normal.to_array().map(V::splat);
     let viewer = place.to_viewer.to_array().map(V::splat);
     let cos_out_all = V::splat(cos_out);
-    let (light, surface) = (&light.channels, &place.surface.channels);
+    let seen = &place.seen.channels;
     for at in (0..basis.padded()).step_by(V::LANES) {
         let Some(hats) = hats(basis, normal, viewer, cos_out_all, at) else { continue };
-        let share = V::load_bytes(&place.shares[at..at + V::LANES]).mul(V::splat(1.0 / 255.0));
         let mut arriving = [zero; 3];
-        for (c, value) in arriving.iter_mut().enumerate() {
-            let (light, surface) = (V::load(&light[c][at..at + V::LANES]), V::load(&surface[c][at..at + V::LANES]));
-            *value = share.mul_add(light, surface).mul(hats.weight);
+        for (value, seen) in arriving.iter_mut().zip(seen) {
+            *value = V::load(&seen[at..at + V::LANES]).mul(hats.weight);
         }
         let mut grazing = arriving;
         for value in &mut grazing {

@@ -12,9 +12,9 @@
 //! convolved with that of the normals: a lobe that is wider by their variance ([`LobePlace::width_seen`]).
 
 use super::half_vector;
-use super::light_basis::{LightBasis, LightPlanes};
+use super::light_basis::LightBasis;
 use super::lobe_kernel::{MOST_AT_ONCE, row_in, sums_in};
-use super::surroundings::SurfaceLight;
+use super::seen_light::SeenLight;
 use crate::math::vector::versions;
 use glam::Vec3;
 
@@ -36,8 +36,8 @@ pub struct LobePlace<'a> {
     pub to_viewer: Vec3,
     /// Visible shares of the hats.
     pub shares: &'a [u8],
-    /// Other surface around.
-    pub surface: &'a SurfaceLight,
+    /// The light that is seen in the hats, from other surface as well.
+    pub seen: &'a SeenLight,
     /// Variance of the normal over the footprint, of both axes together, in squared radians.
     pub normal_variance: f32,
 }
@@ -84,18 +84,18 @@ impl LobeSums {
 }
 
 /// The sums of a lobe at several widths, without derivatives. `sums` is as long as `widths`.
-pub fn lobe_sums(basis: &LightBasis, place: &LobePlace, light: &LightPlanes, widths: &[f32], sums: &mut [LobeSums]) {
+pub fn lobe_sums(basis: &LightBasis, place: &LobePlace, widths: &[f32], sums: &mut [LobeSums]) {
     let narrow = widths.partition_point(|&width| place.width_seen(width) < wide_from(basis));
     for (sum, &width) in sums.iter_mut().zip(&widths[..narrow]) {
         let width = place.width_seen(width);
-        *sum = half_vector::lobe_sums(basis, place, light, width, half_vector::place_count(basis, width));
+        *sum = half_vector::lobe_sums(basis, place, width, half_vector::place_count(basis, width));
     }
     for (sums, widths) in sums[narrow..].chunks_mut(MOST_AT_ONCE).zip(widths[narrow..].chunks(MOST_AT_ONCE)) {
         let mut seen = [0.0; MOST_AT_ONCE];
         for (seen, &width) in seen.iter_mut().zip(widths) {
             *seen = place.width_seen(width);
         }
-        wide_sums(basis, place, light, &seen[..widths.len()], sums);
+        wide_sums(basis, place, &seen[..widths.len()], sums);
     }
 }
 
@@ -103,16 +103,16 @@ pub fn lobe_sums(basis: &LightBasis, place: &LobePlace, light: &LightPlanes, wid
 ///
 /// Over hats the derivative is that of the sum. Over half vectors it is the difference of the sum at widths two per cent
 /// apart: the places move with the width, and between hats the sum bends.
-pub fn lobe_with_derivative(basis: &LightBasis, place: &LobePlace, light: &LightPlanes, width: f32) -> LobeSums {
+pub fn lobe_with_derivative(basis: &LightBasis, place: &LobePlace, width: f32) -> LobeSums {
     let (width, slope_of_width) = (place.width_seen(width), place.slope_of_width_seen(width));
     let mut sum = if width >= wide_from(basis) {
         let mut sums = [LobeSums::default()];
-        wide_sums_with_derivative(basis, place, light, &[width], &mut sums);
+        wide_sums_with_derivative(basis, place, &[width], &mut sums);
         sums[0]
     } else {
         const STEP: f32 = 0.01;
         let count = half_vector::place_count(basis, width);
-        let at = |width: f32| half_vector::lobe_sums(basis, place, light, width, count);
+        let at = |width: f32| half_vector::lobe_sums(basis, place, width, count);
         let (sum, below, above) = (at(width), at(width * (-STEP).exp()), at(width * STEP.exp()));
         let slope = |above: f32, below: f32| (above - below) / (2.0 * STEP);
         LobeSums {
@@ -141,14 +141,12 @@ versions! {
     fn wide_sums(
         basis: &LightBasis,
         place: &LobePlace,
-        light: &LightPlanes,
         widths: &[f32],
         sums: &mut [LobeSums],
     ) = sums_in[false];
     fn wide_sums_with_derivative(
         basis: &LightBasis,
         place: &LobePlace,
-        light: &LightPlanes,
         widths: &[f32],
         sums: &mut [LobeSums],
     ) = sums_in[true];
@@ -158,6 +156,7 @@ versions! {
 #[cfg(test)]
 mod tests {
     use super::super::half_vector_kernel;
+    use super::super::light_basis::LightPlanes;
     use super::*;
     use crate::material::{LobeGeometry, Material};
     use crate::math::random::SequentialRandom;
@@ -203,7 +202,8 @@ mod tests {
     fn sums_are_the_integrals_of_the_lobe_at_all_widths() {
         let basis = LightBasis::new(64, 32);
         let light = light_of(&basis, 2);
-        let (shares, surface) = (vec![255u8; basis.padded()], SurfaceLight::none(&basis));
+        let shares = vec![255u8; basis.padded()];
+        let seen = SeenLight::of_light(&light, &shares);
         let sun = basis.direction_of(8 * 64 + 20);
         let normal = Vec3::new(0.1, 0.95, 0.2).normalize_or(Vec3::Y);
         // Beside the highlight only the tail of a narrow lobe reaches the sun, and few places lie there: what counts is
@@ -213,15 +213,14 @@ mod tests {
             [(Vec3::ZERO, "highlight", 0.025), (Vec3::new(0.2, 0.1, -0.3), "beside", 0.025)]
         {
             let mirrored = (normal * (2.0 * normal.dot(sun)) - sun + offset).normalize_or(Vec3::Y);
-            let place =
-                LobePlace { normal, to_viewer: mirrored, shares: &shares, surface: &surface, normal_variance: 0.0 };
+            let place = LobePlace { normal, to_viewer: mirrored, shares: &shares, seen: &seen, normal_variance: 0.0 };
             for (index, width) in [0.01f32, 0.05, 0.1, 0.17, 0.24, 0.26, 0.4, 0.7, 1.0].into_iter().enumerate() {
                 let (base, grazing) = truth(&light, normal, mirrored, width);
                 if offset == Vec3::ZERO {
                     highlights.push(base);
                 }
                 let mut sums = [LobeSums::default()];
-                lobe_sums(&basis, &place, &light, &[width], &mut sums);
+                lobe_sums(&basis, &place, &[width], &mut sums);
                 for channel in 0..3 {
                     let error = f64::from(sums[0].base[channel]) - base[channel];
                     let allowed = tolerance * base[channel] + 0.012 * highlights[index][channel];
@@ -240,7 +239,8 @@ mod tests {
     fn a_curved_footprint_sends_what_its_normals_send_on_average() {
         let basis = LightBasis::new(64, 32);
         let light = light_of(&basis, 2);
-        let (shares, surface) = (vec![255u8; basis.padded()], SurfaceLight::none(&basis));
+        let shares = vec![255u8; basis.padded()];
+        let seen = SeenLight::of_light(&light, &shares);
         let sun = basis.direction_of(8 * 64 + 20);
         let normal = Vec3::new(0.1, 0.95, 0.2).normalize_or(Vec3::Y);
         let to_viewer = normal * (2.0 * normal.dot(sun)) - sun;
@@ -253,17 +253,16 @@ mod tests {
                 let tilted = normal + across * place(index % SIDE) + along * place(index / SIDE);
                 let tilted = tilted.normalize_or(Vec3::Y);
                 sum += tilted;
-                let place =
-                    LobePlace { normal: tilted, to_viewer, shares: &shares, surface: &surface, normal_variance: 0.0 };
+                let place = LobePlace { normal: tilted, to_viewer, shares: &shares, seen: &seen, normal_variance: 0.0 };
                 let mut sums = [LobeSums::default()];
-                lobe_sums(&basis, &place, &light, &[width], &mut sums);
+                lobe_sums(&basis, &place, &[width], &mut sums);
                 mean += f64::from(sums[0].base[1]) / (SIDE * SIDE) as f64;
             }
             let normal_variance = 1.0 - (sum / (SIDE * SIDE) as f32).length_squared();
             let of = |normal_variance: f32| {
-                let place = LobePlace { normal, to_viewer, shares: &shares, surface: &surface, normal_variance };
+                let place = LobePlace { normal, to_viewer, shares: &shares, seen: &seen, normal_variance };
                 let mut sums = [LobeSums::default()];
-                lobe_sums(&basis, &place, &light, &[width], &mut sums);
+                lobe_sums(&basis, &place, &[width], &mut sums);
                 f64::from(sums[0].base[1]) / mean - 1.0
             };
             let (error, as_if_flat) = (of(normal_variance), of(0.0));
@@ -282,15 +281,16 @@ mod tests {
         let light = basis.planes(&vec![[1.0; 3]; basis.count()]);
         let mut random = SequentialRandom::new(4);
         let some: Vec<u8> = (0..basis.padded()).map(|_| random.below(256) as u8).collect();
-        let (all, none) = (vec![255u8; basis.padded()], SurfaceLight::none(&basis));
-        let surface = SurfaceLight::filled(&basis, |hat| 1.0 - f32::from(some[hat]) / 255.0);
+        let all = vec![255u8; basis.padded()];
+        let (light_alone, with_surface) =
+            (SeenLight::of_light(&light, &all), SeenLight::with_surface(&light, &some, |_| 1.0));
         let to_viewer = Vec3::new(-0.5, 0.6, 0.4).normalize_or(Vec3::Y);
-        let open = LobePlace { normal: Vec3::Y, to_viewer, shares: &all, surface: &none, normal_variance: 0.0 };
-        let closed = LobePlace { shares: &some, surface: &surface, ..open };
+        let open = LobePlace { normal: Vec3::Y, to_viewer, shares: &all, seen: &light_alone, normal_variance: 0.0 };
+        let closed = LobePlace { shares: &some, seen: &with_surface, ..open };
         for width in [0.03f32, 0.2, 0.3, 0.55, 1.0] {
             let [open, closed] = [open, closed].map(|place| {
                 let mut sums = [LobeSums::default()];
-                lobe_sums(&basis, &place, &light, &[width], &mut sums);
+                lobe_sums(&basis, &place, &[width], &mut sums);
                 sums[0]
             });
             assert!((closed.base[1] / open.base[1] - 1.0).abs() < 1e-5, "{width}: {closed:?} {open:?}");
@@ -304,21 +304,21 @@ mod tests {
         let light = light_of(&basis, 5);
         let mut random = SequentialRandom::new(9);
         let shares: Vec<u8> = (0..basis.padded()).map(|_| (random.next_number() * 255.0) as u8).collect();
-        let surface = SurfaceLight::filled(&basis, |_| random.next_number());
-        let none = SurfaceLight::none(&basis);
+        let seen = SeenLight::with_surface(&light, &shares, |_| random.next_number());
+        let light_alone = SeenLight::of_light(&light, &shares);
         let normal = Vec3::new(0.3, 0.9, -0.1).normalize_or(Vec3::Y);
         let to_viewer = Vec3::new(-0.5, 0.6, 0.4).normalize_or(Vec3::Y);
-        let place = LobePlace { normal, to_viewer, shares: &shares, surface: &surface, normal_variance: 0.004 };
+        let place = LobePlace { normal, to_viewer, shares: &shares, seen: &seen, normal_variance: 0.004 };
         for width in [0.03f32, 0.2, 0.3, 0.55, 1.0] {
-            let sums = lobe_with_derivative(&basis, &place, &light, width);
+            let sums = lobe_with_derivative(&basis, &place, width);
             let mut plain = [LobeSums::default()];
-            let seen = place.width_seen(width);
-            if seen >= wide_from(&basis) {
-                sums_in::<Plain, true>(&basis, &place, &light, &[seen], &mut plain);
+            let width_seen = place.width_seen(width);
+            if width_seen >= wide_from(&basis) {
+                sums_in::<Plain, true>(&basis, &place, &[width_seen], &mut plain);
                 plain[0].d_base = plain[0].d_base.map(|slope| slope * place.slope_of_width_seen(width));
             } else {
-                let count = half_vector::place_count(&basis, seen);
-                plain[0] = half_vector_kernel::sums_in::<Plain>(&basis, &place, &light, seen, count);
+                let count = half_vector::place_count(&basis, width_seen);
+                plain[0] = half_vector_kernel::sums_in::<Plain>(&basis, &place, width_seen, count);
                 // Its derivative is a difference of sums.
                 plain[0].d_base = sums.d_base;
             }
@@ -337,14 +337,14 @@ mod tests {
                 let by_row: f64 =
                     row.iter().zip(&light.channels[channel]).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum();
                 let mut of_light = [LobeSums::default()];
-                lobe_sums(&basis, &LobePlace { surface: &none, ..place }, &light, &[width], &mut of_light);
+                lobe_sums(&basis, &LobePlace { seen: &light_alone, ..place }, &[width], &mut of_light);
                 let direct = f64::from(0.3 * of_light[0].base[channel] + of_light[0].grazing[channel]);
                 assert!((by_row / direct - 1.0).abs() < 2e-6, "{width}: {by_row} {direct}");
             }
             let step = 0.01f32;
             let at = |width: f32| {
                 let mut sums = [LobeSums::default()];
-                lobe_sums(&basis, &place, &light, &[width], &mut sums);
+                lobe_sums(&basis, &place, &[width], &mut sums);
                 sums[0]
             };
             if width < 1.0 {

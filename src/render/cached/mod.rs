@@ -5,7 +5,8 @@
 //! 2. [`points`] and [`visibility`]: points of the surface on a grid over the atlas, and which share of each hat they see.
 //! 3. [`mod@irradiance`]: diffuse light, a masked sum. [`lobe_sum`] and [`half_vector`]: the specular integrals `S0 - S5`
 //!    and `S5`, and their derivative by the width.
-//! 4. [`bounce`]: light between surfaces as a sparse matrix with its transpose; [`surroundings`]: the same as lobes see it.
+//! 4. [`bounce`]: light between surfaces as a sparse matrix with its transpose; [`surroundings`] and
+//!    [`seen_light`]: the same as lobes see it.
 //! 5. [`footprint`]: what a camera sees, as shading points with lists of texels.
 //! 6. [`transport`]: all of it together, and the radiance it gives. Sums run on several numbers at a time
 //!    ([`crate::math::vector`]).
@@ -29,6 +30,7 @@ pub mod light_basis;
 mod lobe_kernel;
 pub mod lobe_sum;
 pub mod points;
+pub mod seen_light;
 pub mod surroundings;
 pub mod transport;
 pub mod visibility;
@@ -39,5 +41,5 @@ mod tests;
 pub use footprint::{FootprintSettings, ShadingPoint, ViewFootprints};
 pub use light_basis::{LightBasis, LightPlanes};
 pub use points::VisibilityGrid;
-pub use surroundings::SurfaceLight;
+pub use seen_light::SeenLight;
 pub use transport::{CachedSettings, CachedTransport, PointLight};

@@ -7,11 +7,11 @@
 
 use super::bounce::point_hit;
 use super::light_basis::LightBasis;
-use super::points::{NO_POINT, VisibilityGrid};
+use super::points::VisibilityGrid;
 use super::visibility::Visibility;
 use crate::math::sphere::direction_of_texel;
 use crate::render::Surface;
-use glam::{Vec3, Vec4};
+use glam::Vec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -99,6 +99,12 @@ impl Surroundings {
         &self.hidings[self.offsets[point] as usize..self.offsets[point + 1] as usize]
     }
 
+    /// The hats of a cell.
+    #[inline]
+    pub(super) fn hats(&self, cell: u32) -> impl Iterator<Item = usize> + Clone + use<> {
+        self.cells.hats(cell as usize)
+    }
+
     /// Bytes it takes.
     pub fn memory_bytes(&self) -> usize {
         self.offsets.len() * size_of::<u32>() + self.hidings.len() * size_of::<Hiding>()
@@ -142,90 +148,15 @@ impl Cells {
     }
 }
 
-/// The radiance of other surface around one point, times the share of each hat that it hides: in the order of the light.
-/// It is kept from place to place as long as they belong to one point, and serves as long as surface sends the same.
-#[derive(Clone, Debug)]
-pub struct SurfaceLight {
-    /// The point it is of, or [`NO_POINT`].
-    point: u32,
-    /// Hats that are not dark.
-    lit: Vec<u32>,
-    /// One plane a channel.
-    pub(super) channels: [Vec<f32>; 3],
-    /// Texel by texel.
-    pub(super) texels: Vec<Vec4>,
-}
-
-impl Default for SurfaceLight {
-    fn default() -> Self {
-        SurfaceLight { point: NO_POINT, lit: Vec::new(), channels: Default::default(), texels: Vec::new() }
-    }
-}
-
-impl SurfaceLight {
-    /// No surface around, under lights of this size.
-    pub fn none(basis: &LightBasis) -> Self {
-        let mut made = SurfaceLight::default();
-        made.resize(basis.padded());
-        made
-    }
-
-    /// Surface that sends this grey radiance in each hat.
-    #[cfg(test)]
-    pub(super) fn filled(basis: &LightBasis, mut radiance: impl FnMut(usize) -> f32) -> Self {
-        let mut made = SurfaceLight::none(basis);
-        for hat in 0..basis.count() {
-            let radiance = radiance(hat);
-            made.channels.iter_mut().for_each(|plane| plane[hat] = radiance);
-            made.texels[hat] = Vec4::splat(radiance);
-        }
-        made
-    }
-
-    fn resize(&mut self, padded: usize) {
-        self.channels.iter_mut().for_each(|plane| plane.resize(padded, 0.0));
-        self.texels.resize(padded, Vec4::ZERO);
-    }
-
-    /// Turns to a point, where points send `leaving` to others and it sees `shares` of the hats.
-    pub(super) fn turn_to(
-        &mut self,
-        point: u32,
-        surroundings: Option<&Surroundings>,
-        shares: &[u8],
-        leaving: &[[f32; 3]],
-    ) {
-        if self.point == point && self.texels.len() == shares.len() {
-            return;
-        }
-        for hat in self.lit.drain(..) {
-            self.channels.iter_mut().for_each(|plane| plane[hat as usize] = 0.0);
-            self.texels[hat as usize] = Vec4::ZERO;
-        }
-        self.resize(shares.len());
-        self.point = point;
-        let Some(surroundings) = surroundings else { return };
-        for &Hiding { cell, point } in surroundings.of(point as usize) {
-            for hat in surroundings.cells.hats(cell as usize).filter(|&hat| shares[hat] < u8::MAX) {
-                let share = 1.0 - f32::from(shares[hat]) * (1.0 / 255.0);
-                let [red, green, blue] = leaving[point as usize].map(|radiance| share * radiance);
-                for (plane, value) in self.channels.iter_mut().zip([red, green, blue]) {
-                    plane[hat] = value;
-                }
-                self.texels[hat] = Vec4::new(red, green, blue, 0.0);
-                self.lit.push(hat as u32);
-            }
-        }
-    }
-}
-
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
+    use super::super::light_basis::LightPlanes;
+    use super::super::seen_light::SeenLight;
     use super::*;
     use crate::scene::demo;
 
     /// The demo's surface, and a coarse grid over it with what hides cells of so many hats.
-    fn traced(side: usize) -> (Surface, VisibilityGrid, LightBasis, Visibility, Surroundings) {
+    pub fn traced(side: usize) -> (Surface, VisibilityGrid, LightBasis, Visibility, Surroundings) {
         let settings = demo::DemoSettings { views: 1, held_out: 0, width: 8, height: 8, map_size: 128, seed: 1 };
         let surface = Surface::new(demo::build(&settings).unwrap().scene.mesh).unwrap();
         let (grid, basis, go) = (VisibilityGrid::new(&surface, 64), LightBasis::new(32, 16), AtomicBool::new(false));
@@ -269,15 +200,16 @@ mod tests {
         let leaving: Vec<[f32; 3]> = grid.points.iter().map(|point| [1.0 + point.position.y; 3]).collect();
         let mut sums = [0.0f64; 2];
         let mut difference = 0.0f64;
+        let dark: LightPlanes = basis.planes(&vec![[0.0; 3]; basis.count()]);
         for point in 0..grid.points.len() {
             let seen = [&fine, &coarse].map(|surroundings| {
-                let mut surface = SurfaceLight::default();
-                surface.turn_to(point as u32, Some(surroundings), visibility.of(point), &leaving);
+                let mut seen = SeenLight::default();
+                seen.turn_to(point as u32, &dark, visibility.of(point), (Some(surroundings), &leaving));
                 // As white paint sees it: beside the horizon hats are hidden by nothing.
                 let normal = grid.points[point].shading_normal;
                 let arriving = |hat: usize| {
                     let cosine = basis.direction_of(hat).dot(normal).max(0.0);
-                    f64::from(surface.channels[0][hat] * basis.solid_angle[hat] * cosine)
+                    f64::from(seen.channels[0][hat] * basis.solid_angle[hat] * cosine)
                 };
                 (0..basis.count()).map(arriving).sum::<f64>()
             });
@@ -287,24 +219,6 @@ mod tests {
         println!("{:?} and a mean difference of {:.4}", sums, difference / sums[0]);
         assert!(coarse.hidings.len() * 3 < fine.hidings.len());
         assert!((sums[1] / sums[0] - 1.0).abs() < 0.03 && difference < 0.08 * sums[0], "{sums:?} {difference}");
-    }
-
-    #[test]
-    fn turning_from_point_to_point_leaves_nothing_behind() {
-        let (_, grid, _, visibility, surroundings) = traced(2);
-        let leaving = vec![[1.0, 2.0, 3.0]; grid.points.len()];
-        let mut turned = SurfaceLight::default();
-        for point in (0..grid.points.len()).step_by(97) {
-            let mut fresh = SurfaceLight::default();
-            for surface in [&mut turned, &mut fresh] {
-                surface.turn_to(point as u32, Some(&surroundings), visibility.of(point), &leaving);
-            }
-            assert_eq!(turned.channels, fresh.channels, "{point}");
-            assert_eq!(turned.texels, fresh.texels, "{point}");
-        }
-        let mut turned = SurfaceLight { point: NO_POINT, ..turned };
-        turned.turn_to(0, None, visibility.of(0), &leaving);
-        assert!(turned.channels.iter().flatten().all(|&value| value == 0.0));
     }
 
     #[test]

@@ -7,7 +7,8 @@ use super::irradiance::{irradiance, irradiance_backward};
 use super::light_basis::{LightBasis, LightPlanes};
 use super::lobe_sum::{LobePlace, LobeSums, lobe_sums};
 use super::points::VisibilityGrid;
-use super::surroundings::{SurfaceLight, Surroundings};
+use super::seen_light::SeenLight;
+use super::surroundings::Surroundings;
 use super::visibility::Visibility;
 use crate::material::texels::Texel;
 use crate::render::Surface;
@@ -237,22 +238,23 @@ impl CachedTransport {
         sum
     }
 
-    /// Where the lobe of a shading point is integrated, among surface that sends this. `surface` is kept from place to
-    /// place, as long as `at` is the same.
+    /// Where the lobe of a shading point is integrated, under a light and among surface that sends this. `seen` is kept from
+    /// place to place, as long as `light` and `at` are the same.
     #[inline]
     pub fn lobe_place<'a>(
         &'a self,
         point: &ShadingPoint,
+        light: &LightPlanes,
         at: &PointLight,
-        surface: &'a mut SurfaceLight,
+        seen: &'a mut SeenLight,
     ) -> LobePlace<'a> {
         let shares = self.visibility.of(point.lobe_point as usize);
-        surface.turn_to(point.lobe_point, self.surroundings.as_ref(), shares, &at.leaving);
+        seen.turn_to(point.lobe_point, light, shares, (self.surroundings.as_ref(), &at.leaving));
         LobePlace {
             normal: point.normal,
             to_viewer: point.to_viewer,
             shares,
-            surface,
+            seen,
             normal_variance: point.normal_variance,
         }
     }
@@ -265,7 +267,7 @@ impl CachedTransport {
         footprints: &ViewFootprints,
         point: &ShadingPoint,
         material: &[f32; 7],
-        surface: &mut SurfaceLight,
+        seen: &mut SeenLight,
     ) -> [f32; 3] {
         let arriving = Self::interpolate(&at.arriving, footprints, point);
         let diffuse = [0, 1, 2].map(|c| material[c] * arriving[c]);
@@ -274,7 +276,7 @@ impl CachedTransport {
             return diffuse;
         }
         let mut sums = [LobeSums::default()];
-        lobe_sums(&self.basis, &self.lobe_place(point, at, surface), light, &[material[6].exp()], &mut sums);
+        lobe_sums(&self.basis, &self.lobe_place(point, light, at, seen), &[material[6].exp()], &mut sums);
         let lobe = sums[0].radiance([material[3], material[4], material[5]]);
         [0, 1, 2].map(|c| diffuse[c] + strength * lobe[c])
     }
@@ -303,9 +305,9 @@ impl CachedTransport {
             .points
             .par_iter()
             .with_min_len(256)
-            .map_init(SurfaceLight::default, |surface, point| {
+            .map_init(SeenLight::default, |seen, point| {
                 let material = Self::material_of(footprints, point, texels);
-                self.shade(light, at, footprints, point, &material, surface)
+                self.shade(light, at, footprints, point, &material, seen)
             })
             .collect();
         let mut picture = vec![[0.0f32; 3]; footprints.width * footprints.height];
@@ -334,7 +336,8 @@ const ALBEDO_SPAN: f32 = 5.0;
 fn lobe_albedo() -> Vec<[f32; 2]> {
     let constant = LightBasis::new(1, 1);
     let light = constant.planes(&[[1.0; 3]]);
-    let (shares, surface) = (vec![255u8; constant.padded()], SurfaceLight::none(&constant));
+    let shares = vec![255u8; constant.padded()];
+    let seen = SeenLight::of_light(&light, &shares);
     (0..=20)
         .map(|step| {
             let width = (ALBEDO_SPAN * (step as f32 / 20.0 - 1.0)).exp();
@@ -345,8 +348,8 @@ fn lobe_albedo() -> Vec<[f32; 2]> {
                 let cosine = ((angle as f32 + 0.5) / ANGLES as f32).sqrt();
                 let to_viewer = Vec3::new((1.0 - cosine * cosine).sqrt(), cosine, 0.0);
                 let place =
-                    LobePlace { normal: Vec3::Y, to_viewer, shares: &shares, surface: &surface, normal_variance: 0.0 };
-                let sums = half_vector::lobe_sums(&constant, &place, &light, width, 256);
+                    LobePlace { normal: Vec3::Y, to_viewer, shares: &shares, seen: &seen, normal_variance: 0.0 };
+                let sums = half_vector::lobe_sums(&constant, &place, width, 256);
                 sum[0] += sums.base[0] / ANGLES as f32;
                 sum[1] += sums.grazing[0] / ANGLES as f32;
             }

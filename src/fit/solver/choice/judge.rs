@@ -8,7 +8,7 @@ use super::clustered::ClusteredMean;
 use super::student::StudentNoise;
 use super::{ALTERNATIVES, Alternative, LOBE_ALTERNATIVES};
 use crate::render::cached::lobe_sum::{LobeSums, lobe_sums};
-use crate::render::cached::{CachedTransport, LightPlanes, PointLight, SurfaceLight, ViewFootprints};
+use crate::render::cached::{CachedTransport, LightPlanes, PointLight, SeenLight, ViewFootprints};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -162,7 +162,7 @@ impl SolverScene {
         footprints: &ViewFootprints,
         pixel: &Observation,
         [light, coarse]: [JudgedLight; 2],
-        around: &mut [SurfaceLight; 2],
+        around: &mut [SeenLight; 2],
     ) -> Option<Judged> {
         let point = &footprints.points[pixel.point as usize];
         let mut rho = [[0.0f32; 3]; ALTERNATIVES];
@@ -184,13 +184,13 @@ impl SolverScene {
         if !is_solved || surface.regions[region].is_none() {
             return None;
         }
-        let lobes = |(planes, at): JudgedLight, around: &mut SurfaceLight, lobes: [Lobe; 2]| -> [[f32; 3]; 2] {
-            let place = self.transport.lobe_place(point, at, around);
+        let lobes = |(planes, at): JudgedLight, around: &mut SeenLight, lobes: [Lobe; 2]| -> [[f32; 3]; 2] {
+            let place = self.transport.lobe_place(point, planes, at, around);
             let swap = usize::from(lobes[0][3] > lobes[1][3]);
             let widths = [lobes[swap][3].exp(), lobes[1 - swap][3].exp()];
             let mut sums = [LobeSums::default(); 2];
             let count = if widths[0] == widths[1] { 1 } else { 2 };
-            lobe_sums(&self.transport.basis, &place, planes, &widths[..count], &mut sums[..count]);
+            lobe_sums(&self.transport.basis, &place, &widths[..count], &mut sums[..count]);
             if count == 1 {
                 sums[1] = sums[0];
             }

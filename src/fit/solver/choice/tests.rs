@@ -7,7 +7,7 @@ use super::judge::region_of;
 use crate::image::Image;
 use crate::math::random::SequentialRandom;
 use crate::render::Surface;
-use crate::render::cached::{CachedTransport, SurfaceLight, ViewFootprints};
+use crate::render::cached::{CachedTransport, SeenLight, ViewFootprints};
 use crate::scene::{Scene, demo};
 use glam::Vec3;
 use std::sync::atomic::AtomicBool;
@@ -58,7 +58,7 @@ fn photograph(held_out: usize, noise: f32, lobe_of: impl Fn(usize) -> Option<[f3
         let (view, grid) = (target.view, &cache.transport.grid);
         let footprints = ViewFootprints::trace(&made.surface, grid, &target.camera, &cache.first_hits);
         let mut picture = vec![Vec3::ZERO; 64 * 48];
-        let mut around = SurfaceLight::default();
+        let mut around = SeenLight::default();
         for point in &footprints.points {
             let texel = footprints.texels_of(point)[0].0 as usize;
             let radiance = match lobe_of(region_of(texel, SIZE)) {

@@ -2,12 +2,13 @@
 
 use super::super::cell_sums::System;
 use super::super::lobe_prior::{LobeFamily, LobeKind};
+use super::super::lobe_sums::tests::of_systems;
 use super::super::lobe_widths::weighed_log_widths;
 use super::*;
 
 /// Sums of a texel whose pixels say F0 with this precision at a width, and that other widths are worse.
 fn sums(specular: f64, log_width: f64, precision: f64) -> LobeSumsOfGroup {
-    LobeSumsOfGroup(weighed_log_widths().map(|x| {
+    of_systems(&weighed_log_widths().map(|x| {
         let misfit = precision * 0.5 * (x - log_width).powi(2);
         let mut sums = System::default();
         sums.observe(precision, 0.0, 1.0, specular);
@@ -133,7 +134,7 @@ fn a_lobe_does_not_outshine_what_is_seen() {
     for kind in families[0].kinds.iter().map(|kind| LobeKind { share: 1.0, ..*kind }) {
         let family = LobeFamily { kinds: vec![kind], ..families[0] };
         let prior = LobePrior { families: vec![family], keep };
-        let sums = vec![LobeSumsOfGroup(grey); texels.len()];
+        let sums = vec![of_systems(&grey); texels.len()];
         for belief in beliefs(&texels, &sums, 8, &weighed_log_widths(), (&prior, LobeSharing::QUICK)).0 {
             assert!(belief.mean[0] < 0.105, "{kind:?}: {belief:?}");
         }
