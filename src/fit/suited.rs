@@ -15,8 +15,9 @@ pub struct Suited {
     pub map_size: Option<usize>,
 }
 
-/// As many as take no longer than what photographs do not need of the solver: its finer edges and finer grid.
-const POLISH_OF_PHOTOGRAPHS: usize = 90;
+/// As many as take no longer than what photographs do not need of the solver: finer edges, a finer grid, larger and second
+/// maps on halved photos.
+const POLISH_OF_PHOTOGRAPHS: usize = 110;
 /// So much coarser is the solver's grid where polishing follows, by whole paths: shadows as fine as maps need are theirs.
 const COARSER_GRID: usize = 2;
 /// Share of an atlas that charts cover, at the least, as a rule.
@@ -108,18 +109,18 @@ mod tests {
 
     #[test]
     fn polishing_and_its_sizes_go_together() {
-        let photographs = Suited { method: Method::Paper, solver_polish: 90, map_size: None };
+        let photographs = Suited { method: Method::Paper, solver_polish: 110, map_size: None };
         let rendered = Suited { method: Method::Solver, solver_polish: 0, map_size: None };
         let of = |suited: &Suited, polish: usize, chosen: &[&str]| {
             let from = FitSettings { solver_polish: polish, solver_levels: 1, ..FitSettings::default() };
             let settings = applied(suited, from, chosen);
             (settings.solver_polish, settings.solver_levels, settings.solver_grid)
         };
-        assert_eq!((of(&photographs, 0, &[]), of(&rendered, 0, &[])), ((90, 3, 128), (0, 2, 256)));
+        assert_eq!((of(&photographs, 0, &[]), of(&rendered, 0, &[])), ((110, 3, 128), (0, 2, 256)));
         assert_eq!(of(&rendered, 5, &["solver-polish"]), (5, 3, 128));
         assert_eq!(of(&photographs, 0, &["solver-polish"]), (0, 2, 256));
-        assert_eq!(of(&photographs, 0, &["solver-levels"]), (90, 1, 128));
-        assert_eq!(of(&photographs, 0, &["solver-grid"]), (90, 3, 256));
+        assert_eq!(of(&photographs, 0, &["solver-levels"]), (110, 1, 128));
+        assert_eq!(of(&photographs, 0, &["solver-grid"]), (110, 3, 256));
     }
 
     #[test]

@@ -5,8 +5,10 @@ use crate::fit::settings::FitSettings;
 
 /// Width of the solver's maps on a coarse level, at least.
 const LEAST_COARSE_MAP: usize = 128;
-/// Rounds of the solver on the light on each level but the coarsest.
+/// Rounds of the solver on the light on each level but the coarsest, where it makes all maps.
 const FINER_ROUNDS: usize = 2;
+/// The same where polishing follows, whose steps move the light as well.
+const FINER_ROUNDS_BEFORE_POLISHING: usize = 1;
 /// Rounds on the coarsest level after its first maps, which tell the lobes they are done with; maps are made anew after
 /// them.
 const ROUNDS_AFTER_MAPS: usize = 1;
@@ -26,31 +28,45 @@ enum Finest {
 enum CoarseMaps {
     /// Halved as often as the photos.
     Halved,
-    /// Halved once less. Polishing takes few and small steps: what it shall keep of structure the maps must have before.
+    /// Halved once less, as fits with polishing were once begun.
     Finer,
 }
 
 /// The solver's part in maps of all sizes.
+///
+/// Where polishing follows, light and maps need not be found as well: on photographs of a statue and of portals the time
+/// that second maps on the coarsest level, a second round on the light on finer ones and maps twice as large took serves
+/// better for more steps of polishing.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) struct SolverShare {
     finest: Finest,
     coarse_maps: CoarseMaps,
+    /// Whether the coarsest level is visited twice.
+    visits_again: bool,
+    /// Rounds on the light on each level but the coarsest.
+    finer_rounds: usize,
 }
 
 impl SolverShare {
     pub(super) fn of(settings: &FitSettings) -> Self {
-        match settings.solver_polish > 0 {
-            true => SolverShare { finest: Finest::Polish, coarse_maps: CoarseMaps::Finer },
-            false => SolverShare { finest: Finest::Solver, coarse_maps: CoarseMaps::Halved },
+        let is_polished = settings.solver_polish > 0;
+        SolverShare {
+            finest: if is_polished { Finest::Polish } else { Finest::Solver },
+            coarse_maps: CoarseMaps::Halved,
+            visits_again: !is_polished,
+            finer_rounds: if is_polished { FINER_ROUNDS_BEFORE_POLISHING } else { FINER_ROUNDS },
         }
     }
 
-    /// The same once the stages of a plan have begun: what the solver has begun on whole photos is done, and maps have the
-    /// sizes they began with.
+    /// The same once the stages of a plan have begun: what the solver has begun on whole photos is done, maps have the
+    /// sizes they began with, and what was visited again stays so.
     pub(super) fn as_begun(self, begun: &[Stage], map_size: usize) -> Self {
         let of_solver = || begun.iter().filter(|stage| stage.kind.is_of_solver());
         let has_finest = of_solver().any(|stage| stage.photo_level == 0);
         let coarse = of_solver().find(|stage| stage.photo_level > 0);
+        let coarsest = of_solver().map(|stage| stage.photo_level).max();
+        let finer =
+            of_solver().find(|stage| stage.kind == StageKind::NarrowLight && Some(stage.photo_level) != coarsest);
         SolverShare {
             finest: if has_finest { Finest::Solver } else { self.finest },
             coarse_maps: coarse.map_or(self.coarse_maps, |stage| {
@@ -59,14 +75,16 @@ impl SolverShare {
                     false => CoarseMaps::Finer,
                 }
             }),
+            visits_again: self.visits_again || of_solver().any(|stage| stage.visit > 0),
+            finer_rounds: finer.map_or(self.finer_rounds, |stage| stage.steps_of_kind),
         }
     }
 }
 
-/// Light and maps on the coarsest level, twice; on each finer one some rounds more, and maps anew. What is done on the
-/// coarsest is cheap, and the second maps know which lobes the first have shown.
+/// Light and maps on the coarsest level, twice where the solver makes all maps; on each finer one some rounds more, and
+/// maps anew. What is done on the coarsest is cheap, and the second maps know which lobes the first have shown.
 pub(super) fn positions_of_solver(settings: &FitSettings, share: SolverShare) -> Vec<Position> {
-    let SolverShare { finest, coarse_maps } = share;
+    let SolverShare { finest, coarse_maps, visits_again, finer_rounds } = share;
     let mut positions: Vec<Position> = Vec::new();
     let map_size_at = |photo_level: usize| match coarse_maps {
         CoarseMaps::Halved => settings.map_size >> photo_level,
@@ -86,11 +104,14 @@ pub(super) fn positions_of_solver(settings: &FitSettings, share: SolverShare) ->
     add(StageKind::WideLight, wide, coarsest);
     add(StageKind::NarrowLight, settings.solver_rounds - wide, coarsest);
     add(StageKind::Maps, 1, coarsest);
-    add(StageKind::NarrowLight, ROUNDS_AFTER_MAPS, coarsest);
-    add(StageKind::Maps, 1, coarsest);
+    // Where there is one size only, nothing else makes up for it.
+    if visits_again || coarsest == 0 {
+        add(StageKind::NarrowLight, ROUNDS_AFTER_MAPS, coarsest);
+        add(StageKind::Maps, 1, coarsest);
+    }
     let finest = usize::from(finest == Finest::Polish);
     for level in (finest..coarsest).rev() {
-        add(StageKind::NarrowLight, FINER_ROUNDS, level);
+        add(StageKind::NarrowLight, finer_rounds, level);
         add(StageKind::Maps, 1, level);
     }
     add(StageKind::Polish, settings.solver_polish, 0);

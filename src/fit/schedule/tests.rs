@@ -85,26 +85,41 @@ fn the_solver_visits_the_smallest_size_twice_and_keeps_its_plan_wherever_it_is()
         assert_eq!(revised(&settings, &plan, stage, step).unwrap(), plan, "{stage}, {step}");
         let polished = FitSettings { solver_polish: 3, ..settings.clone() };
         let revised = revised(&polished, &plan, stage, step).unwrap();
-        // Polishing makes the finest maps, unless the solver has begun them.
-        let kept = if stage < 5 { 5 } else { plan.len() };
+        // Polishing makes the finest maps, unless the solver has begun them, and needs no second visit that has not begun.
+        let kept = match stage {
+            0..3 => 3,
+            3..5 => 5,
+            _ => plan.len(),
+        };
         assert_eq!((revised.len(), revised.last().unwrap().steps), (kept + 1, 3), "{stage}, {step}");
         assert_eq!(revised[..kept], plan[..kept], "{stage}, {step}");
         assert_eq!((revised[kept].kind, revised[kept].map_size), (StageKind::Polish, 256));
     }
     let polished = FitSettings { solver_polish: 3, ..settings.clone() };
     let plan_with = stages(&polished);
-    assert_eq!(plan_with.len(), 6);
-    // Polishing wants the structure of full maps from halved photos.
-    assert!(plan_with.iter().all(|stage| stage.map_size == 256));
-    assert_eq!(plan_with.iter().map(|stage| stage.photo_level).collect::<Vec<_>>(), [1, 1, 1, 1, 1, 0]);
+    let names: Vec<String> = plan_with.iter().map(Stage::name).collect();
+    assert_eq!(names, ["wide light 1/2", "narrow light 1/2", "maps 1/2", "polish"]);
     for (stage, step) in walk(&plan_with) {
         assert_eq!(revised(&polished, &plan_with, stage, step).unwrap(), plan_with, "{stage}, {step}");
     }
-    // Left out once more, whole photos follow with maps of the same size.
-    let without = revised(&settings, &plan_with, 2, 0).unwrap();
-    assert_eq!(without[..5], plan_with[..5]);
-    assert_eq!(without[5..].iter().map(Stage::name).collect::<Vec<_>>(), ["narrow light", "maps"]);
-    assert!(without[5..].iter().all(|stage| stage.map_size == 256 && !stage.is_of_level_of(&without[4])));
+    // Left out once more, it is as if it had never been asked for.
+    assert_eq!(revised(&settings, &plan_with, 2, 0).unwrap(), plan);
+    // A fit begun with full maps on halved photos and a second visit goes on with both.
+    let mut full = revised(&polished, &plan, 4, 0).unwrap();
+    full.iter_mut().for_each(|stage| stage.map_size = 256);
+    for (stage, step) in walk(&full).into_iter().filter(|(stage, _)| *stage >= 3) {
+        assert_eq!(revised(&polished, &full, stage, step).unwrap(), full, "{stage}, {step}");
+    }
+    // On finer ones there is one round on the light for two, but where two have begun.
+    let three = FitSettings { solver_levels: 3, map_size: 512, ..settings.clone() };
+    let begun = stages(&three);
+    let rounds = |plan: &[Stage], level: usize| {
+        let own = plan.iter().filter(|stage| stage.kind == StageKind::NarrowLight && stage.photo_level == level);
+        own.map(|stage| stage.steps).sum::<usize>()
+    };
+    let three_polished = FitSettings { solver_polish: 3, ..three };
+    assert_eq!([rounds(&begun, 1), rounds(&stages(&three_polished), 1)], [2, 1]);
+    assert_eq!(rounds(&revised(&three_polished, &begun, 5, 1).unwrap(), 1), 2);
     // Without coarser maps the solver makes what there is, twice as well.
     let small = stages(&FitSettings { map_size: 64, ..polished });
     let names: Vec<String> = small.iter().map(Stage::name).collect();
