@@ -6,7 +6,8 @@ use super::estimate::Estimate;
 use super::light_colour::change_by_highlights;
 use super::light_evidence::{LightKnown, Precisions, evidence_shares};
 use super::light_shape::{LightShape, bright_texels};
-use super::light_step::{Gauge, LightPrior, NormalEquations, narrow_scales, solve_channel};
+use super::light_step::{Gauge, LightPrior, NormalEquations, solve_channel};
+use super::light_suns::narrow_scales;
 use super::plan;
 use super::report::{ErrorSums, StepReport, median};
 use super::round::{BlockWork, Round, open_prior};
@@ -200,7 +201,7 @@ impl SolverScene {
             gauge_slack: if self.background.is_empty() { self.settings.gauge_slack } else { BACKGROUND_GAUGE_SLACK },
         };
         let before = shape.coefficients_of_channels(&estimate.light);
-        let narrow = narrow_scales(shape, &estimate.light, &before);
+        let narrow = narrow_scales(shape, &estimate.light, &before, self.settings.suns);
         let channels: Vec<(Vec<f32>, Precisions, f64)> = (0..3usize)
             .into_par_iter()
             .map(|c| {

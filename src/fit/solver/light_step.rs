@@ -11,8 +11,6 @@ use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
 
 /// The usual radiance of a sky is at least this share of its mean: half of it may be black.
 const LEAST_USUAL: f64 = 0.3;
-/// How many times its excess over the usual radiance a narrow hat may be, see [`narrow_scales`].
-const NARROW_GROWTH: f64 = 10.0;
 /// Share of the hold on suns that all narrow hats have, so that none of them is free.
 const LEAST_HOLD: f64 = 1e-6;
 /// By which power of the scale of a texel it may differ from its neighbours: suns more than they may shine. With 1 a sun
@@ -164,18 +162,6 @@ pub struct ChannelKnown {
     pub scale_deviation: f64,
 }
 
-/// What narrow hats are believed to be (one standard deviation), over the usual radiance of their channel, by the light
-/// before the step, given with its coefficients. Where all channels are bright there is a sun, and it may be much brighter; elsewhere there is sky. One
-/// channel alone is no sun: solved by themselves, channels put blue or red suns where only held-out views look. On eight
-/// hard cases (geometric means) held-out errors are .063 so, .126 with a scale of each channel's own, errors of the light
-/// .48 and .60.
-pub fn narrow_scales(shape: &LightShape, light: &[[f32; 3]], coefficients: &[Vec<f32>; 3]) -> Vec<f64> {
-    let usual = coefficients.each_ref().map(|x| usual_radiance(shape, x));
-    let least = |radiance: [f32; 3]| (0..3).map(|c| f64::from(radiance[c]) / usual[c]).fold(f64::INFINITY, f64::min);
-    let scale = |&texel: &u32| 1.0 + NARROW_GROWTH * (least(light[texel as usize]) - 1.0).max(0.0);
-    shape.fine.iter().map(scale).collect()
-}
-
 /// Adds what is believed of texels with narrow hats. Sky is about as bright as what is beside it, so that a hole in what
 /// photos show takes the radiance of its rim. What may be a sun, by its scale, is hardly held to its neighbours; its
 /// narrow hat rather is zero, which keeps light in few texels.
@@ -204,7 +190,7 @@ fn add_square(matrix: &mut [f64], count: usize, entries: &[(u32, f64)], weight: 
 }
 
 /// The radiance of most of a sky, by its wide hats; the mean may be that of a sun.
-fn usual_radiance(shape: &LightShape, x: &[f32]) -> f64 {
+pub(super) fn usual_radiance(shape: &LightShape, x: &[f32]) -> f64 {
     let mut wide = x[..shape.coarse.0 * shape.coarse.1].to_vec();
     median(&mut wide).max(LEAST_USUAL * mean_radiance(shape, x))
 }
@@ -215,7 +201,7 @@ fn mean_radiance(shape: &LightShape, x: &[f32]) -> f64 {
     sum.max(1e-9)
 }
 
-/// Solves one channel: coefficients start at `x` and end there. `narrow` are [`narrow_scales`].
+/// Solves one channel: coefficients start at `x` and end there. `narrow` are [`super::light_suns::narrow_scales`].
 pub fn solve_channel(
     equations: &NormalEquations,
     shape: &LightShape,
@@ -293,6 +279,7 @@ fn mean_weights(shape: &LightShape) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::light_suns::{Suns, narrow_scales};
     use super::*;
 
     #[test]
@@ -303,7 +290,7 @@ mod tests {
         light[sun as usize] = [1000.0, 800.0, 500.0];
         light[blue as usize][2] = 100.0;
         let coefficients = shape.coefficients_of_channels(&light);
-        let scales = narrow_scales(&shape, &light, &coefficients);
+        let scales = narrow_scales(&shape, &light, &coefficients, Suns::Any);
         assert!(scales[0] > 100.0 && scales[1..] == [1.0, 1.0], "{scales:?}");
 
         // A doubtful row, 40 +- 20, moves a texel of the sky by little, and the sun stays.
@@ -341,7 +328,7 @@ mod tests {
         }
         let light: Vec<[f32; 3]> = texels.map(|texel| [truth(texel); 3]).collect();
         let coefficients = shape.coefficients_of_channels(&light);
-        let scales = narrow_scales(&shape, &light, &coefficients);
+        let scales = narrow_scales(&shape, &light, &coefficients, Suns::Any);
         let prior = LightPrior { variation: 0.7, independence: 1.0, gauge_slack: 1.0 };
         let row = vec![1.0 / (width * height) as f32; width * height];
         let mut x = vec![0.7; shape.count()];

@@ -50,7 +50,7 @@ impl SolverScene {
         let planes = self.transport.basis.planes(&estimate.light);
         let at_points = self.point_light(estimate, &planes);
         let round = self.round(estimate, &planes, &at_points);
-        let prior = lobe_families::with_families_of(estimate);
+        let prior = lobe_families::with_families_of(estimate, self.settings.surface_kinds);
         let mut check = Check::begin(self, &at_points, &prior);
         let mut rows = vec![DiffuseRow::default(); self.observations.list.len()];
         let mut residuals = Vec::new();

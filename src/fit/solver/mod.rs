@@ -9,9 +9,9 @@
 //! 3. [`round`]: a block's rows over the light; [`eliminate`] takes the block's own unknowns out of them, so that what is
 //!    left is the Schur complement of the joint Gauss-Newton system.
 //! 4. [`light_step`]: the light from those rows, at least zero ([`non_negative`]), in wide and narrow hats
-//!    ([`light_shape`]), with a weak wish for smoothness. [`light_round`] is the round as a whole,
-//!    [`light_evidence`] says what each texel of the light is known by, `light_holes` fills what lies between texels that
-//!    photos show.
+//!    ([`light_shape`]), with a weak wish for smoothness but for suns ([`light_suns`]). [`light_round`] is the round as a
+//!    whole, [`light_evidence`] says what each texel of the light is known by, `light_holes` fills what lies between texels
+//!    that photos show.
 //! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`, `tile_texels`, `tile_spread`,
 //!    `tile_highlights`) with the footprints of pixels, where the evidence, as far as it is independent
 //!    (`tile_independence`), decides which texels share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_prior`],
@@ -39,6 +39,7 @@ mod light_holes;
 pub mod light_round;
 pub mod light_shape;
 pub mod light_step;
+pub mod light_suns;
 pub mod lobe_evidence;
 pub mod lobe_families;
 mod lobe_kind;
