@@ -158,7 +158,8 @@ pub struct FitSettings {
     pub solver_choices: Choosing,
     /// Optimiser steps after the solver's maps, on all maps and the light, by the gradient of whole paths: for photos of
     /// real places, whose edges, background and geometry the solver's model does not carry. The solver then leaves the
-    /// finest maps to them. Where its model holds, they make maps worse. When not given: 110 for 8-bit photos, else none.
+    /// finest maps to them, and looks for one sun and hardly any metal. Where its model holds, they make maps worse. When
+    /// not given: 110 for 8-bit photos, else none.
     #[arg(long, default_value_t = FitSettings::default().solver_polish)]
     pub solver_polish: usize,
     /// Optimiser steps between two looks at the held-out views; 0 never looks.
