@@ -34,7 +34,7 @@ pub fn check(options: &CheckOptions, json: bool) -> Result<()> {
     } else {
         println!("{}: {} triangles, {} views", scene.name, scene.mesh.triangles.len(), scene.views.len());
         if let Some(texels) = report.texels_resolved {
-            let size = Suited::to(&scene, report.texels_resolved).map_size.unwrap_or_default();
+            let size = Suited::to(&scene, &report).map_size.unwrap_or_default();
             let texels = number::whole(texels as u64);
             println!("the photos resolve some {texels} texels of the surface, about maps of {size} x {size}");
         }

@@ -49,27 +49,20 @@ pub fn demo(options: &DemoOptions, json: bool) -> Result<()> {
 pub fn fit(options: &FitOptions, json: bool) -> Result<()> {
     let mut settings = run_settings(options)?;
     settings.fit.validate()?;
-    let of_preset = settings.fit.map_size;
     let folder = RunFolder::create(&options.output)?;
     if !json {
         eprintln!("reading and checking {}", settings.scene.display());
     }
     let stop = Arc::new(AtomicBool::new(false));
     stop_on_interrupt(Arc::clone(&stop));
+    let mut told = Vec::new();
     let (prepared, fitter, settings) = with_bar(json, |tell| {
         let opened = open::open_scene(&settings.scene, &settings.read, &stop, tell)?;
-        suit(options, &opened, &mut settings.fit);
+        told = suit(options, &opened, &mut settings.fit);
         open::start_new(opened, settings, &stop, tell)
     })?;
-    let is_free = |name: &str| options.settings.is_none() && !options.fit.typed.iter().any(|own| own == name);
-    if !json && settings.fit.method == Method::Solver && is_free("method") {
-        eprintln!("the method is the solver, since all photos hold linear radiance; --method paper takes Adam");
-    }
-    if !json && settings.fit.map_size < of_preset && is_free("map-size") {
-        let size = settings.fit.map_size;
-        eprintln!(
-            "maps of {size} x {size} texels are about what the photos resolve; --map-size {of_preset} takes larger ones"
-        );
+    if !json {
+        told.iter().for_each(|line| eprintln!("{line}"));
     }
     let job = job::start(prepared, fitter, settings, folder.clone())?;
     watch(job, &folder, &stop, json)
@@ -102,18 +95,20 @@ pub fn run_settings(options: &FitOptions) -> Result<RunSettings> {
     Ok(settings)
 }
 
-/// Sets what suits the scene and was not asked for. A settings file asks for all: it says what differs from the defaults.
-pub fn suit(options: &FitOptions, opened: &OpenedScene, settings: &mut FitSettings) {
+/// Sets what suits the scene and was not asked for, and returns what to say of that ([`Suited::told`]). A settings file
+/// asks for all: it says what differs from the defaults.
+pub fn suit(options: &FitOptions, opened: &OpenedScene, settings: &mut FitSettings) -> Vec<String> {
     if options.settings.is_some() {
-        return;
+        return Vec::new();
     }
-    let suited = Suited::to(&opened.scene, opened.report.texels_resolved);
+    let suited = Suited::to(&opened.scene, &opened.report);
     let asked = settings.clone();
     suited.apply(settings, &options.fit.typed);
     if settings.method == Method::Paper {
         // What the solver would do is no setting of such a run.
         settings.polish_as(&asked);
     }
+    suited.told(&asked, settings)
 }
 
 fn absolute(path: &Path) -> PathBuf {

@@ -63,8 +63,8 @@ pub struct FitSettings {
     /// Seed of all random numbers.
     #[arg(long, default_value_t = FitSettings::default().seed)]
     pub seed: u64,
-    /// How maps and light are found. When it is not named, a scene all of whose photos hold linear radiance is given to the
-    /// solver.
+    /// How maps and light are found. When it is not named, a scene is given to the solver, unless a setting is that says
+    /// something to Adam alone.
     #[arg(long, value_enum, default_value_t)]
     pub method: Method,
     /// Width and height of the maps in texels: a power of two, 16 to 8192. When not given, neither here nor by a settings
@@ -107,8 +107,10 @@ pub struct FitSettings {
     /// Background pixels as evidence for the light.
     #[arg(long, value_enum, default_value_t)]
     pub background: BackgroundEvidence,
-    /// Fit a gain for each view, with mean logarithm zero.
-    #[arg(long)]
+    /// Fit a gain for each view, with mean logarithm zero. When neither it nor `--exposure=false` is given, photos of 8 bits
+    /// get gains where the check finds that their exposures differ.
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", default_value_t = false,
+        action = clap::ArgAction::Set)]
     pub exposure: bool,
     /// Where to begin.
     #[arg(long, value_enum, default_value_t)]

@@ -1,8 +1,9 @@
-//! What suits a scene, where nobody chose: method, polishing after photographs, maps as large as photos resolve.
+//! What suits a scene, where nobody chose: method, polishing and gains of photographs, maps as large as photos resolve.
 
 use super::method::Method;
 use super::settings::FitSettings;
 use crate::scene::Scene;
+use crate::scene::doctor::{Report, exposure};
 
 /// The settings that a scene decides.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -11,12 +12,14 @@ pub struct Suited {
     pub method: Method,
     /// Steps of polishing after the solver's maps.
     pub solver_polish: usize,
+    /// Whether each photo gets a gain.
+    pub exposure: bool,
     /// Width and height of maps with about as many texels as photos resolve; `None` where that is not known.
     pub map_size: Option<usize>,
 }
 
 /// As many as take no longer than what photographs do not need of the solver: finer edges, a finer grid, larger and second
-/// maps on halved photos.
+/// maps on halved photos. A preset of more or fewer steps has so many more or fewer of these.
 const POLISH_OF_PHOTOGRAPHS: usize = 110;
 /// So much coarser is the solver's grid where polishing follows, by whole paths: shadows as fine as maps need are theirs.
 const COARSER_GRID: usize = 2;
@@ -26,18 +29,21 @@ const COVERED_SHARE: f64 = 0.6;
 const LEAST_MAP_SIZE: usize = 256;
 
 impl Suited {
-    /// What suits a scene; `texels_resolved` is that of the check ([`crate::scene::doctor::Report`]).
+    /// What suits a scene of which the check found what `report` says.
     ///
     /// Linear radiance in all photos is what renderers write, and what the solver's model follows: there it ends nearer in
-    /// maps, light and pictures under another light, in less time, and needs no polishing. On photographs of real places,
-    /// 8 bits a channel, Adam through whole paths is ahead in the structure of what it shows. The README has both tables.
-    /// Maps with more texels than photos have pixels to tell them apart cost time and show the photos' noise.
-    pub fn to(scene: &Scene, texels_resolved: Option<f64>) -> Self {
-        let is_rendered = !scene.views.is_empty() && scene.views.iter().all(|view| view.photo.is_linear());
+    /// maps, light and pictures under another light than Adam, in less time, and needs no polishing. On photographs of
+    /// real places, 8 bits a channel, it does so in held-out pictures once it is polished and once the photos' exposures,
+    /// which cameras choose, are no riddle to the light. The README has both tables. Maps with more texels than photos
+    /// have pixels to tell them apart cost time and show the photos' noise. Where there are no photos there is nothing to
+    /// solve.
+    pub fn to(scene: &Scene, report: &Report) -> Self {
+        let is_photographed = scene.views.iter().any(|view| !view.photo.is_linear());
         Suited {
-            method: if is_rendered { Method::Solver } else { Method::Paper },
-            solver_polish: if is_rendered { 0 } else { POLISH_OF_PHOTOGRAPHS },
-            map_size: texels_resolved.map(map_size_for),
+            method: if scene.views.is_empty() { Method::Paper } else { Method::Solver },
+            solver_polish: if is_photographed { POLISH_OF_PHOTOGRAPHS } else { 0 },
+            exposure: is_photographed && exposure::differ(&report.views),
+            map_size: report.texels_resolved.map(map_size_for),
         }
     }
 
@@ -49,7 +55,8 @@ impl Suited {
             settings.method = if Method::means_adam(chosen) { Method::Paper } else { self.method };
         }
         if is_free("solver-polish") {
-            settings.solver_polish = self.solver_polish;
+            settings.solver_polish =
+                self.solver_polish.saturating_mul(settings.steps_all) / FitSettings::default().steps_all;
         }
         // Polishing leaves the solver the sizes below the full one, and it does with one more of them.
         if is_free("solver-levels") {
@@ -59,9 +66,38 @@ impl Suited {
             let coarser = if settings.solver_polish > 0 { COARSER_GRID } else { 1 };
             settings.solver_grid = FitSettings::default().solver_grid / coarser;
         }
+        if is_free("exposure") {
+            settings.exposure |= self.exposure;
+        }
         if is_free("map-size") {
             settings.map_size = self.map_size.map_or(settings.map_size, |size| size.min(settings.map_size));
         }
+    }
+
+    /// What was taken for the scene that nobody asked for, a sentence each, and how to have it otherwise; `asked` are the
+    /// settings before [`Suited::apply`], `settings` those after it.
+    pub fn told(&self, asked: &FitSettings, settings: &FitSettings) -> Vec<String> {
+        let mut told = Vec::new();
+        if settings.method != asked.method {
+            let why = match (self.solver_polish, settings.solver_polish) {
+                (0, _) => ", since all photos hold linear radiance",
+                (_, 0) => "",
+                _ => ", its maps polished by whole paths",
+            };
+            told.push(format!("The method is the solver{why}; --method paper takes Adam"));
+        }
+        if settings.exposure != asked.exposure {
+            told.push(
+                "A gain is fitted for each photo, since their exposures differ; --exposure=false leaves it out".into(),
+            );
+        }
+        if settings.map_size != asked.map_size {
+            let (size, larger) = (settings.map_size, asked.map_size);
+            told.push(format!(
+                "Maps of {size} x {size} texels are about what the photos resolve; --map-size {larger} takes larger ones"
+            ));
+        }
+        told
     }
 }
 
@@ -74,9 +110,21 @@ fn map_size_for(texels: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fit::Preset;
     use crate::image::Image;
     use crate::scene::Photo;
     use crate::scene::demo::{DemoSettings, build};
+    use crate::scene::doctor::ViewCheck;
+
+    /// Two views of 8 x 6 pixels.
+    fn linear_scene() -> Scene {
+        let small = DemoSettings { views: 2, held_out: 0, width: 8, height: 6, map_size: 64, seed: 1 };
+        let mut scene = build(&small).unwrap().scene;
+        for view in 0..2 {
+            scene.set_photo(view, Image::filled(8, 6, glam::Vec3::ONE)).unwrap();
+        }
+        scene
+    }
 
     fn names(of: &[&str]) -> Vec<String> {
         of.iter().map(|name| name.to_string()).collect()
@@ -89,28 +137,59 @@ mod tests {
     }
 
     #[test]
-    fn linear_photos_are_for_the_solver_unless_adam_is_meant() {
-        let small = DemoSettings { views: 2, held_out: 0, width: 8, height: 6, map_size: 64, seed: 1 };
-        let mut scene = build(&small).unwrap().scene;
-        for view in 0..2 {
-            scene.set_photo(view, Image::filled(8, 6, glam::Vec3::ONE)).unwrap();
-        }
-        let method =
-            |scene: &Scene, chosen: &[&str]| applied(&Suited::to(scene, None), FitSettings::default(), chosen).method;
-        assert_eq!(method(&scene, &[]), Method::Solver);
-        assert_eq!(method(&scene, &["map-size"]), Method::Solver);
-        assert_eq!(method(&scene, &["consistency"]), Method::Paper);
-        assert_eq!(method(&scene, &["method", "bounces"]), FitSettings::default().method);
+    fn photos_are_for_the_solver_unless_adam_is_meant_and_photographs_are_polished() {
+        let mut scene = linear_scene();
+        let suits = |scene: &Scene, chosen: &[&str]| {
+            let settings = applied(&Suited::to(scene, &Report::default()), FitSettings::default(), chosen);
+            (settings.method, settings.solver_polish)
+        };
+        assert_eq!(suits(&scene, &[]), (Method::Solver, 0));
+        assert_eq!(suits(&scene, &["map-size"]), (Method::Solver, 0));
+        assert_eq!(suits(&scene, &["consistency"]).0, Method::Paper);
+        assert_eq!(suits(&scene, &["method", "bounces"]).0, FitSettings::default().method);
         scene.views[1].photo = Photo::Srgb8(Image::filled(8, 6, [200; 3]));
-        assert_eq!(method(&scene, &[]), Method::Paper);
+        assert_eq!(suits(&scene, &[]), (Method::Solver, POLISH_OF_PHOTOGRAPHS));
+        assert_eq!(suits(&scene, &["samples"]).0, Method::Paper);
         scene.views.clear();
-        assert_eq!(method(&scene, &[]), Method::Paper);
+        assert_eq!(suits(&scene, &[]).0, Method::Paper);
+    }
+
+    #[test]
+    fn photographs_whose_exposures_differ_get_gains_unless_that_was_decided() {
+        let mut scene = linear_scene();
+        let seen = |stops: f64| ViewCheck { exposure_stops: Some(stops), ..ViewCheck::default() };
+        let differ = Report { views: vec![seen(0.0), seen(0.7)], ..Report::default() };
+        let agree = Report { views: vec![seen(0.0), seen(0.05)], ..Report::default() };
+        let gains = |scene: &Scene, report: &Report, from: bool, chosen: &[&str]| {
+            let from = FitSettings { exposure: from, ..FitSettings::default() };
+            applied(&Suited::to(scene, report), from, chosen).exposure
+        };
+        assert!(!gains(&scene, &differ, false, &[]), "a renderer's cameras have one exposure: it is gloss");
+        scene.views[0].photo = Photo::Srgb8(Image::filled(8, 6, [200; 3]));
+        assert!(gains(&scene, &differ, false, &[]));
+        assert!(!gains(&scene, &differ, false, &["exposure"]), "refused");
+        assert!(!gains(&scene, &agree, false, &[]));
+        assert!(gains(&scene, &agree, true, &[]), "a preset that has gains keeps them");
+    }
+
+    #[test]
+    fn what_was_taken_is_told_and_nothing_else() {
+        let suited = Suited { method: Method::Solver, solver_polish: 110, exposure: true, map_size: Some(512) };
+        let told = |asked: &FitSettings, chosen: &[&str]| suited.told(asked, &applied(&suited, asked.clone(), chosen));
+        let usual = FitSettings::default();
+        let all = told(&usual, &[]);
+        assert_eq!(all.len(), 3, "{all:?}");
+        assert!(all[0].contains("solver") && all[1].contains("gain") && all[2].contains("512 x 512"), "{all:?}");
+        assert!(all[0].contains("polished") && !told(&usual, &["solver-polish"])[0].contains("polished"));
+        assert_eq!(told(&usual, &["method", "exposure", "map-size"]), Vec::<String>::new());
+        let as_it_is = FitSettings { method: Method::Solver, exposure: true, map_size: 256, ..usual };
+        assert_eq!(told(&as_it_is, &[]), Vec::<String>::new());
     }
 
     #[test]
     fn polishing_and_its_sizes_go_together() {
-        let photographs = Suited { method: Method::Paper, solver_polish: 110, map_size: None };
-        let rendered = Suited { method: Method::Solver, solver_polish: 0, map_size: None };
+        let photographs = Suited { method: Method::Solver, solver_polish: 110, exposure: false, map_size: None };
+        let rendered = Suited { solver_polish: 0, ..photographs.clone() };
         let of = |suited: &Suited, polish: usize, chosen: &[&str]| {
             let from = FitSettings { solver_polish: polish, solver_levels: 1, ..FitSettings::default() };
             let settings = applied(suited, from, chosen);
@@ -124,11 +203,18 @@ mod tests {
     }
 
     #[test]
+    fn a_preset_says_how_long_to_polish() {
+        let photographs = Suited { method: Method::Solver, solver_polish: 110, exposure: false, map_size: None };
+        let steps = Preset::ALL.map(|preset| applied(&photographs, FitSettings::preset(preset), &[]).solver_polish);
+        assert_eq!(steps, [36, 110, 220]);
+    }
+
+    #[test]
     fn maps_hold_what_photos_resolve_and_no_more() {
         // Charts cover six tenths of a map.
         let sizes = [0.0, 100.0, 78_000.0, 79_000.0, 157_000.0, 630_000.0, 5e6, 5.1e6, 1e30].map(map_size_for);
         assert_eq!(sizes, [256, 256, 256, 512, 512, 1024, 2048, 4096, 8192]);
-        let suited = |size| Suited { method: Method::Paper, solver_polish: 0, map_size: size };
+        let suited = |size| Suited { method: Method::Paper, solver_polish: 0, exposure: false, map_size: size };
         let usual = FitSettings::default;
         assert_eq!(applied(&suited(Some(512)), usual(), &[]).map_size, 512);
         assert_eq!(applied(&suited(Some(512)), usual(), &["map-size"]).map_size, 2048);

@@ -35,7 +35,7 @@ fn what_is_typed_wins_over_a_preset_and_over_a_file() {
 }
 
 #[test]
-fn linear_photos_are_given_to_the_solver_unless_something_else_was_asked_for() {
+fn photos_are_given_to_the_solver_unless_something_else_was_asked_for() {
     let linear = crate::support::scene().0;
     let mut bytes = Scene::clone(&linear);
     let size = (bytes.views[0].photo.width(), bytes.views[0].photo.height());
@@ -45,8 +45,9 @@ fn linear_photos_are_given_to_the_solver_unless_something_else_was_asked_for() {
     assert_eq!(of(&linear, &["--map-size", "64", "--preset", "careful"]), Method::Solver);
     assert_eq!(of(&linear, &["--method", "paper"]), Method::Paper);
     assert_eq!(of(&linear, &["--consistency", "exact"]), Method::Paper, "the solver knows no consistency");
-    assert_eq!(of(&bytes, &[]), Method::Paper);
-    assert_eq!(of(&bytes, &["--method", "solver"]), Method::Solver);
+    assert_eq!(of(&bytes, &[]), Method::Solver);
+    assert_eq!(of(&bytes, &["--method", "paper"]), Method::Paper);
+    assert_eq!(of(&bytes, &["--samples", "8"]), Method::Paper, "paths a pixel are Adam's");
     let polish = |scene: &Scene, more: &[&str]| {
         let settings = suited(scene, None, &[&["--method", "solver"], more].concat());
         (settings.solver_polish, settings.solver_levels, settings.solver_grid)

@@ -67,7 +67,11 @@ fn a_scene_of_linear_photos_is_given_to_the_solver_and_presets_leave_it_there() 
     let mut studio = TestStudio::opening(Some(small_scene().into()));
     studio.wait("the scene", |model| model.project.is_some());
     assert_eq!(studio.model().edits.fit.method, Method::Solver);
-    assert!(studio.log().contains("the method is the solver"), "{}", studio.log());
+    assert!(
+        studio.log().contains("The method is the solver, since all photos hold linear radiance"),
+        "{}",
+        studio.log()
+    );
     studio.act(Act::PanelFit);
     studio.control("Method");
     assert!(!studio.says("Differs from the usual"), "what suits the scene is the usual there");

@@ -3,6 +3,7 @@
 use super::block::BlockPrior;
 use super::eliminate::BlockRows;
 use super::estimate::Estimate;
+use super::gains::gains_after;
 use super::light_colour::change_by_highlights;
 use super::light_evidence::{LightKnown, Precisions, evidence_shares};
 use super::light_shape::{LightShape, bright_texels};
@@ -49,7 +50,7 @@ impl SolverScene {
             let held = self.held_light(estimate, &done, number);
             Some(self.solve_light(&equations, &surface, &shape, held, estimate, stop)?)
         };
-        let gains = self.settings.exposure.then(|| gain_ratios(&round, &done, self.views.len()));
+        let gains = self.settings.exposure.then(|| gains_after(&round, &done, self.settings.independence));
         let mut errors = ErrorSums::new(self.views.len());
         for (_, work) in &done {
             errors.add_block(&round, work);
@@ -218,29 +219,4 @@ impl SolverScene {
         (!stop.load(Ordering::Relaxed))
             .then(|| (light, LightKnown { shares: evidence_shares(&precisions, shape), scale_deviation }))
     }
-}
-
-/// Logarithms of gains that bring the model to the photos, with mean zero.
-fn gain_ratios(round: &Round, done: &[(usize, BlockWork)], views: usize) -> Vec<f32> {
-    let mut sums = vec![(0.0f64, 0.0f64); views];
-    for (_, work) in done {
-        for (term, &used) in work.terms.iter().zip(&work.used) {
-            let model = round.model(work, term);
-            let sums = &mut sums[round.observations.list[used as usize].view as usize];
-            for c in 0..3 {
-                sums.0 += f64::from(term.weight * model[c] * term.radiance[c]);
-                sums.1 += f64::from(term.weight * model[c] * model[c]);
-            }
-        }
-    }
-    let moved: Vec<f32> = sums
-        .iter()
-        .zip(round.log_gains)
-        .map(|(&(product, power), &old)| {
-            let ratio = product / power;
-            old + if ratio.is_finite() && ratio > 0.0 { ratio.ln() as f32 } else { 0.0 }
-        })
-        .collect();
-    let mean = moved.iter().sum::<f32>() / views.max(1) as f32;
-    moved.iter().map(|value| value - mean).collect()
 }

@@ -124,19 +124,11 @@ impl Sums {
 /// where any kinds may be, a family for each kind of surface that maps show. Without maps it is the prior alone.
 pub fn with_families_of(estimate: &Estimate, kinds: SurfaceKinds) -> LobePrior {
     let any = kinds.prior();
-    let known: Vec<Sample> = estimate
-        .texels
-        .iter()
-        .zip(&estimate.variances)
-        .filter_map(|(texel, variance)| Sample::of(texel, variance))
-        .collect();
-    let step = known.len().div_ceil(SAMPLES).max(1);
-    let samples: Vec<Sample> = known.into_iter().step_by(step).collect();
+    let Some(scene) = SceneLobes::of(estimate) else { return any };
     let clusters = match kinds {
-        SurfaceKinds::Any => clusters(&samples),
+        SurfaceKinds::Any => clusters(&known_samples(estimate)),
         SurfaceKinds::Outdoors => Vec::new(),
     };
-    let Some(scene) = SceneLobes::of(estimate) else { return any };
     // Texels that are known well are no fair sample of the surface: shares go with the root of their number.
     let total: f64 = clusters.iter().map(|cluster| cluster.count.sqrt()).sum();
     let of_any = if total > 0.0 { ANY_SHARE } else { 1.0 };
@@ -146,6 +138,14 @@ pub fn with_families_of(estimate: &Estimate, kinds: SurfaceKinds) -> LobePrior {
     let of_cluster = |cluster: &Sums| cluster.family((1.0 - ANY_SHARE) * cluster.count.sqrt() / total);
     let families = any.families.iter().flat_map(both).chain(clusters.iter().map(of_cluster)).collect();
     LobePrior { families, keep: any.keep }
+}
+
+/// Texels whose lobes are known well, evenly chosen where there are more than it takes.
+fn known_samples(estimate: &Estimate) -> Vec<Sample> {
+    let texels = estimate.texels.iter().zip(&estimate.variances);
+    let known: Vec<Sample> = texels.filter_map(|(texel, variance)| Sample::of(texel, variance)).collect();
+    let step = known.len().div_ceil(SAMPLES).max(1);
+    known.into_iter().step_by(step).collect()
 }
 
 impl LobeFamily {

@@ -11,7 +11,7 @@
 //! 4. [`light_step`]: the light from those rows, at least zero ([`non_negative`]), in wide and narrow hats
 //!    ([`light_shape`]), with a weak wish for smoothness but for suns ([`light_suns`]). [`light_round`] is the round as a
 //!    whole, [`light_evidence`] says what each texel of the light is known by, `light_holes` fills what lies between texels
-//!    that photos show.
+//!    that photos show; `gains` of photos whose exposures differ.
 //! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`, `tile_texels`, `tile_spread`,
 //!    `tile_highlights`) with the footprints of pixels, where the evidence, as far as it is independent
 //!    (`tile_independence`), decides which texels share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_prior`],
@@ -33,6 +33,7 @@ pub mod diffuse;
 pub mod diffuse_system;
 pub mod eliminate;
 pub mod estimate;
+mod gains;
 mod light_colour;
 pub mod light_evidence;
 mod light_holes;

@@ -3,8 +3,8 @@
 //! Points seen by two views give the logarithm of a ratio; its median over the points hardly feels highlights. The
 //! views' exposures are the least-squares solution of all pairs, with median zero.
 
-use super::Report;
 use super::probe::{Probe, surface_at};
+use super::{Report, ViewCheck};
 use crate::error::{Finding, Place, Severity};
 use crate::math::{luminance, statistics::quantile};
 use crate::scene::{PixelState, Scene};
@@ -20,6 +20,11 @@ const NEIGHBOURS: usize = 8;
 const FEWEST_SHARED: usize = 20;
 /// A view that is off by more than this, in stops, is named.
 const JUMP_STOPS: f64 = 0.5;
+/// Where no view is, views that differ by more than this, in stops, are told of: root of the mean square.
+const SPREAD_STOPS: f64 = 0.1;
+/// More than gloss makes of photos that all have one exposure: a glossy vase came to 0.16 stops so, photographs of a statue
+/// and of portals by a camera that chose its exposures to 0.32 and 0.31.
+const SPREAD_BEYOND_GLOSS_STOPS: f64 = 0.25;
 
 /// A pair of views and the median of ln(radiance in b / radiance in a) over what they share.
 struct Pair {
@@ -56,27 +61,36 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
                 )
                 .at(Place::View(view.name.clone()))
                 .remedy(
-                    "fit an exposure per view, or develop all photos with one exposure and white balance; of things that \
-                     shine all over it may be their gloss",
+                    "fit an exposure per view, as is done with photos of 8 bits, or develop all photos with one exposure and \
+                     white balance; of things that shine all over it may be their gloss",
                 ),
             );
         }
     }
-    let known = exposures.iter().flatten().count();
-    if jumps == 0 && known > 2 {
-        let spread = (exposures.iter().flatten().map(|log| log * log).sum::<f64>() / known as f64).sqrt()
-            / std::f64::consts::LN_2;
-        if spread > 0.1 {
-            report.findings.push(
-                Finding::new(
-                    Severity::Note,
-                    "exposure-varies",
-                    format!("exposures vary by {spread:.2} stops (standard deviation over the views)"),
-                )
-                .remedy("fit an exposure per view if the fit leaves brightness errors of whole pictures"),
-            );
-        }
+    if let Some(spread) = spread_stops(&report.views).filter(|spread| jumps == 0 && *spread > SPREAD_STOPS) {
+        report.findings.push(
+            Finding::new(
+                Severity::Note,
+                "exposure-varies",
+                format!("exposures vary by {spread:.2} stops (standard deviation over the views)"),
+            )
+            .remedy("fit an exposure per view if the fit leaves brightness errors of whole pictures"),
+        );
     }
+}
+
+/// Whether views see the surface they share so differently that their exposures must differ: one of them by more than half
+/// a stop, or all of them by more than a quarter in the root of the mean square.
+pub fn differ(views: &[ViewCheck]) -> bool {
+    let is_jump = |view: &ViewCheck| view.exposure_stops.is_some_and(|stops| stops.abs() > JUMP_STOPS);
+    views.iter().any(is_jump) || spread_stops(views).is_some_and(|spread| spread > SPREAD_BEYOND_GLOSS_STOPS)
+}
+
+/// Root of the mean square over the views; `None` where fewer than three are known, which differ by what they see.
+fn spread_stops(views: &[ViewCheck]) -> Option<f64> {
+    let known: Vec<f64> = views.iter().filter_map(|view| view.exposure_stops).collect();
+    let mean_square = known.iter().map(|stops| stops * stops).sum::<f64>() / known.len() as f64;
+    (known.len() > 2).then(|| mean_square.sqrt())
 }
 
 fn pairs_of(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], a: usize) -> Vec<Pair> {
@@ -176,5 +190,19 @@ mod tests {
             assert!((solved[view].unwrap() - truth[view]).abs() < 1e-6, "{solved:?}");
         }
         assert_eq!(solved[5], None);
+    }
+
+    #[test]
+    fn a_jump_or_a_wide_spread_is_of_exposures_and_less_is_not() {
+        let of = |stops: &[Option<f64>]| {
+            let view = |stops: &Option<f64>| ViewCheck { exposure_stops: *stops, ..ViewCheck::default() };
+            differ(&stops.iter().map(view).collect::<Vec<_>>())
+        };
+        assert!(!of(&[]) && !of(&[None, None, None]));
+        assert!(!of(&[Some(0.2), Some(-0.2), Some(0.0), None]));
+        assert!(of(&[Some(0.4), Some(-0.4), Some(0.0)]));
+        assert!(!of(&[Some(0.4), Some(-0.4), None]), "two views are no spread");
+        assert!(of(&[Some(0.6), Some(0.0)]), "but a jump is one");
+        assert!(of(&[&[Some(-0.6)][..], &[Some(0.0); 99]].concat()));
     }
 }

@@ -7,7 +7,7 @@ use super::project::Atlas;
 use super::{Cursor, Done, Edits, Model, Project, StageSwitches, Workspace};
 use crate::error::{Finding, Severity};
 use crate::export::RunFolder;
-use crate::fit::{FitSettings, Method, Suited};
+use crate::fit::{FitSettings, Suited};
 use crate::image::RgbImage;
 use crate::insight::report::data::StageTime;
 use crate::job::demo;
@@ -91,7 +91,7 @@ impl Model {
                 }
                 PathKind::Scene => {
                     let opened = open::open_scene(&path, &settings.read, &context.stop, &tell)?;
-                    let suited = Suited::to(&opened.scene, opened.report.texels_resolved);
+                    let suited = Suited::to(&opened.scene, &opened.report);
                     suited.apply(&mut settings.fit, &[]);
                     context.tell("small pictures", 0.0);
                     let read = SceneRead::new(Some(path), settings, opened);
@@ -154,12 +154,9 @@ impl Model {
         }
         let views = read.scene.views.len();
         self.edits.fit = read.settings.fit.clone();
-        if self.edits.fit.method == Method::Solver {
-            self.log.note("The photos hold linear radiance: the method is the solver");
-        }
-        if read.suited.is_some() && self.edits.fit.map_size < FitSettings::default().map_size {
-            let size = self.edits.fit.map_size;
-            self.log.note(format!("Maps of {size} x {size} texels are about what the photos resolve"));
+        if let Some(suited) = &read.suited {
+            let told = suited.told(&FitSettings::default(), &self.edits.fit);
+            told.into_iter().for_each(|line| self.log.note(line));
         }
         self.eye = OrbitEye::around(bounds(&read.mesh));
         if let Some(truth) = &read.scene.truth {
