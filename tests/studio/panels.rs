@@ -203,6 +203,7 @@ fn a_texel_that_is_pinned_on_a_map_tells_what_every_photo_says() {
     for words in ["Texel row", "Roughness", "Seen by", "Spread of views", "Nearest to highlight"] {
         assert!(studio.says(words), "{words}");
     }
+    assert!(!studio.says("NaN"), "where there is no figure, words say why");
     studio.click("Let go");
     assert!(studio.says("No texel") || studio.says("Texel under the cursor"));
 }

@@ -116,6 +116,14 @@ fn ask(ui: &Ui, model: &Model, cursor: &Cursor, memory: &mut RecordMemory) {
     }
 }
 
+/// In place of a figure that only photos tell.
+const UNSEEN: &str = "no photo sees it";
+
+/// A figure with its unit, or in words why there is none.
+fn figure(value: f32, decimals: usize, unit: &str, otherwise: &str) -> String {
+    if value.is_nan() { otherwise.into() } else { format!("{value:.decimals$}{unit}") }
+}
+
 fn body(ui: &mut Ui, model: &mut Model, record: &TexelRecord) {
     let (row, column) = record.texel;
     ui.label(format!("Texel row {row}, column {column}"));
@@ -133,10 +141,11 @@ fn body(ui: &mut Ui, model: &mut Model, record: &TexelRecord) {
             line(name, value, help);
         }
         line("Seen by", format!("{} photos", record.rows.len()), "Photos whose view of the texel nothing blocks");
-        line("Resolved to", format!("{:.2} texels a pixel", record.footprint_texels), "Above 1 no photo resolves single texels here");
-        line("Spread of views", format!("{:.0} degrees", record.view_spread_degrees), "Small: shine cannot be told from colour");
-        line("Nearest to highlight", format!("{:.0} degrees", record.highlight_degrees), "Angle between the normal and the nearest half vector of a view and the brightest light: small, and roughness can be known");
-        line("Clipped", format!("{:.0} %", 100.0 * record.clipped_share), "Share of these pixels that are clipped and no data");
+        line("Resolved to", figure(record.footprint_texels, 2, " texels a pixel", UNSEEN), "Above 1 no photo resolves single texels here");
+        line("Spread of views", figure(record.view_spread_degrees, 0, " degrees", UNSEEN), "Small: shine cannot be told from colour");
+        let no_highlight = if record.rows.is_empty() { UNSEEN } else { "it faces away from the light" };
+        line("Nearest to highlight", figure(record.highlight_degrees, 0, " degrees", no_highlight), "Angle between the normal and the nearest half vector of a view and the brightest light: small, and roughness can be known");
+        line("Clipped", figure(100.0 * record.clipped_share, 0, " %", UNSEEN), "Share of these pixels that are clipped and no data");
     });
     heading(ui, "What each photo says");
     if record.rows.is_empty() {
@@ -229,4 +238,15 @@ fn pull(ui: &mut Ui, residual: Vec3, largest: f32) {
     ui.painter().rect_filled(bar, 0.0, if mean > 0.0 { colours.curves[1] } else { colours.curves[2] });
     ui.painter().vline(centre, rect.y_range(), egui::Stroke::new(1.0, ui.visuals().weak_text_color()));
     response.on_hover_text(rgb(residual));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_figure_that_is_none_says_why() {
+        assert_eq!(figure(12.345, 1, " degrees", UNSEEN), "12.3 degrees");
+        assert_eq!(figure(f32::NAN, 0, " %", UNSEEN), "no photo sees it");
+    }
 }
