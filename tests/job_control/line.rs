@@ -20,6 +20,10 @@ fn what_is_typed_wins_over_a_preset_and_over_a_file() {
     let typed = of(&["--preset", "quick", "--map-size", "2048", "--exclude", "a", "--exclude", "b c"]).fit;
     let exclude = vec!["a".to_string(), "b c".to_string()];
     assert_eq!(typed, FitSettings { map_size: 2048, exclude, ..FitSettings::preset(Preset::Quick) });
+    // A switch may stand alone, or say that it is off.
+    let gains = ["--exposure", "--exposure=true", "--exposure=false"]
+        .map(|word| of(&["--preset", "careful", word]).fit.exposure);
+    assert_eq!(gains, [true, true, false]);
 
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("settings.toml");
