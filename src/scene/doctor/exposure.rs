@@ -47,7 +47,7 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
     let mut jumps = 0;
     for ((view, line), exposure) in scene.views.iter().zip(&mut report.views).zip(&exposures) {
         line.exposure_stops = exposure.map(|log| log / std::f64::consts::LN_2);
-        if let Some(stops) = line.exposure_stops.filter(|stops| stops.abs() > JUMP_STOPS) {
+        if let Some(stops) = jump_stops(line) {
             jumps += 1;
             report.findings.push(
                 Finding::new(
@@ -82,8 +82,13 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
 /// Whether views see the surface they share so differently that their exposures must differ: one of them by more than half
 /// a stop, or all of them by more than a quarter in the root of the mean square.
 pub fn differ(views: &[ViewCheck]) -> bool {
-    let is_jump = |view: &ViewCheck| view.exposure_stops.is_some_and(|stops| stops.abs() > JUMP_STOPS);
-    views.iter().any(is_jump) || spread_stops(views).is_some_and(|spread| spread > SPREAD_BEYOND_GLOSS_STOPS)
+    views.iter().any(|view| jump_stops(view).is_some())
+        || spread_stops(views).is_some_and(|spread| spread > SPREAD_BEYOND_GLOSS_STOPS)
+}
+
+/// By how much a view is off, where that is a jump.
+fn jump_stops(view: &ViewCheck) -> Option<f64> {
+    view.exposure_stops.filter(|stops| stops.abs() > JUMP_STOPS)
 }
 
 /// Root of the mean square over the views; `None` where fewer than three are known, which differ by what they see.
