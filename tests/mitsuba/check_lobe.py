@@ -5,8 +5,8 @@ import numpy as np
 
 import exchange_scene as ex
 
-CASES = [(0.5, 0.04, 0.5, 0.3), (0.2, 0.5, 0.05, 0.9), (0.0, 1.0, 0.2, 0.2), (0.5, 0.04, 0.02, 1.3), (0.3, 0.3, 1.0, 1.0),
-         (0.0, 0.0, 0.1, 1.4), (0.1, 0.9, 0.005, 0.6)]
+CASES = [(0.5, 0.04, 0.5, 0.3), (0.2, 0.5, 0.05, 0.9), (0.0, 1.0, 0.2, 0.2), (0.5, 0.04, 0.02, 1.3),
+         (0.3, 0.3, 1.0, 1.0), (0.0, 0.0, 0.1, 1.4), (0.1, 0.9, 0.005, 0.6)]
 
 
 def closed_form(rho_d, f0, r, i, o):
@@ -37,7 +37,8 @@ def main():
         z, phi = np.meshgrid((np.arange(rows) + 0.5) / rows, (np.arange(rows) + 0.5) / rows * 2 * np.pi, indexing="ij")
         s = np.sqrt(1 - z * z)
         o = np.stack([s * np.cos(phi), s * np.sin(phi), z]).reshape(3, -1)
-        value, density = lobe.eval_pdf(context, hit(o.shape[1]), mi.Vector3f(*(mi.Float(x.astype(np.float32)) for x in o)))
+        out = mi.Vector3f(*(mi.Float(x.astype(np.float32)) for x in o))
+        value, density = lobe.eval_pdf(context, hit(o.shape[1]), out)
         value, density = np.array(value)[0], np.array(density)
         exact = closed_form(rho_d, f0, r, np.repeat(i[:, None], o.shape[1], 1), o)
         departure = np.max(np.abs(value - exact) / (exact + 1e-3 * exact.max()))
@@ -50,7 +51,8 @@ def main():
         mass = density.astype(float).mean() * 2 * np.pi
         good = departure < 2e-3 and abs(z_albedo) < 4 and abs(mass - valid) < 3e-3
         bad += not good
-        print(f"rho_d {rho_d} F0 {f0} r {r} theta {theta}: eval off by {departure:.1e}, density {mass:.4f} / valid {valid:.4f}, "
+        print(f"rho_d {rho_d} F0 {f0} r {r} theta {theta}: eval off by {departure:.1e}, "
+              f"density {mass:.4f} / valid {valid:.4f}, "
               f"albedo {albedo:.5f} sampled {weight.mean():.5f} +- {error:.1e}  {'ok' if good else 'BAD'}")
     sys.exit(int(bad > 0))
 

@@ -2,7 +2,8 @@
 
 A side without variance is taken to have the other's, times --missing-variance (0 for a noiseless picture, 0.25 for one
 with four times the samples). A variance from K batches makes z follow Student's law: with K = 16 on both sides its
-RMS is about 1.035 and 0.5 % lie above 3; with a variance from one side only 1.07 and 0.9 %. Prints one JSON line a view and one for all; ends with 1 when a limit is passed.
+RMS is about 1.035 and 0.5 % lie above 3; with a variance from one side only 1.07 and 0.9 %. Prints one JSON line a view
+and one for all; ends with 1 when a limit is passed or a value is not finite.
 """
 import argparse
 import json
@@ -36,6 +37,7 @@ def figures(ours, theirs, variance):
         "relative_mean": float(difference.mean() / np.mean(theirs)),
         "noiseless_max": float(np.abs(difference[~noisy]).max() if (~noisy).any() else 0.0),
         "noisy_values": int(noisy.sum()),
+        "non_finite": int((~np.isfinite(difference + variance)).sum()),
     }
 
 
@@ -71,7 +73,8 @@ def main():
         print(json.dumps({"view": name} | figures(*everything[-1])))
     total = figures(*(np.concatenate(part) for part in zip(*everything)))
     print(json.dumps({"view": "all", "views": len(names)} | total))
-    if total["z_above_3"] > options.limit_above_3 or total["z_rms"] > options.limit_rms:
+    # Values that are not finite are asked for by themselves: a comparison with one is false.
+    if total["non_finite"] or total["z_above_3"] > options.limit_above_3 or total["z_rms"] > options.limit_rms:
         sys.exit(1)
 
 

@@ -1,5 +1,7 @@
 """An exchange folder as a Mitsuba scene: files, cameras, light."""
+import contextlib
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -28,13 +30,30 @@ def read_exr(path):
     return pixels[..., None] if pixels.ndim == 2 else pixels
 
 
+@contextlib.contextmanager
+def replacing(path):
+    """A path beside `path` to write to; what was written takes the place of `path` when the block ends without error.
+
+    Scripts pass over files that exist, so that a file under its own name must be whole, whenever a run is cut off. The
+    ending is kept: Mitsuba chooses the format of a picture by it.
+    """
+    path = Path(path)
+    temporary = path.with_name(f"{path.stem}.{os.getpid()}.tmp{path.suffix}")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
 def write_exr(path, pixels):
     """Writes float32 [height, width] or [height, width, 1 or 3]."""
     pixels = np.ascontiguousarray(pixels, np.float32)
     pixels = pixels[..., None] if pixels.ndim == 2 else pixels
     kind = mi.Bitmap.PixelFormat.Y if pixels.shape[2] == 1 else mi.Bitmap.PixelFormat.RGB
-    Path(path).parent.mkdir(parents=True, exist_ok=True)
-    mi.Bitmap(pixels, kind).write(str(path))
+    with replacing(path) as temporary:
+        mi.Bitmap(pixels, kind).write(str(temporary))
 
 
 class Folder:
@@ -59,7 +78,8 @@ class Folder:
 
     def save_facts(self, **facts):
         self.facts.update(facts)
-        (self.folder / "scene.json").write_text(json.dumps(self.facts, indent=1) + "\n")
+        with replacing(self.folder / "scene.json") as temporary:
+            temporary.write_text(json.dumps(self.facts, indent=1) + "\n")
 
 
 def nodes_of_light(radiance):
@@ -94,7 +114,8 @@ def scene(folder, light, blend_log_width=False):
     maps = dict(folder.maps)
     if blend_log_width:
         maps["roughness"] = 0.5 * np.log(np.clip(maps["roughness"], 2.5e-5, 1.0))
-    lobe = {"type": "modct", "log_width": blend_log_width, "lobe_strength": float(folder.facts.get("lobe_strength", 1.0))}
+    lobe = {"type": "modct", "log_width": blend_log_width,
+            "lobe_strength": float(folder.facts.get("lobe_strength", 1.0))}
     return mi.load_dict({
         "type": "scene",
         "surface": {"type": "obj", "filename": str(folder.folder / "mesh.obj"),
@@ -138,11 +159,14 @@ def render(world, how, camera, samples, batches, seed):
 
 
 def chosen_views(text, count):
-    """`0,3,8-11` as indices; all of them when nothing is given."""
+    """`0,3,8-11` as indices; all of them when nothing is given. Ends the script where there is no such view."""
     if not text:
         return list(range(count))
     chosen = []
     for piece in text.split(","):
         first, _, last = piece.partition("-")
-        chosen.extend(range(int(first), int(last or first) + 1))
-    return [index for index in chosen if index < count]
+        indices = range(int(first), int(last or first) + 1)
+        if not indices or indices[-1] >= count:
+            raise SystemExit(f"there are no views {piece}: the scene has {count}, counted from 0")
+        chosen.extend(indices)
+    return chosen

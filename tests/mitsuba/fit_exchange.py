@@ -5,7 +5,8 @@
 START holds diffuse.exr, specular.exr, roughness.exr and env.exr; their sizes are those of the result. At the first step
 that ends after each of the times, and at the end, DIR/NNN gets the same four files and DIR/snapshots.jsonl a line:
 
-    {"folder": "000", "due": 10.0, "seconds": 10.4, "cpu_seconds": 17.1, "step": 9, "stage": "all", "peak_bytes": ..., "non_finite": 0}
+    {"folder": "000", "due": 10.0, "seconds": 10.4, "cpu_seconds": 17.1, "step": 9, "stage": "all",
+     "peak_bytes": ..., "non_finite": 0}
 
 Seconds count from the start of the process, imports and compilation of kernels included; writing these files is not
 counted. `patina bench fit` runs this script beside the program's own methods.
@@ -127,8 +128,8 @@ class Problem:
         for place, view in enumerate(views):
             photo, sensor = self.photo(view)
             number = 2 * (seed + place)
-            picture = self.mi.render(self.world, self.parameters, sensor=sensor, integrator=self.integrator, spp=samples,
-                                     spp_grad=samples, seed=number, seed_grad=number + 1)
+            picture = self.mi.render(self.world, self.parameters, sensor=sensor, integrator=self.integrator,
+                                     spp=samples, spp_grad=samples, seed=number, seed_grad=number + 1)
             loss = self.dr.mean(self.dr.square(picture - photo), axis=None) / len(views)
             # What leads from the leaves to the scene is needed again by the next view.
             self.dr.backward(loss, flags=self.dr.ADFlag.ClearVertices)
@@ -184,8 +185,10 @@ def main():
     parser.add_argument("--spp", type=int, default=16)
     parser.add_argument("--views-per-step", type=int, default=1)
     parser.add_argument("--rate", type=float, default=0.02, help="step size of the maps")
-    parser.add_argument("--rate-light", type=float, default=0.1, help="step size of the light, times its mean at the start")
-    parser.add_argument("--final-rate", type=float, default=0.05, help="share of the step sizes that is left at the end")
+    parser.add_argument("--rate-light", type=float, default=0.1,
+                        help="step size of the light, times its mean at the start")
+    parser.add_argument("--final-rate", type=float, default=0.05,
+                        help="share of the step sizes that is left at the end")
     options = parser.parse_args()
     clock = Clock(options.began or IMPORTED)
 
@@ -199,8 +202,11 @@ def main():
     problem = Problem(mi, dr, folder, start, depth, hidden)
     views = ex.chosen_views(options.views, len(folder.views))
     if options.names:
-        names = set(options.names.split(","))
-        views = [index for index in range(len(folder.views)) if folder.name_of_view(index) in names]
+        names, stems = set(options.names.split(",")), [folder.name_of_view(index) for index in range(len(folder.views))]
+        # Fitted to fewer photos than the program's own methods, it could not be compared with them.
+        if not names <= set(stems):
+            raise SystemExit(f"no views are called {', '.join(sorted(names - set(stems)))}")
+        views = [index for index, stem in enumerate(stems) if stem in names]
     snapshots = Snapshots(options.out, [float(at) for at in options.at.split(",") if at], clock)
 
     rates = dict.fromkeys(MAPS, options.rate)

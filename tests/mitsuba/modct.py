@@ -6,7 +6,8 @@
     G = g(n.i) g(n.o),  g(c) = c / (c (1 - k) + k),  k = a / 2          Smith product of Schlick's approximation
 
 `r` is what roughness.exr holds. `lobe_strength` scales the second term: 0 takes the lobe away as a whole, which F0 = 0
-does not. With `log_width` the third texture holds ln a instead of r, so that ln a is what a bilinear tap blends. The cosines of G cancel those below the fraction, so nothing is divided by a cosine.
+does not. With `log_width` the third texture holds ln a instead of r, so that ln a is what a bilinear tap blends. The
+cosines of G cancel those below the fraction, so nothing is divided by a cosine.
 
 A direction is drawn from a mixture: cosine-weighted about n, or a half vector with density D (n.h) which reflects i.
 Nothing in the mixture carries a derivative; the value of f does.

@@ -3,6 +3,7 @@ import argparse
 import json
 import os
 import time
+from pathlib import Path
 
 import exchange_scene as ex
 
@@ -30,11 +31,15 @@ def main():
         view = folder.views[index]
         mean, variance = ex.render(world, how, ex.sensor(view), options.spp, options.seeds, options.seed * 4096 + index)
         ex.write_exr(f"{options.out}/{folder.name_of_view(index)}.exr", mean)
-        if variance is not None:
-            ex.write_exr(f"{options.out}/variance/{folder.name_of_view(index)}.exr", variance)
+        path = Path(options.out) / "variance" / f"{folder.name_of_view(index)}.exr"
+        if variance is None:
+            # That of an earlier run belongs to another picture.
+            path.unlink(missing_ok=True)
+        else:
+            ex.write_exr(path, variance)
         pixels += view["width"] * view["height"]
     seconds = time.time() - start
-    samples = options.spp // options.seeds * options.seeds
+    samples = max(1, options.spp // options.seeds) * options.seeds
     print(json.dumps({"out": options.out, "depth": depth, "spp": samples, "seeds": options.seeds, "hidden": hidden,
                       "seconds": round(seconds, 2), "Msamples_per_s": round(pixels * samples / seconds / 1e6, 3),
                       "load": os.getloadavg()[0]}))

@@ -1,6 +1,9 @@
-"""Brings a latitude-longitude picture to 32 x 64 by exact area on the sphere: resample_light.py IN.hdr OUT.exr [--scale S].
+"""Brings a latitude-longitude picture to 32 x 64 by exact area on the sphere.
 
-The energy through every cell is kept; --mean M scales the map to mean luminance M over the sphere.
+    resample_light.py IN.hdr OUT.exr [--height 32] [--mean M]
+
+The result has twice as many columns as rows. The energy through every cell is kept; --mean M scales the map to mean
+luminance M over the sphere.
 """
 import argparse
 
@@ -17,11 +20,11 @@ def overlaps(fine, coarse):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("source")
     parser.add_argument("target")
-    parser.add_argument("--height", type=int, default=32)
-    parser.add_argument("--mean", type=float)
+    parser.add_argument("--height", type=int, default=32, help="rows of the result")
+    parser.add_argument("--mean", type=float, help="mean luminance of the result; that of the source when not given")
     options = parser.parse_args()
     ex.start("scalar_rgb")
     fine = ex.read_exr(options.source)[..., :3].astype(np.float64)
@@ -34,8 +37,9 @@ def main():
     areas = down.sum(0)[:, None] * across.sum(0)[None, :]
     light = energy / areas[..., None]
     mean = (light * areas[..., None]).sum((0, 1)) / 2.0
-    if options.mean:
-        light *= options.mean / (mean @ [0.2126, 0.7152, 0.0722])
+    if options.mean is not None:
+        factor = options.mean / (mean @ [0.2126, 0.7152, 0.0722])
+        light, mean = factor * light, factor * mean
     ex.write_exr(options.target, light)
     print(f"{options.target}: mean {mean.round(4)}, largest {light.max():.1f}")
 

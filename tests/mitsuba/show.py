@@ -23,7 +23,8 @@ def main():
         sheet[y:y + tile.shape[0], x:x + tile.shape[1]] = tile
     x = np.clip(sheet * options.exposure, 0, 1)
     encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
-    mi.Bitmap((encoded * 255 + 0.5).astype(np.uint8)).write(options.target)
+    with ex.replacing(options.target) as temporary:
+        mi.Bitmap((encoded * 255 + 0.5).astype(np.uint8)).write(str(temporary))
 
 
 main()

@@ -1,11 +1,12 @@
 """Times Mitsuba on an exchange folder: one JSON object a repetition, with a list for each sampler.
 
-    [camera rays, bounce rays, shadow rays, path samples, noise, seconds to 1 % noise, gradient samples, gradient over picture]
+    [camera rays, bounce rays, shadow rays, path samples, noise, seconds to 1 % noise, gradient samples,
+     gradient over picture]
 
 Rays and samples in millions a second; noise is the standard deviation of a pixel in percent of the pictures' mean, from
-the difference to the pictures of the repetition before; seconds are those of a megapixel, as variance times time. Rays and
-gradients do not depend on the sampler and are null but for the first. The first pass of each compiles and is not counted.
-`patina bench tracer` runs this beside the program's own tracer.
+the difference to the pictures of the repetition before; seconds are those of a megapixel, as variance times time. Rays
+and gradients do not depend on the sampler and are null but for the first. The first pass of each compiles and is not
+counted. `patina bench tracer` runs this beside the program's own tracer.
 """
 import argparse
 import json
@@ -48,8 +49,9 @@ def main():
     camera, bounce, shadow = [], [], []
     for number, (view, sensor) in enumerate(zip(views, sensors)):
         columns, rows = view["width"], view["height"]
-        place = [(np.tile(np.arange(columns), rows) + 0.5) / columns, (np.repeat(np.arange(rows), columns) + 0.5) / rows]
-        ray, _ = sensor.sample_ray(0.0, 0.5, mi.Point2f(*(mi.Float(p.astype(np.float32)) for p in place)), mi.Point2f(0.5, 0.5))
+        x, y = np.tile(np.arange(columns), rows), np.repeat(np.arange(rows), columns)
+        place = mi.Point2f(*(mi.Float(p.astype(np.float32)) for p in ((x + 0.5) / columns, (y + 0.5) / rows)))
+        ray, _ = sensor.sample_ray(0.0, 0.5, place, mi.Point2f(0.5, 0.5))
         dr.eval(ray)
         camera.append(ray)
         si = world.ray_intersect(ray)
@@ -85,7 +87,8 @@ def main():
 
     def noise(made, before):
         """Standard deviation of a pixel over the mean."""
-        made, before = (np.concatenate([np.array(picture, np.float64).ravel() for picture in all_of]) for all_of in (made, before))
+        joined = lambda pictures: np.concatenate([np.array(picture, np.float64).ravel() for picture in pictures])
+        made, before = joined(made), joined(before)
         return np.sqrt(0.5 * np.mean((made - before)**2)) / np.mean(0.5 * (made + before))
 
     parameters = mi.traverse(world)

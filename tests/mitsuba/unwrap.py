@@ -1,8 +1,13 @@
-"""Gives an OBJ texture coordinates with xatlas: unwrap.py IN.obj OUT.obj [--size 256]. Normals by angle-weighted mean."""
+"""Gives an OBJ texture coordinates with xatlas: unwrap.py IN.obj OUT.obj [--size 256].
+
+Normals are the mean over the faces of a vertex, weighted by their angles.
+"""
 import argparse
 
 import numpy as np
 import xatlas
+
+import exchange_scene as ex
 
 
 def read_obj(path):
@@ -50,7 +55,7 @@ def main():
     else:
         raise SystemExit("the charts do not fit the map: raise --size")
     old, triangles, uv = atlas[0]
-    with open(options.target, "w") as out:
+    with ex.replacing(options.target) as temporary, open(temporary, "w") as out:
         for p in positions[old]:
             out.write("v %.9g %.9g %.9g\n" % tuple(p))
         # Texels of the packing are texels of the map: the rest of the map stays empty.
