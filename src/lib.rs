@@ -10,7 +10,7 @@
 //! |---|---|
 //! | [`error`], [`files`] | errors with kind, place and remedy; files that are written whole or not at all |
 //! | [`math`] | random numbers, frames, the sphere, sampling tables, statistics, numbers with derivatives |
-//! | [`image`] | linear images, image files, metrics, the mip chain and its transpose |
+//! | [`image`] | linear images, image files, metrics |
 //! | [`trace`] | rays and the bounding volume hierarchy |
 //! | [`light`] | the environment |
 //! | [`material`] | texture maps and the reflection lobe |

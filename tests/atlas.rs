@@ -275,6 +275,22 @@ fn non_manifold_and_sliver_ridden_input() {
     }
 }
 
+/// A triangle and its back share all corners: no parting of the two by their centres is possible.
+#[test]
+fn a_triangle_with_its_back_is_parted() {
+    let mut mesh = grid(10, 10, |x, y| Vec3::new(x, 0.0, y));
+    let first = mesh.positions.len() as u32;
+    // An ear at the corner of the sheet, once from each side.
+    let (corner, along) = (mesh.positions[0], Vec3::new(0.1, 0.0, 0.0));
+    mesh.positions.extend([corner, corner - along, corner - Vec3::new(0.0, 0.0, 0.1)]);
+    mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 1]]);
+    checked(&mesh, &settings(256));
+    // Alone.
+    let mut both = Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], ..Mesh::default() };
+    both.triangles = vec![[0, 1, 2], [0, 2, 1]];
+    checked(&both, &settings(64));
+}
+
 #[test]
 fn cleaning_twice_is_cleaning_once_and_leaves_no_holes() {
     use patina::atlas::clean::dissolve_degenerate;

@@ -261,6 +261,7 @@ fn files_that_claim_too_much_are_refused_before_memory_is_taken() {
     expect(window(9_999, 9_999), ErrorKind::Malformed);
     // The others by their headers.
     expect(pfm_bytes("PF", 40_000, 40_000, &[], true), ErrorKind::TooLarge);
+    expect(pfm_bytes("PF4", 2, 2, &[0.5; 16], true), ErrorKind::Malformed);
     expect(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 40000 +X 40000\n".to_vec(), ErrorKind::TooLarge);
     expect(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 9000 +X 9000\n\x02\x02".to_vec(), ErrorKind::Malformed);
     let mut png = file::encode_png_srgb8(&byte_image(3, 3)).unwrap();

@@ -73,6 +73,11 @@ fn only_the_mask_counts_and_what_is_not_finite_is_counted_not_hidden() {
     let all = scores(&estimate, &truth, None).unwrap();
     assert_eq!((all.pixels, all.not_finite), (399, 1));
     assert!((all.rmse - (0.25f64 / 399.0).sqrt()).abs() < 1e-9 && all.ssim.is_finite());
+    // What one image does not know makes no difference around it.
+    let bright = Image::filled(20, 20, Vec3::splat(0.7));
+    let mut hole = bright.clone();
+    hole[(10, 10)] = Vec3::NAN;
+    assert_eq!(scores(&hole, &bright, None).unwrap().ssim, 1.0);
     let one = Image::from_fn(20, 20, |row, column| row == 4 && column == 4);
     assert_eq!(rmse(&estimate, &truth, Some(&one)).unwrap(), 0.5);
     let nothing = scores(&estimate, &truth, Some(&Image::filled(20, 20, false))).unwrap();

@@ -131,7 +131,8 @@ impl ChartMesh {
         }
     }
 
-    /// Parts the chart in two edge-connected halves of surface triangles: seeds far apart, each triangle to the nearer.
+    /// Parts a chart of two triangles or more in two halves of surface triangles, neither empty: seeds far apart, each
+    /// triangle to the nearer. Halves are edge-connected unless all centres lie in one place.
     pub fn halves(&self, surface: &Surface) -> [Vec<u32>; 2] {
         let centres: Vec<DVec3> =
             self.triangles.iter().map(|&triangle| surface.corners(triangle).into_iter().sum::<DVec3>() / 3.0).collect();
@@ -145,6 +146,11 @@ impl ChartMesh {
         let mut halves = [Vec::new(), Vec::new()];
         for (local, &triangle) in self.triangles.iter().enumerate() {
             halves[usize::from(from_second[local] < from_first[local])].push(triangle);
+        }
+        // All centres in one place, as of a triangle and its back: then any parting serves, but none may be empty.
+        if halves[1].is_empty() {
+            let moved = halves[0].pop();
+            halves[1].extend(moved);
         }
         halves
     }

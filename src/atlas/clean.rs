@@ -53,7 +53,8 @@ impl Cleaned {
 /// as none, in diagonals of the bounding box (rounded down to a power of two, so that cleaning twice is cleaning once).
 ///
 /// # Errors
-/// `InvalidScene` when the mesh is inconsistent, has no triangles, or none that has an area.
+/// `InvalidScene` when the mesh is inconsistent, has no triangles, or none that has an area; `NonFinite` for a vertex that
+/// is not finite.
 pub fn dissolve_degenerate(mesh: &Mesh, relative_distance: f64) -> Result<Cleaned> {
     mesh.validate()?;
     let Some((low, high)) = mesh.bounds() else {

@@ -63,7 +63,7 @@ pub enum KeepUv {
 
 /// Settings of [`build`].
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(default)]
+#[serde(default, deny_unknown_fields)]
 pub struct AtlasSettings {
     /// Width and height of the maps in texels, 8 to 16384.
     pub resolution_texels: usize,
@@ -117,7 +117,8 @@ impl AtlasSettings {
 /// A mesh with an atlas.
 #[derive(Clone, Debug)]
 pub struct Atlas {
-    /// The cleaned mesh: vertices doubled at seams, UVs in [0, 1] with v up, normals as they came.
+    /// The cleaned mesh: vertices doubled at seams, UVs with v up, in [0, 1] but for a ten-thousandth
+    /// where they were kept, normals as they came.
     pub mesh: Mesh,
     /// Chart of each triangle, from 0 without gaps.
     pub chart_of_triangle: Vec<u32>,

@@ -22,7 +22,8 @@ pub struct Scores {
     pub psnr: f64,
     /// Mean structural similarity of the luminance, see [`ssim_map`]; 1 when the images are equal.
     pub ssim: f64,
-    /// Root of the sum of squared differences over the sum of squares of the truth. NaN for a black truth.
+    /// Root of the sum of squared differences over the sum of squares of the truth. Infinite for a black truth, NaN when
+    /// the estimate is black as well.
     pub relative_rmse: f64,
     /// Number of pixels that were compared; with 0 of them the scores are NaN.
     pub pixels: usize,
@@ -81,11 +82,16 @@ pub fn scores_without_noise(
     }
     squares.rise_to_one_standard_error();
     let rmse = squares.rmse();
-    let noise = half_difference.map(luminance_or_zero);
+    let usable = |index: usize| {
+        let images = [Some(estimate), Some(truth), half_difference];
+        images.into_iter().flatten().all(|image| image.pixels()[index].is_finite())
+    };
+    let grey = |image: &RgbImage| luminance_where(image, usable);
+    let noise = half_difference.map(grey);
     Ok(Scores {
         rmse,
         psnr: psnr_of_rmse(rmse),
-        ssim: mean_ssim(&luminance_or_zero(estimate), noise.as_ref(), &luminance_or_zero(truth), &counted),
+        ssim: mean_ssim(&grey(estimate), noise.as_ref(), &grey(truth), &counted),
         relative_rmse: (squares.difference.max(0.0) / squares.truth).sqrt(),
         pixels: counted.count,
         not_finite: counted.not_finite,
@@ -187,8 +193,12 @@ fn counted_pixels(estimate: &RgbImage, truth: &RgbImage, mask: Option<&Image<boo
     Ok(Counted { included, count, not_finite })
 }
 
-fn luminance_or_zero(image: &RgbImage) -> GreyImage {
-    image.map(|&rgb| if rgb.is_finite() { luminance(rgb) } else { 0.0 })
+/// The luminance of the pixels that both images know, and 0 in both where one does not: windows of the similarity beside
+/// such a pixel see no difference there.
+fn luminance_where(image: &RgbImage, is_usable: impl Fn(usize) -> bool) -> GreyImage {
+    let pixels = image.pixels().iter().enumerate();
+    let pixels = pixels.map(|(index, &rgb)| if is_usable(index) { luminance(rgb) } else { 0.0 });
+    Image::from_pixels(image.width(), image.height(), pixels.collect())
 }
 
 /// Pixels on each side of the centre of an SSIM window: 11 x 11 in all.

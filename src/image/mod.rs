@@ -1,4 +1,4 @@
-//! Linear images, image files, metrics and the mip chain.
+//! Linear images, image files and metrics.
 //!
 //! Read [`raster`] first: an image is a row-major table of pixels, row 0 at the top. Values are linear; transfer
 //! curves ([`transfer`]) are applied by [`mod@file`] at the file border and nowhere else.
@@ -9,7 +9,6 @@ pub mod file;
 pub mod histogram;
 pub mod linear;
 pub mod metrics;
-pub mod mip;
 pub mod raster;
 pub mod resize;
 pub mod transfer;

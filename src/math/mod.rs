@@ -15,7 +15,7 @@ pub mod random;
 pub mod real;
 pub mod sphere;
 pub mod statistics;
-pub mod vector;
+pub(crate) mod vector;
 
 /// At most so many of a list, in its order, evenly spread over it and with its first.
 pub fn evenly_spread<T: Copy>(list: &[T], most: usize) -> Vec<T> {

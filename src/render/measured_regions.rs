@@ -9,11 +9,10 @@ use super::accumulate::PassKey;
 use super::first_hits::CameraRays;
 use super::packet::LEAST_DENSITY;
 use super::path::{MAX_BOUNCES, balance_heuristic};
-use super::picture::{Picture, PictureSettings};
+use super::picture::{Picture, PictureSettings, picture_of_groups};
 use super::regions::{MeasuredMaterial, Regions};
 use super::sums::Parameters;
 use super::surface::{Surface, SurfacePoint};
-use crate::image::Image;
 use crate::light::{EnvironmentSampler, LightSample};
 use crate::material::{LobeGeometry, LobeSampler, Material};
 use crate::math::frame::Frame;
@@ -22,8 +21,7 @@ use crate::math::sphere::tap_of_direction;
 use crate::scene::Camera;
 use crate::trace::{Hit, Ray};
 use glam::Vec3;
-use rayon::prelude::*;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 /// What reflects at a vertex.
 enum Reflector<'a> {
@@ -160,40 +158,22 @@ pub fn render_regions(
     let light = EnvironmentSampler::new(&parameters.environment());
     let tracer = RegionTracer { surface, parameters, regions, light: &light, settings };
     let rays = CameraRays::fresh(surface, camera, settings.filter, settings.samples);
-    let groups = settings.groups.max(1);
-    let pixels: Vec<(Vec3, Vec3, f32, bool)> = (0..camera.width * camera.height)
-        .into_par_iter()
-        .map(|pixel| {
-            if stop.load(Ordering::Relaxed) {
-                return (Vec3::ZERO, Vec3::ZERO, 0.0, true);
+    picture_of_groups(
+        camera,
+        settings.groups,
+        stop,
+        || (),
+        |(), pixel, group| {
+            let key = PassKey::whole(settings.seed, group, view, 0);
+            let (mut sum, mut escaped) = (Vec3::ZERO, 0usize);
+            for sample in 0..rays.samples() {
+                let mut stream = key.stream(pixel, sample, rays.samples());
+                let (ray, hit) = rays.at(pixel, sample, stream.next_pair());
+                escaped += usize::from(hit.is_none());
+                sum += tracer.radiance(&ray, hit, &mut stream);
             }
-            let (mut mean, mut squared_deviations, mut escaped) = (Vec3::ZERO, Vec3::ZERO, 0usize);
-            for group in 0..groups {
-                let key = PassKey::whole(settings.seed, group as u32, view, 0);
-                let mut sum = Vec3::ZERO;
-                for sample in 0..rays.samples() {
-                    let mut stream = key.stream(pixel, sample, rays.samples());
-                    let (ray, hit) = rays.at(pixel, sample, stream.next_pair());
-                    escaped += usize::from(hit.is_none());
-                    sum += tracer.radiance(&ray, hit, &mut stream);
-                }
-                let delta = sum / rays.samples() as f32 - mean;
-                mean += delta / (group + 1) as f32;
-                squared_deviations += delta * (sum / rays.samples() as f32 - mean);
-            }
-            let variance = squared_deviations / ((groups - 1).max(1) * groups) as f32;
-            let coverage = 1.0 - escaped as f32 / (groups * rays.samples()) as f32;
-            if mean.is_finite() { (mean, variance, coverage, true) } else { (Vec3::ZERO, Vec3::ZERO, coverage, false) }
-        })
-        .collect();
-    let (width, height) = (camera.width, camera.height);
-    let image = |pick: fn(&(Vec3, Vec3, f32, bool)) -> Vec3| {
-        Image::from_pixels(width, height, pixels.iter().map(pick).collect())
-    };
-    Picture {
-        radiance: image(|pixel| pixel.0),
-        variance: (groups > 1).then(|| image(|pixel| pixel.1)),
-        coverage: Image::from_pixels(width, height, pixels.iter().map(|pixel| pixel.2).collect()),
-        non_finite_pixels: pixels.iter().filter(|pixel| !pixel.3).count(),
-    }
+            let count = rays.samples() as f32;
+            (sum / count, escaped as f32 / count)
+        },
+    )
 }

@@ -2,11 +2,11 @@
 
 use super::accumulate::{PassKey, estimate_pixel};
 use super::first_hits::{CameraRays, PixelFilter};
-use super::path::{PathArena, PathSettings, PathTracer};
+use super::path::PathArena;
+use super::progressive::PictureTracer;
 use super::sums::Parameters;
 use super::surface::Surface;
 use crate::image::{GreyImage, Image, RgbImage};
-use crate::light::EnvironmentSampler;
 use crate::math::random::{SampleStream, StreamKey};
 use crate::scene::Camera;
 use glam::Vec3;
@@ -22,7 +22,7 @@ pub struct PictureSettings {
     pub groups: usize,
     /// How samples are spread over a pixel.
     pub filter: PixelFilter,
-    /// Number of surface hits on the longest path.
+    /// Number of surface hits on the longest path, at most [`MAX_BOUNCES`](super::path::MAX_BOUNCES).
     pub max_bounces: usize,
     /// Strength of the specular lobe as a whole, in [0, 1].
     pub lobe_strength: f32,
@@ -78,38 +78,41 @@ pub fn render(
     settings: &PictureSettings,
     stop: &AtomicBool,
 ) -> Picture {
-    let sampler = EnvironmentSampler::new(&parameters.environment());
-    let tracer = PathTracer {
-        surface,
-        proposal: &parameters.texels,
-        light: &sampler,
-        environment_size: parameters.environment_size,
-        settings: PathSettings {
-            max_bounces: settings.max_bounces,
-            lobe_strength: settings.lobe_strength,
-            background_visible: settings.background_visible,
-            two_sided: settings.two_sided,
-            camera_cone_radians: 0.0,
-            bounce_cone_radians: 0.0,
-        },
-    };
+    let prepared = PictureTracer::new(surface, parameters, *settings);
+    let tracer = prepared.paths();
     let rays = CameraRays::fresh(surface, camera, settings.filter, settings.samples);
-    let groups = settings.groups.max(1);
+    picture_of_groups(camera, settings.groups, stop, PathArena::default, |arena, pixel, group| {
+        let key = PassKey::whole(settings.seed, group, view, 0);
+        let estimate = estimate_pixel(&tracer, &rays, pixel, key, parameters, arena);
+        (estimate.mean(rays.samples()), estimate.escaped)
+    })
+}
+
+/// A picture whose pixels are means over independent groups of samples; 0 groups count as one. `of_group` has what
+/// `scratch` makes for each thread, the row-major index of the pixel and the number of the group, and returns the group's
+/// mean radiance and the share of its camera rays that met nothing. A pixel that is not finite becomes black and is
+/// counted. Pixels that are begun after `stop` is set are black.
+pub(super) fn picture_of_groups<Scratch>(
+    camera: &Camera,
+    groups: usize,
+    stop: &AtomicBool,
+    scratch: impl Fn() -> Scratch + Sync + Send,
+    of_group: impl Fn(&mut Scratch, usize, u32) -> (Vec3, f32) + Sync + Send,
+) -> Picture {
+    let groups = groups.max(1);
     let pixels: Vec<(Vec3, Vec3, f32, bool)> = (0..camera.width * camera.height)
         .into_par_iter()
-        .map_init(PathArena::default, |arena, pixel| {
+        .map_init(scratch, |scratch, pixel| {
             if stop.load(Ordering::Relaxed) {
                 return (Vec3::ZERO, Vec3::ZERO, 0.0, true);
             }
             let (mut mean, mut squared_deviations, mut escaped) = (Vec3::ZERO, Vec3::ZERO, 0.0);
             for group in 0..groups {
-                let key = PassKey::whole(settings.seed, group as u32, view, 0);
-                let estimate = estimate_pixel(&tracer, &rays, pixel, key, parameters, arena);
-                let value = estimate.mean(rays.samples());
+                let (value, escaped_of_group) = of_group(scratch, pixel, group as u32);
                 let delta = value - mean;
                 mean += delta / (group + 1) as f32;
                 squared_deviations += delta * (value - mean);
-                escaped += estimate.escaped;
+                escaped += escaped_of_group;
             }
             let variance = squared_deviations / ((groups - 1).max(1) * groups) as f32;
             let coverage = 1.0 - escaped / groups as f32;

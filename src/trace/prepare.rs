@@ -12,7 +12,8 @@ pub(super) struct PreparedTriangle {
     pub corners: [Vec3; 3],
     /// Its index in the list the hierarchy is built from.
     pub index: u32,
-    /// How many triangles of lower index have the same box; none of them is a copy of this one.
+    /// How many triangles before this one have the same box, none of them a copy of it; the order is that of their corners'
+    /// bits.
     pub box_copies: u32,
 }
 

@@ -107,7 +107,8 @@ pub fn encode_png_srgb8(image: &Image<[u8; 3]>) -> Result<Vec<u8>> {
 /// Errors: an image without pixels or with more than 65,535 a side.
 pub fn encode_jpeg(image: &Image<[u8; 3]>, quality: u8) -> Result<Vec<u8>> {
     if image.pixels().is_empty() {
-        return Err(Error::new(ErrorKind::InvalidSetting, "an image without pixels cannot be written as JPEG"));
+        return Err(Error::new(ErrorKind::InvalidSetting, "an image without pixels cannot be written as JPEG")
+            .remedy("give one with pixels"));
     }
     let mut bytes = Vec::new();
     JpegEncoder::new_with_quality(&mut bytes, quality.clamp(1, 100))

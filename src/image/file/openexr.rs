@@ -1,8 +1,8 @@
 //! OpenEXR: any flat layer with half, float or integer channels is read; scanline ZIP with floats is written.
 //!
 //! A file may hold many layers and channels. For colour, channels named `R G B` are taken first, then `*.R *.G *.B` of
-//! one group (a group called `Combined` before others, else the first in the file), then a lone luminance. For grey, a
-//! lone channel of any name, then `Y`, then the luminance of the colour. Alpha is left out; colour is as stored.
+//! one group (a group called `Combined` before others, else the first in the file), then a lone luminance. For grey, `Y`,
+//! then a lone channel of any name, then the luminance of the colour. Alpha is left out; colour is as stored.
 //! The image is the data window: a display window around or inside it is ignored.
 
 use super::guard::guarded;

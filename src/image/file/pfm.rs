@@ -31,16 +31,25 @@ impl PfmHeader {
 pub fn read_header(reader: &mut impl BufRead, path: &Path) -> Result<PfmHeader> {
     let mut position = 0;
     let mut word = |name: &str| -> Result<String> { read_word(reader, path, &mut position, name) };
-    let channels = if word("the kind")? == "PF" { 3 } else { 1 };
+    let kind = word("the kind")?;
     let width = word("the width")?;
     let height = word("the height")?;
     let scale = word("the scale")?;
+    let channels = match kind.as_str() {
+        "PF" => 3,
+        "Pf" => 1,
+        _ => {
+            let message = format!("a float map of the kind '{kind}' is not read");
+            return Err(malformed(path, 0, message).remedy("save it as PF, of three channels, or Pf, of one"));
+        }
+    };
     let number = |text: &str| text.parse::<u32>().ok().map(|value| value as usize);
     let (Some(width), Some(height)) = (number(&width), number(&height)) else {
-        return Err(malformed(path, 3, format!("'{width} {height}' is not a size in pixels")));
+        return Err(malformed(path, 3, format!("'{width} {height}' is not a size in pixels")).remedy("save it again"));
     };
     let Some(scale) = scale.parse::<f32>().ok().filter(|scale| scale.is_finite() && *scale != 0.0) else {
-        return Err(malformed(path, position, format!("the scale '{scale}' is not a number other than 0")));
+        return Err(malformed(path, position, format!("the scale '{scale}' is not a number other than 0"))
+            .remedy("save it again"));
     };
     Ok(PfmHeader { channels, width, height, little_endian: scale < 0.0, data_offset: position as usize })
 }
@@ -64,7 +73,8 @@ fn read_word(reader: &mut impl BufRead, path: &Path, position: &mut u64, name: &
             letter => text.push(letter as char),
         }
         if text.len() > 32 {
-            return Err(malformed(path, *position, format!("{name} is missing in the header of a float map")));
+            return Err(malformed(path, *position, format!("{name} is missing in the header of a float map"))
+                .remedy("save it again"));
         }
     }
 }

@@ -136,7 +136,7 @@ impl ViewFootprints {
                         uv_at_middle(surface, camera, row, column).is_some_and(|uv| !is_wanted(pixel as u32, uv))
                     });
                     if is_left_out {
-                        made.escaped.push(0.0);
+                        made.escaped.push(f32::NAN);
                         continue;
                     }
                     let first = row * (camera.width + 1) + column;

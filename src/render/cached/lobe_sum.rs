@@ -83,7 +83,7 @@ impl LobeSums {
     }
 }
 
-/// The sums of a lobe at several widths, without derivatives. `sums` is as long as `widths`.
+/// The sums of a lobe at several widths, which rise, without derivatives. `sums` is as long as `widths`.
 pub fn lobe_sums(basis: &LightBasis, place: &LobePlace, widths: &[f32], sums: &mut [LobeSums]) {
     let narrow = widths.partition_point(|&width| place.width_seen(width) < wide_from(basis));
     for (sum, &width) in sums.iter_mut().zip(&widths[..narrow]) {
