@@ -1,6 +1,7 @@
 //! Files that are written whole or not at all, and settings that are read with the line of what is wrong.
 
 use crate::error::{Error, ErrorKind, Place, Result};
+use std::collections::HashSet;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -45,6 +46,29 @@ pub fn settings_of_toml<T: serde::de::DeserializeOwned>(text: &str, path: &Path)
     })
 }
 
+/// Names that are each other's equal only once: of those that repeat, the second is called `NAME_2`, and so on, past names
+/// that are taken. For files that are named after files from several folders.
+pub fn unrepeated(names: &[String]) -> Vec<String> {
+    let mut taken: HashSet<String> = names.iter().cloned().collect();
+    let mut met = HashSet::new();
+    names
+        .iter()
+        .map(|name| {
+            if met.insert(name) {
+                return name.clone();
+            }
+            let mut number = 2;
+            loop {
+                let numbered = format!("{name}_{number}");
+                if taken.insert(numbered.clone()) {
+                    return numbered;
+                }
+                number += 1;
+            }
+        })
+        .collect()
+}
+
 /// The temporary name of a file that is being written: same folder, so that the rename is atomic.
 pub fn temporary_beside(path: &Path) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
@@ -55,6 +79,13 @@ pub fn temporary_beside(path: &Path) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_that_repeat_are_numbered_past_those_that_are_taken() {
+        let names = ["sky", "sky", "sky_2", "sun", "sky"].map(String::from);
+        assert_eq!(unrepeated(&names), ["sky", "sky_3", "sky_2", "sun", "sky_4"]);
+        assert!(unrepeated(&[]).is_empty());
+    }
 
     #[test]
     fn a_failed_write_keeps_the_old_file() {

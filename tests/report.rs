@@ -70,7 +70,7 @@ fn a_missing_file_is_named_with_the_command_that_makes_it() {
 
     assert!(folder.read_loss().unwrap_err().to_string().contains("loss.csv"));
     let report = folder.read_report_json::<ReportData>().unwrap_err();
-    assert!(report.remedy_text().contains("patina compare"), "{report}");
+    assert!(report.remedy_text().contains("patina resume"), "{report}");
     assert_eq!(RunFolder::open(&folder.file("nowhere")).unwrap_err().kind(), ErrorKind::Missing);
     assert_eq!(RunFolder::open(&folder.file("seen.exr")).unwrap_err().kind(), ErrorKind::Missing);
 }
@@ -373,7 +373,9 @@ fn a_full_report_holds_every_section_in_one_file() {
         assert!(html.contains(text), "{text}");
     }
     assert_eq!(html.matches("<figure class=triple>").count(), 10);
-    assert!(!html.contains("class=empty") || !html.contains("No view"), "no empty section");
+    // Where the system tells no memory one line says so; nothing else is empty.
+    let empty = html.matches("class=empty").count();
+    assert!(empty <= usize::from(patina::insight::memory::peak_bytes().is_none()), "{empty} empty sections");
     let words = without_pictures(&html).replace("http://www.w3.org/2000/svg", "");
     for forbidden in ["<script", "http://", "https://", "<link", "NaN"] {
         assert!(!words.contains(forbidden), "{forbidden}");

@@ -34,6 +34,14 @@ pub enum NeuralTask {
     Speed(SpeedOptions),
 }
 
+/// A number of minutes.
+pub(super) fn minutes(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(minutes) if minutes >= 0.0 => Ok(minutes),
+        _ => Err("give a number of minutes, 0 or more".into()),
+    }
+}
+
 /// Options of `patina measured train`.
 #[derive(Debug, Args)]
 pub struct TrainOptions {
@@ -52,7 +60,7 @@ pub struct TrainOptions {
     #[arg(long, default_value_t = 1.0)]
     pub fraction: f64,
     /// Stop after this many minutes, to be taken up with --resume.
-    #[arg(long)]
+    #[arg(long, value_parser = minutes)]
     pub minutes: Option<f64>,
     /// Steps in all; the rates fall along them.
     #[arg(long)]
@@ -171,7 +179,7 @@ fn train_flow(options: &TrainOptions, json: bool) -> Result<()> {
         settings,
         left_out: options.leave_out.clone(),
         command: std::env::args().collect::<Vec<_>>().join(" "),
-        time: options.minutes.map(|minutes| Duration::from_secs_f64(60.0 * minutes.clamp(0.0, 1e6))),
+        time: options.minutes.map(|minutes| Duration::from_secs_f64(60.0 * minutes.min(1e6))),
         resume: options.resume,
     };
     let account = train(&sitting, &library, &stop, &tell)?;
@@ -193,7 +201,11 @@ fn embedding(options: &EmbeddingOptions, json: bool) -> Result<()> {
     let picture = options.output.with_extension("svg");
     write_bytes(&picture, map.svg().as_bytes())?;
     if json {
-        println!("{}", serde_json::json!({"purity": map.purity, "chance": map.chance, "explained": map.explained}));
+        println!(
+            "{}",
+            serde_json::json!({"event": "embedding", "purity": map.purity, "chance": map.chance,
+            "explained": map.explained})
+        );
     } else {
         println!(
             "{:.1} % of the {} nearest neighbours are of a kind ({:.1} % by chance); the map shows {:.0} % of the variance",
@@ -239,7 +251,7 @@ fn codes(options: &CodesOptions, json: bool) -> Result<()> {
         if json {
             println!(
                 "{}",
-                serde_json::json!({"material": name, "trained_on": known, "error": error,
+                serde_json::json!({"event": "codes", "material": name, "trained_on": known, "error": error,
                 "library_log_rmse": own, "largest_albedo": largest, "between_nodes_log_rmse": between_nodes})
             );
         } else {
@@ -283,7 +295,10 @@ fn time(options: &SpeedOptions, json: bool) -> Result<()> {
         let flow = Flow::new(architecture, 1)?;
         let found = speed::measure(&flow, options.batch, options.repeats);
         if json {
-            println!("{}", serde_json::json!({"configuration": name, "weights": flow.weights.len(), "speed": found}));
+            println!(
+                "{}",
+                serde_json::json!({"event": "speed", "configuration": name, "weights": flow.weights.len(), "speed": found})
+            );
         } else {
             println!(
                 "{name}, {} weights, batches of {}: {:.3e} evaluations/s, {:.3e} samples/s, {:.3e} with gradients/s",

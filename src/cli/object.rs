@@ -1,9 +1,11 @@
 //! `patina object`: light and reflectance from photos of one object.
 
 use super::fit::stop_on_interrupt;
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::files::unrepeated;
+use crate::job::object::estimate_as_far_as_it_goes;
 use crate::light::Environment;
-use crate::object::joint::{Known, estimate};
+use crate::object::joint::Known;
 use crate::object::prior::LightPriorKind;
 use crate::object::progress::ObjectEvent;
 use crate::object::read::{ObjectFiles, read_views};
@@ -134,12 +136,14 @@ pub fn object(options: &ObjectOptions, json: bool) -> Result<()> {
         findings.append(&mut noticed);
         known.light = Some(light);
     }
-    let mut relights = Vec::new();
+    let (mut names, mut lights) = (Vec::new(), Vec::new());
     for path in &options.relight {
         let (light, mut noticed) = Environment::read(path)?;
         findings.append(&mut noticed);
-        relights.push((path.file_stem().unwrap_or_default().to_string_lossy().into_owned(), light));
+        names.push(path.file_stem().unwrap_or_default().to_string_lossy().into_owned());
+        lights.push(light);
     }
+    let relights: Vec<(String, Environment)> = unrepeated(&names).into_iter().zip(lights).collect();
     let model = StartedModel::of(options.model, options.weights.as_deref(), usize::from(options.lobes), &settings)?;
     let watch = |event: ObjectEvent| match (event, json) {
         (ObjectEvent::Stage(stage), false) => eprintln!("{stage}"),
@@ -157,7 +161,7 @@ pub fn object(options: &ObjectOptions, json: bool) -> Result<()> {
         (ObjectEvent::Row(row), true) => println!("{}", serde_json::json!({"event": "step", "row": row})),
         (ObjectEvent::State { .. }, _) => {}
     };
-    let mut found = estimate(&views, &model, &known, &settings, &stop, &watch)?;
+    let (mut found, ended_early) = estimate_as_far_as_it_goes(&views, &model, &known, &settings, &stop, &watch)?;
     found.findings.splice(0..0, findings);
     let inputs = ObjectInputs {
         files,
@@ -167,6 +171,11 @@ pub fn object(options: &ObjectOptions, json: bool) -> Result<()> {
         weights: options.weights.clone(),
     };
     result_folder::write(&options.output, &views, &model, &found, &settings, &inputs, &relights)?;
+    if let Some(error) = ended_early {
+        // What was reached is written; that it is not the end is no success.
+        let message = format!("{}; what was reached is in {}", error.message(), options.output.display());
+        return Err(Error::new(error.kind(), message).at(error.place().clone()).remedy(error.remedy_text()));
+    }
     if json {
         let line = serde_json::json!({
             "event": "finished", "run": options.output, "start": found.start, "seconds": found.seconds,
@@ -224,7 +233,7 @@ pub struct StudyIbrdfOptions {
     #[arg(long, value_enum, value_delimiter = ',')]
     pub parts: Vec<study::Part>,
     /// Minutes after which figure 2 begins no further fit of DSBRDF; none are begun with --quick, and all without.
-    #[arg(long)]
+    #[arg(long, value_parser = super::neural::minutes)]
     pub dsbrdf_minutes: Option<f64>,
     /// Seed of pixels, noise and nets.
     #[arg(long, default_value_t = 1)]

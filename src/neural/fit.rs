@@ -106,7 +106,11 @@ impl Sample {
                 .sum()
         };
         // The error has one valley in the colour: golden sections.
-        let (mut low, mut high) = (-6.0, 4.0);
+        let (mut low, mut high) = match reconstruction {
+            Reconstruction::Exponential => (-6.0, 4.0),
+            // There it is the logarithm of the mean stored value, hundreds for what is white.
+            Reconstruction::Product => (-6.0, 10.0),
+        };
         for _ in 0..16 {
             let (a, b) = (high - 0.618 * (high - low), low + 0.618 * (high - low));
             if error(a) < error(b) { high = b } else { low = a }

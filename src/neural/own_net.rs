@@ -103,6 +103,8 @@ pub struct OwnNetFit {
     pub error: TableError,
     /// The main figure on the cells of the last hundred steps.
     pub late_log_rmse: f64,
+    /// Where its weights began.
+    pub start: OwnNetStart,
 }
 
 impl OwnNetFit {
@@ -117,7 +119,10 @@ impl OwnNetFit {
         let mut own = Trained::clone(self.model.trained());
         own.account.materials = vec![material.into()];
         own.account.left_out = Vec::new();
-        own.account.data = format!("one material, {material}; begun from weights of: {}", own.account.data);
+        own.account.data = match self.start {
+            OwnNetStart::Library => format!("one material, {material}; begun from weights of: {}", own.account.data),
+            OwnNetStart::Scratch => format!("one material, {material}; begun from weights drawn at random"),
+        };
         own.account.command = command.into();
         own.account.log_error = self.error.log_rmse;
         own
@@ -179,7 +184,7 @@ pub fn fit_own_net(library: &Trained, table: &MeasuredBrdf, settings: &OwnNetSet
     let parameters: Vec<f64> = own.codes.iter().chain(&own.log_colours).map(|&value| f64::from(value)).collect();
     let model = FlowModel::new(Arc::new(own), 1);
     let error = table_error(&model.table(&parameters), table)?;
-    Ok(OwnNetFit { model, parameters, error, late_log_rmse })
+    Ok(OwnNetFit { model, parameters, error, late_log_rmse, start: settings.start })
 }
 
 /// Weights, codes and colours to start from.

@@ -134,6 +134,12 @@ fn check(account: &Account, sitting: &Sitting, library: &Library) -> Result<()> 
     if account.materials != library.names {
         return refuse("the checkpoint was trained on other materials");
     }
+    if account.data != library.statement {
+        return refuse(&format!("the checkpoint was trained on {}, not on {}", account.data, library.statement));
+    }
+    if account.left_out != sitting.left_out {
+        return refuse("the checkpoint left out other materials");
+    }
     if account.settings != sitting.settings {
         return refuse("the checkpoint was trained with other settings");
     }

@@ -302,14 +302,16 @@ mod tests {
         for shape in SHAPES {
             for fill in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e38] {
                 let mut raw = vec![fill; shape.raw_count()];
+                // A width, and a height that would be next to nothing.
                 raw[0] = -1e30;
+                raw[shape.bins] = -1e30;
                 let mut spline = Spline::new(shape);
                 spline.set(&raw);
                 assert!(spline.width.iter().all(|&width| width >= MIN_WIDTH * 0.999));
                 for step in 0..=1000 {
                     let (density, y) = spline.at(f64::from(step) / 1000.0);
                     assert!(
-                        density >= 0.1f64.powi(i32::from(FLOOR_DIGITS))
+                        density >= 0.999 * 0.1f64.powi(i32::from(shape.floor_digits))
                             && density.is_finite()
                             && (0.0..1.0).contains(&y)
                     );

@@ -45,7 +45,12 @@ pub fn negative_log_evidence(matrix: &LightMatrix, likelihood: &Likelihood, ligh
     let channel = 1;
     let mut rows = matrix.dense(channel);
     let texels = matrix.texels();
-    for (row, pixel) in rows.chunks_exact_mut(texels).zip(&picture) {
+    for (index, (row, pixel)) in rows.chunks_exact_mut(texels).zip(&picture).enumerate() {
+        if likelihood.is_kept_bound(index, channel, pixel[channel]) {
+            // Brighter than what saturates says nothing of how much.
+            row.fill(0.0);
+            continue;
+        }
         let by_log = 1.0 / (DEVIATION * (f64::from(pixel[channel]).max(0.0) + likelihood.epsilon));
         for (value, radiance) in row.iter_mut().zip(&radiance[channel]) {
             *value = (f64::from(*value * radiance) * by_log) as f32;

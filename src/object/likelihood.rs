@@ -59,6 +59,11 @@ impl Likelihood {
         }
     }
 
+    /// Whether a measurement is a bound that this value keeps: then it says nothing of how far.
+    pub fn is_kept_bound(&self, pixel: usize, channel: usize, value: f32) -> bool {
+        self.evidence[pixel][channel] != Evidence::Equal && self.residual(pixel, channel, value) == 0.0
+    }
+
     /// Natural logarithms of picture over measurement, pixel by pixel; 0 where a bound is kept.
     pub fn residuals<'a>(&'a self, picture: &'a [[f32; 3]]) -> impl Iterator<Item = [f64; 3]> + 'a {
         let of = |(pixel, values): (usize, &[f32; 3])| [0, 1, 2].map(|c| self.residual(pixel, c, values[c]));

@@ -61,7 +61,8 @@ pub struct Observations {
 }
 
 impl Observations {
-    /// Takes at most `most` pixels of all views together, spread over each photo and drawn by `seed`, and traces their
+    /// Takes about `most` pixels of all views together, as many of each, spread over each photo and drawn by `seed`, and
+    /// traces their
     /// shadow rays to a `light_width x light_height` environment unless `shadows` is off.
     ///
     /// # Errors

@@ -56,7 +56,8 @@ impl ObjectProblem {
         ObjectProblem::new(views, &coarse).map(|(problem, _)| problem)
     }
 
-    /// The even light under which a reflectance gives pictures of the geometric mean of the photos, per channel.
+    /// The even light under which pictures of a reflectance are as bright as the photos: the median of the ratios, per
+    /// channel.
     pub fn even_light(&self, table: &NodeTable) -> LogLight {
         let directions = self.transport.directions();
         let (width, height) = (directions.width, directions.height);

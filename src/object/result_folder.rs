@@ -67,6 +67,7 @@ pub fn write(
     let (width, height) = settings.light_size();
     let directions = TexelDirections::new(width, height)?;
     let environment = estimate.light.environment();
+    remove_pictures(folder)?;
     environment.write(&folder.join("env.exr"))?;
     match &estimate.light_seen {
         Some(seen) => file::write_exr_rgb(&folder.join(SEEN), &seen.sensitivity)?,
@@ -137,4 +138,16 @@ pub fn write(
         .collect();
     sections.push(("Findings", format!("<ul>{findings}</ul>")));
     crate::files::write_bytes(&folder.join("report.html"), page::page("Object", &sections).as_bytes())
+}
+
+/// Removes the pictures of an earlier estimation: they show another reflectance, and not all of them are made anew.
+fn remove_pictures(folder: &Path) -> Result<()> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
+    for path in entries.flatten().map(|entry| entry.path()) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if name.ends_with(".exr") && (name.starts_with("rerender_") || name.starts_with("relit_")) {
+            std::fs::remove_file(&path).map_err(|source| Error::writing(&path, source))?;
+        }
+    }
+    Ok(())
 }

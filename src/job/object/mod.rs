@@ -13,11 +13,13 @@
 
 pub mod look;
 pub mod parts;
+mod reached;
 mod reopen;
 mod worker;
 
 pub use look::{LobeSlice, MaterialLook, ObjectLook};
 pub use parts::ObjectParts;
+pub use reached::estimate_as_far_as_it_goes;
 pub use reopen::{ReopenedObject, reopen};
 
 use super::{Slot, Wake};

@@ -1,37 +1,24 @@
 //! The thread of an estimation, and the one that paints beside it.
 
 use super::look::{Painter, with_log_error};
+use super::reached::{LOOK_PIXELS, Reached, estimate_as_far_as_it_goes};
 use super::{ObjectLook, ObjectNews, ObjectOutcome, ObjectParts, ObjectRequest, PhotoSeen, Teller};
-use crate::error::{Error, ErrorKind, Finding, Result, Severity};
+use crate::error::{Error, ErrorKind, Result};
 use crate::image::{Image, file};
 use crate::job::Slot;
 use crate::light::Environment;
 use crate::neural;
-use crate::object::joint::{Estimate, Known, estimate};
-use crate::object::nodes::{NodeGrid, NodeTable};
-use crate::object::prior::LogLight;
-use crate::object::progress::{ObjectEvent, ObjectiveRow};
+use crate::object::joint::{Estimate, Known};
+use crate::object::nodes::NodeGrid;
+use crate::object::progress::ObjectEvent;
 use crate::object::read::read_views;
 use crate::object::result_read::FollowedStart;
 use crate::object::split::SplitSpread;
 use crate::object::starts::{ModelKind, StartedModel};
 use crate::object::{ObjectView, result_folder};
 use crossbeam_channel::{Receiver, bounded};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
-
-/// Pixels of the object in a look, at most.
-const LOOK_PIXELS: usize = 6_000;
-
-/// The state after a round, kept in case it is the last.
-#[derive(Clone)]
-struct Reached {
-    round: usize,
-    light: LogLight,
-    table: NodeTable,
-    parameters: Vec<f64>,
-}
 
 /// The work.
 pub(super) struct Worker {
@@ -45,7 +32,6 @@ pub(super) struct Worker {
 impl Worker {
     /// Does all of it. An error means that nothing was reached.
     pub fn run(self) -> Result<()> {
-        let began = Instant::now();
         let settings = &self.request.settings;
         settings.validate()?;
         result_folder::prepare(&self.request.output)?;
@@ -64,44 +50,31 @@ impl Worker {
         let model = self.model()?;
         self.check_stop()?;
 
-        let reached: Mutex<Option<Reached>> = Mutex::default();
-        let rows: Mutex<Vec<ObjectiveRow>> = Mutex::default();
+        let rounds = AtomicUsize::new(0);
         let outcome = self.painted_beside(&views, |paint| {
             let watch = |event: ObjectEvent| match event {
                 ObjectEvent::Stage(stage) => self.stage(stage),
-                ObjectEvent::Row(row) => {
-                    rows.lock().unwrap_or_else(PoisonError::into_inner).push(row);
-                    self.teller.send(ObjectNews::Row(row));
-                }
+                ObjectEvent::Row(row) => self.teller.send(ObjectNews::Row(row)),
                 ObjectEvent::State { light, table, parameters } => {
-                    let mut slot = reached.lock().unwrap_or_else(PoisonError::into_inner);
-                    let round = slot.as_ref().map_or(1, |own| own.round + 1);
-                    let now =
-                        Reached { round, light: light.clone(), table: table.clone(), parameters: parameters.to_vec() };
-                    paint(now.clone());
-                    *slot = Some(now);
-                    drop(slot);
+                    let round = 1 + rounds.fetch_add(1, Ordering::Relaxed);
+                    paint(Reached {
+                        round,
+                        light: light.clone(),
+                        table: table.clone(),
+                        parameters: parameters.to_vec(),
+                    });
                     if let Some(after_round) = &self.after_round {
                         after_round(round);
                     }
                 }
             };
-            let work = || estimate(&views, &model, &known, settings, &self.stop, &watch);
-            std::panic::catch_unwind(std::panic::AssertUnwindSafe(work))
-                .unwrap_or_else(|panic| Err(super::panicked(&*panic)))
+            estimate_as_far_as_it_goes(&views, &model, &known, settings, &self.stop, &watch)
         });
-        let rows = rows.into_inner().unwrap_or_else(PoisonError::into_inner);
-        let reached = reached.into_inner().unwrap_or_else(PoisonError::into_inner);
-        let (mut found, is_whole) = match (outcome, reached) {
-            (Ok(found), _) => (found, true),
-            (Err(error), None) => return Err(error),
-            (Err(error), Some(reached)) => {
-                if error.kind() != ErrorKind::Stopped {
-                    self.teller.send(ObjectNews::Trouble(error));
-                }
-                (self.partial(reached, rows, began.elapsed().as_secs_f64()), false)
-            }
-        };
+        let (mut found, error) = outcome?;
+        let is_whole = error.is_none();
+        if let Some(error) = error.filter(|error| error.kind() != ErrorKind::Stopped) {
+            self.teller.send(ObjectNews::Trouble(error));
+        }
         found.findings.splice(0..0, findings);
         for finding in &found.findings {
             self.teller.send(ObjectNews::Finding(finding.clone()));
@@ -142,8 +115,8 @@ impl Worker {
     fn painted_beside(
         &self,
         views: &[ObjectView],
-        work: impl FnOnce(&(dyn Fn(Reached) + Sync)) -> Result<Estimate>,
-    ) -> Result<Estimate> {
+        work: impl FnOnce(&(dyn Fn(Reached) + Sync)) -> Result<(Estimate, Option<Error>)>,
+    ) -> Result<(Estimate, Option<Error>)> {
         let newest: Mutex<Option<Reached>> = Mutex::default();
         let (bell, rings) = bounded::<()>(1);
         let view = &views[0];
@@ -183,28 +156,6 @@ impl Worker {
             });
             self.looks.put(painter.paint(reached.round, reached.light.environment(), &reached.table));
             self.teller.wake();
-        }
-    }
-
-    /// What was reached before the end.
-    fn partial(&self, reached: Reached, rows: Vec<ObjectiveRow>, seconds: f64) -> Estimate {
-        let rounds = reached.round;
-        let message = format!("the estimation ended after {rounds} rounds: this is what it had reached");
-        let look = self.looks.newest();
-        Estimate {
-            parameters: reached.parameters,
-            table: reached.table,
-            light: reached.light,
-            start: "not followed to the end".into(),
-            candidates: Vec::new(),
-            rows,
-            light_seen: None,
-            picture_log_rmse: look.map_or(0.0, |(_, look)| look.log_rmse),
-            findings: vec![
-                Finding::new(Severity::Warning, "object-ended-early", message)
-                    .remedy("start again for a result that has converged"),
-            ],
-            seconds,
         }
     }
 

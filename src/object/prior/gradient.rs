@@ -47,13 +47,14 @@ impl GradientPrior {
                 let texel = row * self.width + column;
                 let beside = row * self.width + (column + 1) % self.width;
                 each(texel, beside, self.stretch[row], self.shares[texel]);
-                // Below the last row lies the same row, half a turn away.
-                let below = if row + 1 < self.height {
-                    texel + self.width
-                } else {
-                    row * self.width + (column + self.width / 2) % self.width
-                };
-                each(texel, below, 1.0, self.shares[texel]);
+                if row + 1 < self.height {
+                    each(texel, texel + self.width, 1.0, self.shares[texel]);
+                }
+                // Across a pole lies the same row, half a turn away: each pair once.
+                let half = self.width / 2;
+                if (row == 0 || row + 1 == self.height) && column < half {
+                    each(texel, texel + half, 1.0, self.shares[texel]);
+                }
             }
         }
     }

@@ -23,7 +23,7 @@ pub enum LightPriorKind {
     Gradient,
     /// Steps are sparse, and few radiances occur (Lombardi and Nishino 2016).
     Entropy,
-    /// Nothing but a pull to the mean, too weak to see, for texels that light no pixel.
+    /// Nothing: texels that light no pixel stay where they began.
     None,
 }
 

@@ -82,14 +82,14 @@ impl Inputs {
         };
         let (width, height) = settings.light_size();
         let finer = if options.quick { FINER_WHEN_QUICK } else { FINER };
-        let mut lights = Vec::new();
-        for path in light_files(&options.envmaps)? {
-            if lights.len() == options.lights.unwrap_or(if options.quick { 2 } else { usize::MAX }) {
-                break;
-            }
-            lights.push(read_light(&path, (finer * width, finer * height))?);
-        }
         let held_out_path = file_of(&options.envmaps, HELD_OUT);
+        // Without a file for it the last of one more is held out.
+        let most = options.lights.unwrap_or(if options.quick { 2 } else { usize::MAX });
+        let most = most.saturating_add(usize::from(held_out_path.is_none()));
+        let mut lights = Vec::new();
+        for path in light_files(&options.envmaps)?.iter().take(most) {
+            lights.push(read_light(path, (finer * width, finer * height))?);
+        }
         let held_out = match held_out_path {
             Some(path) => read_light(&path, (finer * width, finer * height))?,
             None => lights.pop().ok_or_else(|| no_lights(&options.envmaps))?,

@@ -96,6 +96,7 @@ impl StudyOptions {
 /// Inputs that are missing, files that cannot be written, a stop. Cases that fail are results.
 pub fn run(options: &StudyOptions, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Result<String> {
     std::fs::create_dir_all(&options.output).map_err(|source| Error::writing(&options.output, source))?;
+    check_facts(options)?;
     let mut text = String::new();
     let mut first = Vec::new();
     if options.wants(Part::Fig2) {
@@ -144,6 +145,29 @@ pub fn run(options: &StudyOptions, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Re
         crate::files::write_bytes(&path, text.as_bytes())?;
     }
     Ok(text + &tables::write(options, &inputs, &cases, &lines, &pictures, first)?)
+}
+
+/// Results that stand in a folder are not made again: they must be of the same seed, size and weights. The first sitting
+/// writes these down, later ones are held against them.
+fn check_facts(options: &StudyOptions) -> Result<()> {
+    let name = |path: &std::path::PathBuf| path.to_string_lossy().into_owned();
+    let facts = serde_json::json!({
+        "quick": options.quick,
+        "seed": options.seed,
+        "weights": options.weights.as_ref().map(name),
+        "leave_out_weights": options.leave_out_weights.iter().map(name).collect::<Vec<_>>(),
+    });
+    let path = options.output.join("study.json");
+    if !path.is_file() {
+        return crate::files::write_bytes(&path, format!("{facts:#}\n").as_bytes());
+    }
+    let text = std::fs::read_to_string(&path).map_err(|source| Error::reading(&path, source))?;
+    if serde_json::from_str::<serde_json::Value>(&text).is_ok_and(|known| known == facts) {
+        return Ok(());
+    }
+    Err(Error::new(ErrorKind::InvalidSetting, format!("the results in the folder were made with {}", text.trim()))
+        .at(Place::File(path))
+        .remedy("name another folder with -o, or give the options it began with"))
 }
 
 /// The lines of an earlier sitting.

@@ -15,7 +15,7 @@ pub enum Figure {
     Light,
     /// Figure 5: both.
     Both,
-    /// An object that shadows itself: both light and, with known light, nothing else.
+    /// An object that shadows itself: light with known reflectance.
     Shadows,
     /// Both, by other schedules and with other epsilons.
     Schedules,
