@@ -125,7 +125,7 @@ impl Moments {
         left_out
     }
 
-    /// One plain number in group 0: returns its step before the rate.
+    /// One plain number, the first of a group: returns its step before the rate.
     pub fn direction_of(&mut self, group: usize, gradient: f32) -> f32 {
         let corrections = count_update(&mut self.first[group]);
         update(gradient, (&mut self.first[group][0], &mut self.second[group][0]), corrections, (0.0, 0.0))

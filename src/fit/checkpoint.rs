@@ -1,7 +1,7 @@
 //! A fit's state as one file, written whole or not at all.
 //!
 //! Layout: the line `PATINA CHECKPOINT 1`, eight bytes with the length of a JSON text, that text, then the arrays as
-//! little-endian `f32` in a fixed order, then eight bytes with a checksum over all before them.
+//! `f32` in a fixed order, in the byte order of the machine, which is little-endian on all that are supported, then eight bytes with a checksum over all before them.
 
 use super::adam::Moments;
 use super::schedule::Stage;

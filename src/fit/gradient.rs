@@ -4,7 +4,7 @@ use super::batch::{pixels_of_visit, views_of_step};
 use super::consistency::ViewGradient;
 use super::fitter::Fitter;
 use super::loss::ViewLoss;
-use super::schedule::Stage;
+use super::schedule::{Stage, StageKind};
 use super::settings::{BackgroundEvidence, Consistency};
 use super::targets::Target;
 use super::work::StageWork;
@@ -74,11 +74,12 @@ impl Fitter {
         stage: &Stage,
         stop: &AtomicBool,
     ) -> Result<Option<StepSums>> {
-        let separate = self.settings.consistency != Consistency::None;
+        // The first step of the paper is plain least squares: consistency is of the second (section 4.2).
+        let separate = self.settings.consistency != Consistency::None && stage.kind != StageKind::Diffuse;
         let share = 1.0 / views.len() as f32;
         let sampler = EnvironmentSampler::new(&work.parameters.environment());
+        // 0 takes every pixel.
         let quota = if separate { 0 } else { self.settings.pixels_per_step.div_ceil(views.len()) };
-        let quota = if self.settings.pixels_per_step == 0 { 0 } else { quota };
         let mut sums = StepSums::default();
         let mut view_gradients: Vec<ViewGradient<f32>> = Vec::new();
         let mut total: Option<Parameters<f32>> = None;
@@ -175,10 +176,11 @@ impl Fitter {
         PassKey::halves(self.settings.seed, self.state.step as u32, target.view as u32)
     }
 
-    /// Name and number of the pixels of a view that were not finite, if any; too many of them end the fit.
+    /// Name and number of the pixels of a view that were not finite, if any; too many of them end the fit. The name is the
+    /// same in each step, so that counts add up.
     fn non_finite_of(&self, target: &Target, totals: &PassTotals<f32>, pixels: usize) -> Result<Option<(String, u64)>> {
         let Some(pixel) = totals.first_non_finite else { return Ok(None) };
-        let (row, column) = target.place_in_photo(&self.scene, pixel);
+        let (row, column) = target.place_in_photo(pixel);
         let view = self.scene.views[target.view].name.clone();
         let count = totals.non_finite_pixels;
         if count as f64 > MAX_NON_FINITE_SHARE * pixels as f64 {
@@ -187,7 +189,7 @@ impl Fitter {
                 .at(Place::Pixel { view, row, column })
                 .remedy("the last checkpoint is good: resume from it with smaller rates"));
         }
-        Ok(Some((format!("error of a pixel in {view}, first at row {row} column {column}"), count)))
+        Ok(Some((format!("error of a pixel in {view}"), count)))
     }
 }
 

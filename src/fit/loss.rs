@@ -71,9 +71,10 @@ impl<'a> ViewLoss<'a> {
             (PixelState::Ignored, _) => false,
             // A black background is known exactly: mixed pixels are right, empty ones say nothing.
             (_, Background::Black) => escaped < 1.0 && state.is_surface(),
-            // Mask and rays must agree. A mixed pixel shows some background, which in a photograph is not at infinity.
+            // Mask and rays must agree: what a mask says is surface and rays miss, through a hole of the mesh, say, is no
+            // sky. A mixed pixel shows some background, which in a photograph is not at infinity.
             (state, Background::Environment) if state.is_surface() => {
-                escaped == 0.0 || (self.use_background && escaped == 1.0)
+                escaped == 0.0 || (self.use_background && escaped == 1.0 && !self.target.has_mask)
             }
             (_, Background::Environment) => escaped == 1.0 && self.use_background,
         }
@@ -252,6 +253,13 @@ mod tests {
         let surface = scene(Vec3::ONE * 0.5, PixelState::Surface);
         assert!(at(&surface, estimate(0.0), false).is_some());
         assert!(at(&surface, estimate(0.5), true).is_none(), "a mixed pixel");
+        assert!(at(&surface, estimate(1.0), true).is_some(), "without a mask rays say what is sky");
+        let mut masked = surface.clone();
+        masked.views[0].camera = Camera::looking_at(Vec3::Z, Vec3::ZERO, 2, 1, 1.0);
+        masked.views[0].photo = Photo::Linear32(Image::filled(2, 1, Vec3::ONE * 0.5));
+        masked.views[0].states = Image::from_pixels(2, 1, vec![PixelState::Surface, PixelState::Background]);
+        assert!(at(&masked, estimate(1.0), true).is_none(), "the mask says surface, rays say sky");
+        assert!(at(&masked, estimate(0.0), true).is_some());
         let background = scene(Vec3::ONE * 0.5, PixelState::Background);
         assert!(at(&background, estimate(1.0), true).is_some());
         assert!(at(&background, estimate(1.0), false).is_none());

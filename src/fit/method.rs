@@ -22,7 +22,7 @@ impl Method {
 }
 
 /// Settings that say nothing to the solver, unless it polishes.
-const OF_ADAM: [&str; 15] = [
+const OF_ADAM: [&str; 18] = [
     "steps",
     "steps-diffuse",
     "steps-all",
@@ -37,6 +37,9 @@ const OF_ADAM: [&str; 15] = [
     "rate-specular",
     "rate-roughness",
     "rate-light",
+    "light-smoothness",
+    "final-rate",
+    "first-hits-mib",
     "lobe-ramp",
 ];
 

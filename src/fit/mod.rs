@@ -1,10 +1,11 @@
 //! Where a texel is changed: losses, consistency between views, Adam, schedule, checkpoint.
 //!
-//! Read in this order: [`settings`] says what can be chosen, [`schedule`] turns it into stages, [`targets`] holds the
-//! photographs at the resolution of a stage, [`loss`] compares a pixel with its photo, [`consistency`] compares the
-//! gradients of views, [`adam`] moves the numbers, and [`fitter`] is the loop body: one call, one step.
-//! Its parts stand in the order they run: `evidence` looks at what is given, `work` prepares a stage, `batch` picks views and pixels, `gradient` adds them
-//! up, `weigh` applies consistency, `advance` moves the numbers, `held_out` judges them. [`state`] is all they change.
+//! Read in this order: [`settings`] says what can be chosen (`limits`: in which ranges), [`schedule`] turns it into
+//! stages, [`targets`] holds the photographs at the resolution of a stage, [`loss`] compares a pixel with its photo,
+//! [`consistency`] compares the gradients of views, [`adam`] moves the numbers, and [`fitter`] is the loop body: one
+//! call, one step. Its parts stand in the order they run: `evidence` looks at what is given, `work` prepares a stage,
+//! `batch` picks views and pixels, `gradient` adds them up, `weigh` applies consistency, `advance` moves the numbers,
+//! `held_out` judges them. [`state`] is all they change.
 //! `change` takes other settings between two steps, [`views`] leaves photos out, [`figures`] are for who watches.
 //! [`describe`] lists, reads and sets each setting by name, [`presets`] are whole sets of them.
 //! [`solver`] is the other method, `solver_step` does its steps, [`suited`] says which of both a scene
@@ -27,6 +28,7 @@ pub mod gauge;
 mod gradient;
 mod held_out;
 pub mod light_prior;
+mod limits;
 pub mod loss;
 mod method;
 pub mod presets;

@@ -2,9 +2,10 @@
 
 pub use super::method::Method;
 use super::solver::settings::Choosing;
-use crate::error::{Error, ErrorKind, Place, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::render::first_hits::PixelFilter;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// How gradients of different views are weighed against each other (multi-view gradient consistency, Joy and Poullis
 /// 2023, eq. 2 and 3).
@@ -225,62 +226,6 @@ impl FitSettings {
         self.solver_grid = other.solver_grid;
     }
 
-    /// Checks every range; the error names the setting.
-    pub fn validate(&self) -> Result<()> {
-        let wrong = |name: &str, message: &str| {
-            Err(Error::new(ErrorKind::InvalidSetting, message).at(Place::Setting(name.into())))
-        };
-        // A settings file holds signed numbers of 64 bits.
-        if i64::try_from(self.seed).is_err() {
-            return wrong("seed", "must be at most 9223372036854775807");
-        }
-        if !self.map_size.is_power_of_two() || !(16..=8192).contains(&self.map_size) {
-            return wrong("map-size", "must be a power of two from 16 to 8192");
-        }
-        if !(2..=1024).contains(&self.environment_height) {
-            return wrong("environment-height", "must be 2 to 1024");
-        }
-        if self.samples == 0 || self.samples > 4096 {
-            return wrong("samples", "must be 1 to 4096");
-        }
-        if self.bounces == 0 || self.bounces > crate::render::path::MAX_BOUNCES {
-            return wrong("bounces", "must be 1 to 16");
-        }
-        if self.views_per_step == 0 {
-            return wrong("views-per-step", "must be at least 1");
-        }
-        if self.consistency != Consistency::None && self.views_per_step < 2 {
-            return wrong("views-per-step", "must be at least 2 for consistency between views");
-        }
-        if !(1..=6).contains(&self.levels) || self.map_size >> (self.levels - 1) < 8 {
-            return wrong("levels", "must be 1 to 6 and leave maps of at least 8 texels");
-        }
-        if self.steps_diffuse + self.steps_all == 0 {
-            return wrong("steps-all", "must be at least 1");
-        }
-        if !(2..=64).contains(&self.solver_rounds) {
-            return wrong("solver-rounds", "must be 2 to 64");
-        }
-        if !(1..=6).contains(&self.solver_levels) {
-            return wrong("solver-levels", "must be 1 to 6");
-        }
-        if !(16..=4096).contains(&self.solver_grid) {
-            return wrong("solver-grid", "must be 16 to 4096");
-        }
-        for (name, rate) in [
-            ("rate-diffuse", self.rate_diffuse),
-            ("rate-specular", self.rate_specular),
-            ("rate-roughness", self.rate_roughness),
-            ("rate-light", self.rate_light),
-            ("final-rate", self.final_rate),
-        ] {
-            if !(rate.is_finite() && (0.0..=1.0).contains(&rate)) {
-                return wrong(name, "must be 0 to 1");
-            }
-        }
-        Ok(())
-    }
-
     /// The settings as TOML, only those that differ from the defaults.
     pub fn to_toml(&self) -> String {
         let own = toml::Table::try_from(self).unwrap_or_default();
@@ -295,6 +240,18 @@ impl FitSettings {
             Error::new(ErrorKind::Malformed, format!("settings are not understood: {}", source.message()))
                 .remedy("names are those of `patina fit --help`")
         })
+    }
+
+    /// These settings with what the lines of a TOML file change, and the names of what it sets.
+    ///
+    /// # Errors
+    /// A file that cannot be read; a line that is no setting, with its number.
+    pub fn changed_by_file(&self, path: &Path) -> Result<(Self, Vec<String>)> {
+        let text = std::fs::read_to_string(path).map_err(|source| Error::reading(path, source))?;
+        let values: FitSettings = crate::files::settings_of_toml(&text, path)?;
+        let table: toml::Table = crate::files::settings_of_toml(&text, path)?;
+        let names: Vec<String> = table.keys().cloned().collect();
+        Ok((self.with(&names, &values)?, names))
     }
 
     /// Name, value and whether it is the default, for reports.
@@ -317,6 +274,7 @@ impl FitSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Place;
 
     #[test]
     fn a_settings_file_holds_only_the_differences_and_round_trips() {
@@ -335,10 +293,17 @@ mod tests {
     }
 
     #[test]
-    fn ranges_are_checked_by_name() {
-        FitSettings::default().validate().unwrap();
-        let error = FitSettings { map_size: 1000, ..Default::default() }.validate().unwrap_err();
-        assert!(error.to_string().contains("--map-size"), "{error}");
-        assert!(FitSettings { rate_diffuse: f32::NAN, ..Default::default() }.validate().is_err());
+    fn a_file_changes_what_it_names_and_an_unknown_line_is_an_error_with_its_number() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("changes.toml");
+        let base = FitSettings { map_size: 512, seed: 4, ..Default::default() };
+        crate::files::write_bytes(&path, b"seed = 7\nsamples = 8\n").unwrap();
+        let (changed, names) = base.changed_by_file(&path).unwrap();
+        assert_eq!(changed, FitSettings { map_size: 512, seed: 7, samples: 8, ..Default::default() });
+        assert_eq!(names, ["samples", "seed"]);
+        crate::files::write_bytes(&path, b"seed = 7\nsampels = 8\n").unwrap();
+        let error = base.changed_by_file(&path).unwrap_err();
+        assert_eq!(error.place(), &Place::Line(path.clone(), 2), "{error}");
+        assert!(base.changed_by_file(&folder.path().join("none.toml")).is_err());
     }
 }

@@ -21,8 +21,6 @@ pub struct StartValues {
     pub texel: Texel<f32>,
     /// The light.
     pub environment: Environment,
-    /// Share of the sphere of directions, by solid angle, that background pixels showed.
-    pub light_seen: f64,
 }
 
 /// Specular reflectance to begin with: a dielectric's.
@@ -38,7 +36,6 @@ pub fn paper(settings: &FitSettings) -> StartValues {
     StartValues {
         texel: texel(0.0, 0.0),
         environment: Environment { radiance: crate::image::Image::filled(2 * height, height, Vec3::ZERO) },
-        light_seen: 0.0,
     }
 }
 
@@ -73,7 +70,7 @@ pub fn measured(scene: &Scene, surface: &Surface, targets: &[Target], settings: 
                         surface_mean.0 += radiance.as_dvec3();
                         surface_mean.1 += 1;
                     }
-                } else if use_background {
+                } else if use_background && !(target.has_mask && state.is_surface()) {
                     let tap = tap_of_direction(ray.direction, width, height);
                     for k in 0..4 {
                         let sum = &mut sums[tap.index[k] as usize];
@@ -92,7 +89,7 @@ pub fn measured(scene: &Scene, surface: &Surface, targets: &[Target], settings: 
     if light_seen < 0.01 {
         let radiance = (surface_mean / 0.5).max(Vec3::splat(1e-4));
         let environment = Environment { radiance: crate::image::Image::filled(width, height, radiance) };
-        return StartValues { texel: texel(0.5, START_SPECULAR), environment, light_seen };
+        return StartValues { texel: texel(0.5, START_SPECULAR), environment };
     }
     let known = sums.iter().map(|sum| sum.0 / sum.1.max(1e-6)).collect();
     let radiance = fill_smoothly(known, &seen, width, height);
@@ -103,7 +100,7 @@ pub fn measured(scene: &Scene, surface: &Surface, targets: &[Target], settings: 
             / (4.0 * std::f32::consts::PI);
     let (environment, mean_light) = brightened(environment, mean_light, surface_mean, &seen, light_seen as f32);
     let grey = surface_mean.element_sum() / mean_light.element_sum().max(1e-6);
-    StartValues { texel: texel(grey.clamp(0.05, BRIGHTEST_GREY), START_SPECULAR), environment, light_seen }
+    StartValues { texel: texel(grey.clamp(0.05, BRIGHTEST_GREY), START_SPECULAR), environment }
 }
 
 /// A light under which the surface can be as bright as it is: what the seen texels leave unexplained comes from those

@@ -14,7 +14,7 @@ pub struct LossRow {
     pub stage: String,
     /// Seconds of work since the fit began, pauses left out.
     pub seconds: f64,
-    /// The loss that was minimised.
+    /// The loss that was minimised, without the wish for a smooth light.
     pub loss: f64,
     /// Its part from the pictures: mean squared error in linear radiance. Unbiased, hence now and then below zero.
     pub image_loss: f64,

@@ -12,6 +12,10 @@ pub struct Target {
     pub view: usize,
     /// The camera, shrunk like the photo.
     pub camera: Camera,
+    /// Whether a mask says which pixels show surface; without one rays decide.
+    pub has_mask: bool,
+    /// Pixels of the photo along a side of one of these.
+    factor: usize,
     /// Shrunk pixels; `None` at full size, where the view itself is read.
     shrunk: Option<Shrunk>,
 }
@@ -56,7 +60,7 @@ impl Target {
         let factor = factor.min(source.camera.width).min(source.camera.height);
         let camera = source.camera.shrunk(factor);
         let shrunk = (factor > 1).then(|| shrink(source, &camera, factor));
-        Target { view, camera, shrunk }
+        Target { view, camera, has_mask: source.has_mask(), factor, shrunk }
     }
 
     /// Radiance and state of a pixel, row-major.
@@ -81,9 +85,8 @@ impl Target {
     }
 
     /// Row and column in the photo of the upper left corner of a pixel.
-    pub fn place_in_photo(&self, scene: &Scene, pixel: usize) -> (usize, usize) {
-        let factor = scene.views[self.view].camera.width / self.camera.width;
-        (pixel / self.camera.width * factor, pixel % self.camera.width * factor)
+    pub fn place_in_photo(&self, pixel: usize) -> (usize, usize) {
+        (pixel / self.camera.width * self.factor, pixel % self.camera.width * self.factor)
     }
 
     /// Number of pixels.

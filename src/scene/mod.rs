@@ -64,6 +64,14 @@ pub struct Scene {
     pub findings: Vec<Finding>,
 }
 
+impl View {
+    /// Whether a mask says what is surface: some pixel is background. Without one every pixel is said to be surface, and
+    /// rays decide.
+    pub fn has_mask(&self) -> bool {
+        self.states.pixels().iter().any(|state| state.is_background())
+    }
+}
+
 impl Scene {
     /// Puts a linear picture in the place of a view's photo; every pixel becomes evidence, except those that are not
     /// finite.

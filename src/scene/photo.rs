@@ -10,6 +10,8 @@ use half::f16;
 pub enum Photo {
     /// sRGB-encoded bytes.
     Srgb8(Image<[u8; 3]>),
+    /// Linear radiance in half precision, each the mean of several pixels of sRGB-encoded bytes.
+    MeanOfSrgb8(Image<[f16; 3]>),
     /// Linear radiance in half precision, finite.
     Linear16(Image<[f16; 3]>),
     /// Linear radiance, finite.
@@ -55,7 +57,7 @@ impl Photo {
     pub fn width(&self) -> usize {
         match self {
             Photo::Srgb8(image) => image.width(),
-            Photo::Linear16(image) => image.width(),
+            Photo::MeanOfSrgb8(image) | Photo::Linear16(image) => image.width(),
             Photo::Linear32(image) => image.width(),
         }
     }
@@ -64,21 +66,23 @@ impl Photo {
     pub fn height(&self) -> usize {
         match self {
             Photo::Srgb8(image) => image.height(),
-            Photo::Linear16(image) => image.height(),
+            Photo::MeanOfSrgb8(image) | Photo::Linear16(image) => image.height(),
             Photo::Linear32(image) => image.height(),
         }
     }
 
-    /// Whether it was stored as linear radiance.
+    /// Whether its file holds linear radiance, as renderers write it, and not the eight bits of a camera.
     pub fn is_linear(&self) -> bool {
-        !matches!(self, Photo::Srgb8(_))
+        !matches!(self, Photo::Srgb8(_) | Photo::MeanOfSrgb8(_))
     }
 
     /// Linear radiance of a pixel.
     pub fn radiance(&self, row: usize, column: usize) -> Vec3 {
         match self {
             Photo::Srgb8(image) => linear_from_srgb8(image[(row, column)]),
-            Photo::Linear16(image) => Vec3::from_array(image[(row, column)].map(f16::to_f32)),
+            Photo::MeanOfSrgb8(image) | Photo::Linear16(image) => {
+                Vec3::from_array(image[(row, column)].map(f16::to_f32))
+            }
             Photo::Linear32(image) => image[(row, column)],
         }
     }

@@ -160,7 +160,7 @@ impl FromStr for PixelCentre {
 }
 
 /// Whether masks are used.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum MaskUse {
     /// Where there are any.
@@ -184,7 +184,7 @@ pub enum BackgroundChoice {
 }
 
 /// How the numbers of a photo are encoded.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum ColourEncoding {
     /// By the file: 8-bit files are sRGB, float files are linear.

@@ -37,8 +37,6 @@ pub struct BlockPrior {
     pub specular: ([f64; 3], f64),
     /// Mean of the logarithm of the width, and its standard deviation.
     pub log_width: (f64, f64),
-    /// Mean of the diffuse reflectance per channel, and its standard deviation; infinite says nothing.
-    pub diffuse: ([f64; 3], f64),
     /// Standard deviation of the noise, in radiance.
     pub noise: f64,
     /// Standard deviation of the cells' deviations in diffuse reflectance; 0 makes all cells one.
@@ -183,13 +181,7 @@ mod tests {
     }
 
     fn prior() -> BlockPrior {
-        BlockPrior {
-            specular: ([0.1; 3], 10.0),
-            log_width: (-1.0, 10.0),
-            diffuse: ([0.5; 3], f64::INFINITY),
-            noise: 0.01,
-            spread: 0.1,
-        }
+        BlockPrior { specular: ([0.1; 3], 10.0), log_width: (-1.0, 10.0), noise: 0.01, spread: 0.1 }
     }
 
     #[test]

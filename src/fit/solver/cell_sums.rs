@@ -113,13 +113,10 @@ pub(super) fn system(
     for cell in cells.iter() {
         system.add(&cell.without_deviation(ridge));
     }
-    // Priors, as observations in units of the noise.
+    // The prior, as an observation in units of the noise.
     let variance = prior.noise * prior.noise;
     let (mean, deviation) = prior.specular;
     let precision = variance / (deviation * deviation);
     system.observe(precision, 0.0, 1.0, mean[channel]);
-    let (mean, deviation) = prior.diffuse;
-    let precision = if deviation.is_finite() { variance / (deviation * deviation) } else { 0.0 };
-    system.observe(precision, 1.0, 0.0, mean[channel]);
     system
 }

@@ -65,12 +65,6 @@ impl Estimate {
         self.texels.iter_mut().zip(rho).for_each(|(texel, rho)| texel[..3].copy_from_slice(rho));
     }
 
-    /// Whether a texel was solved for.
-    #[inline]
-    pub fn is_solved(&self, texel: usize) -> bool {
-        self.variances[texel][7] > 0.0
-    }
-
     /// Whether a texel was solved for when maps were made, better than any block of a round on the light is.
     #[inline]
     pub fn is_mapped(&self, texel: usize) -> bool {

@@ -5,7 +5,7 @@
 //! light as their squares were before. Shares of a texel are those of its coefficients, by their weight in it.
 
 use super::light_shape::LightShape;
-use super::light_step::NormalEquations;
+use super::normal_equations::NormalEquations;
 
 /// Shares of a texel's precision: highlights, background pixels, diffuse light with its shadows. What is missing to 1
 /// is belief: that a sky is smooth.

@@ -7,8 +7,9 @@ use super::gains::gains_after;
 use super::light_colour::change_by_highlights;
 use super::light_evidence::{LightKnown, Precisions, evidence_shares};
 use super::light_shape::{LightShape, bright_texels};
-use super::light_step::{Gauge, LightPrior, NormalEquations, solve_channel};
+use super::light_step::{Gauge, LightPrior, solve_channel};
 use super::light_suns::narrow_scales;
+use super::normal_equations::NormalEquations;
 use super::plan;
 use super::report::{ErrorSums, StepReport, median};
 use super::round::{BlockWork, Round, open_prior};
@@ -87,7 +88,7 @@ impl SolverScene {
         })
     }
 
-    /// How far lobes are let go in a round, in [0, 1].
+    /// How far lobes are let go in a round: 0 in the first, 1 in the last, more in rounds on finer photos, which count as 1.
     fn openness(&self, number: usize) -> f64 {
         let last = (self.settings.coarse_rounds + self.settings.fine_rounds).max(2) - 1;
         number as f64 / last as f64

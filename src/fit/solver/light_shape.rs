@@ -23,7 +23,7 @@ pub struct LightShape {
 
 impl LightShape {
     /// Wide hats over the sphere, and narrow hats at these texels. The wide hats are the texels themselves when the
-    /// light is too small to halve.
+    /// light has an odd side or is too small to halve.
     pub fn new(size: (usize, usize), fine: Vec<u32>) -> Self {
         let (width, height) = size;
         let halved = width % 2 == 0 && height % 2 == 0 && height >= 8;

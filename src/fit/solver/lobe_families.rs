@@ -7,7 +7,7 @@
 //! for any scene, with the diffuse reflectance that its texels have (empirical Bayes: Efron and Morris 1973).
 //!
 //! All texels together tell besides what lobes of this scene are like as a whole (`lobe_scene`): one more family,
-//! of the kinds that any scene has.
+//! of the kinds that any scene has. That one is there before the first maps as well, by what rounds on the light solved.
 //!
 //! That uses what a texel's own pixels say twice, once in the cluster. So clusters are wide, and families of what any scene
 //! has keep half of what is believed.
@@ -120,8 +120,9 @@ impl Sums {
     }
 }
 
-/// What is believed of lobes once maps were made: the prior of these kinds, the same with lobes as this scene has them, and
-/// where any kinds may be, a family for each kind of surface that maps show. Without maps it is the prior alone.
+/// What is believed of lobes when maps are made: the prior of these kinds, the same with lobes as this scene has them, and
+/// where any kinds may be, a family for each kind of surface that earlier maps show. Where nothing was solved for yet, by
+/// maps or by rounds on the light, it is the prior alone.
 pub fn with_families_of(estimate: &Estimate, kinds: SurfaceKinds) -> LobePrior {
     let any = kinds.prior();
     let Some(scene) = SceneLobes::of(estimate) else { return any };
@@ -242,7 +243,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn without_maps_nothing_is_added() {
+    fn where_nothing_was_solved_for_nothing_is_added() {
         let light = Environment { radiance: Image::filled(4, 2, Vec3::ONE) };
         for kinds in [SurfaceKinds::Any, SurfaceKinds::Outdoors] {
             assert_eq!(with_families_of(&Estimate::start(16, &light, 1), kinds), kinds.prior());

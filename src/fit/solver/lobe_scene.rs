@@ -2,8 +2,9 @@
 //!
 //! Where pixels say little, a lobe leans on what is believed of it. Believed for any scene, that is a width of 0.55 and a
 //! dielectric's F0 of 0.05; where a scene has more of both, its lobes come out too narrow and too dull, and what they lack
-//! is booked as diffuse reflectance. Once maps exist, means and spreads over all texels, known well or not, are believed
-//! instead. That is a step of expectation maximisation each time that maps are made (Dempster, Laird and Rubin 1977).
+//! is booked as diffuse reflectance. Means and spreads over all texels that were solved for, known well or not, are
+//! believed instead: for the first maps those of the blocks of the rounds on the light, then those of the maps before. That
+//! is a step of expectation maximisation each time that maps are made (Dempster, Laird and Rubin 1977).
 
 use super::estimate::Estimate;
 use super::lobe_families::REACH;
@@ -49,7 +50,8 @@ impl Moments {
 }
 
 impl SceneLobes {
-    /// Those of maps that were made. `None` without any.
+    /// Those of the texels that were solved for: when maps were made, or by blocks in rounds on the light, while there are no
+    /// maps. `None` without any.
     pub(super) fn of(estimate: &Estimate) -> Option<Self> {
         let (mut widths, mut dielectrics) = (Moments::default(), Moments::default());
         for (texel, variance) in estimate.texels.iter().zip(&estimate.variances).filter(|(_, own)| own[7] > 0.0) {

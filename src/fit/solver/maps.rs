@@ -75,7 +75,7 @@ impl SolverScene {
                 if let (Some(check), Some(mut alternatives)) = (&mut check, result.alternatives) {
                     check.add(&alternatives, result.block_seconds, result.tile.seconds);
                     if self.settings.apply_choices {
-                        undecided.push(Undecided::of(&mut alternatives, result.tile.one_lobe));
+                        undecided.push(Undecided::of(&mut alternatives));
                     }
                 }
                 made.push(result.tile);

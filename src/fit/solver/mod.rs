@@ -8,9 +8,9 @@
 //!    looking at all.
 //! 3. [`round`]: a block's rows over the light; [`eliminate`] takes the block's own unknowns out of them, so that what is
 //!    left is the Schur complement of the joint Gauss-Newton system.
-//! 4. [`light_step`]: the light from those rows, at least zero ([`non_negative`]), in wide and narrow hats
-//!    ([`light_shape`]), with a weak wish for smoothness but for suns ([`light_suns`]). [`light_round`] is the round as a
-//!    whole, [`light_evidence`] says what each texel of the light is known by, `light_holes` fills what lies between texels
+//! 4. [`light_step`]: the light from those rows, added up ([`normal_equations`]), at least zero ([`non_negative`]), in
+//!    wide and narrow hats ([`light_shape`]), with a weak wish for smoothness but for suns ([`light_suns`]).
+//!    [`light_round`] is the round as a whole, [`light_evidence`] says what each texel of the light is known by, `light_holes` fills what lies between texels
 //!    that photos show; `gains` of photos whose exposures differ.
 //! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`, `tile_texels`, `tile_spread`,
 //!    `tile_highlights`) with the footprints of pixels, where the evidence, as far as it is independent
@@ -52,6 +52,7 @@ pub mod lobe_tree;
 pub mod lobe_widths;
 pub mod maps;
 pub mod non_negative;
+pub mod normal_equations;
 pub mod observations;
 pub mod plan;
 pub mod report;

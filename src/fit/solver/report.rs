@@ -130,7 +130,6 @@ impl SolverScene {
             log_gains: &estimate.log_gains,
             light: planes,
             at_points,
-            has_lobe: true,
         }
     }
 

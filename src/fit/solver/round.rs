@@ -27,8 +27,6 @@ pub struct Round<'a> {
     pub light: &'a LightPlanes,
     /// The light at the points of the grid.
     pub at_points: &'a PointLight,
-    /// Whether there is a lobe.
-    pub has_lobe: bool,
 }
 
 /// A block at work.
@@ -55,7 +53,6 @@ pub fn open_prior(mean_radiance: f32, openness: f64) -> BlockPrior {
     BlockPrior {
         specular: ([0.07; 3], between(0.02, 0.3)),
         log_width: (-0.6, between(0.15, 0.6)),
-        diffuse: ([0.4; 3], f64::INFINITY),
         // Black photos have no mean to measure noise by.
         noise: 0.05 * f64::from(mean_radiance).max(1e-6),
         spread: 0.1,
@@ -143,12 +140,7 @@ impl Round<'_> {
         let log_widths = log_widths();
         let first_wide = WIDTHS.partition_point(|&width| width < wide_from(&self.transport.basis)).min(MOST_NODES - 1);
         let mut prior = *prior;
-        if self.has_lobe {
-            self.fill(work, first_wide..MOST_NODES);
-        } else {
-            work.nodes = MOST_NODES - 1..MOST_NODES;
-            prior.specular = ([0.0; 3], 1e-3);
-        }
+        self.fill(work, first_wide..MOST_NODES);
         let floor = 0.25 * prior.noise;
         for pass in 0..4 {
             let nodes = work.nodes.clone();
@@ -156,7 +148,7 @@ impl Round<'_> {
                 return false;
             };
             work.solution = solution;
-            if self.has_lobe && work.nodes.start > 0 && work.solution.best_node == work.nodes.start {
+            if work.nodes.start > 0 && work.solution.best_node == work.nodes.start {
                 let start = work.nodes.start;
                 self.fill(work, start.saturating_sub(if start == first_wide { 2 } else { 3 })..start);
                 continue;
@@ -240,19 +232,15 @@ impl Round<'_> {
             }
             shape.reduce(&full, &mut reduced[0]);
             let place = self.transport.lobe_place(point, self.light, self.at_points, &mut seen);
-            let mut sums = LobeSums::default();
+            let sums = lobe_with_derivative(basis, &place, width);
             // What the lobe sends of other surface: what is left of it without the light.
             let mut of_surface = [[0.0f32; 3]; 2];
-            if self.has_lobe {
-                sums = lobe_with_derivative(basis, &place, width);
-                for (which, scales) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
-                    full.fill(0.0);
-                    add_lobe_row(basis, &place, width, scales, &mut full);
-                    shape.reduce(&full, &mut reduced[1 + which]);
-                    let all = [&sums.base, &sums.grazing][which];
-                    of_surface[which] =
-                        [0, 1, 2].map(|c| all[c] - sum_of_products::<16>(&full, &self.light.channels[c]));
-                }
+            for (which, scales) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
+                full.fill(0.0);
+                add_lobe_row(basis, &place, width, scales, &mut full);
+                shape.reduce(&full, &mut reduced[1 + which]);
+                let all = [&sums.base, &sums.grazing][which];
+                of_surface[which] = [0, 1, 2].map(|c| all[c] - sum_of_products::<16>(&full, &self.light.channels[c]));
             }
             let direct = self.interpolate(&self.at_points.direct, observation);
             let scale = f64::from(term.weight.sqrt()) / prior.noise;

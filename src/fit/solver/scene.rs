@@ -9,7 +9,7 @@ use crate::fit::targets::Target;
 use crate::math::sphere::{BilinearTap, tap_of_direction};
 use crate::render::Surface;
 use crate::render::cached::{CachedSettings, CachedTransport, FootprintSettings, ViewFootprints};
-use crate::scene::{Background, PixelState, Scene};
+use crate::scene::{Background, Camera, PixelState, Scene};
 use glam::Vec2;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -48,8 +48,8 @@ pub struct SolverScene {
     pub settings: SolverSettings,
     /// Indices in the scene of the views that are fitted to.
     pub views: Vec<usize>,
-    /// Their photographs, of the size they are fitted at.
-    pub targets: Vec<Target>,
+    /// Their cameras, of the size they are fitted at.
+    pub cameras: Vec<Camera>,
     /// The cache.
     pub transport: CachedTransport,
     /// Footprints of the views: those of the observations, no others.
@@ -87,6 +87,8 @@ impl SolverScene {
         traced: Option<CachedTransport>,
         stop: &AtomicBool,
     ) -> Result<Option<Self>> {
+        // Blocks are solved side by side: parallel factorisations inside them would only wait for each other.
+        faer::set_global_parallelism(faer::Par::Seq);
         let cached = CachedSettings {
             grid: settings.grid.min(settings.map_size),
             bounce_rays: settings.bounce_rays,
@@ -157,7 +159,7 @@ impl SolverScene {
             map_blocks: blocks(MAP_BLOCK),
             settings,
             views: targets.iter().map(|target| target.view).collect(),
-            targets,
+            cameras: targets.iter().map(|target| target.camera).collect(),
             transport,
             footprints,
             first_hits,
@@ -224,13 +226,13 @@ fn background_pixels(
     let mut found = Vec::new();
     let mut seen = 0usize;
     for (index, (target, escaped)) in targets.iter().zip(escaped).enumerate() {
-        // Without a mask every pixel is said to be surface, and rays decide.
-        let has_mask = scene.views[target.view].states.pixels().iter().any(|state| state.is_background());
         for pixel in escaped.iter().cloned().flatten() {
             seen += 1;
             let (row, column) = (pixel / target.camera.width, pixel % target.camera.width);
             let (radiance, state) = target.at(scene, pixel);
-            let says_nothing = state == PixelState::Ignored || state.is_clipped() || (has_mask && state.is_surface());
+            // Without a mask every pixel is said to be surface, and rays decide.
+            let is_missed_surface = target.has_mask && state.is_surface();
+            let says_nothing = state == PixelState::Ignored || state.is_clipped() || is_missed_surface;
             if !seen.is_multiple_of(stride) || says_nothing {
                 continue;
             }

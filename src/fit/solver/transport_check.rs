@@ -59,13 +59,12 @@ impl SolverScene {
             ..PictureSettings::default()
         };
         let tracer = PictureTracer::new(surface, &parameters, settings);
-        let held_out = self.held_out.iter().map(|(target, footprints)| (target, Some(footprints)));
+        let held_out = self.held_out.iter().map(|(target, footprints)| (target.view, &target.camera, Some(footprints)));
         // Of views that are fitted to only the observations' footprints were kept.
-        let training = self.targets.iter().map(|target| (target, None));
+        let training = self.views.iter().zip(&self.cameras).map(|(&view, camera)| (view, camera, None));
         let all: Vec<_> = if self.held_out.is_empty() { training.collect() } else { held_out.collect() };
         let (mut sums, mut compared): (Sums, usize) = ([0.0; 4], 0);
-        for &(target, footprints) in all.iter().step_by(all.len().div_ceil(VIEWS).max(1)) {
-            let (view, camera) = (target.view as u32, &target.camera);
+        for &(view, camera, footprints) in all.iter().step_by(all.len().div_ceil(VIEWS).max(1)) {
             let footprints = match footprints {
                 Some(footprints) => Cow::Borrowed(footprints),
                 None => Cow::Owned(ViewFootprints::trace(surface, &self.transport.grid, camera, &self.first_hits)),
@@ -82,7 +81,7 @@ impl SolverScene {
                         return [0.0; 4];
                     }
                     let [first, second] =
-                        [0, 1].map(|pass| tracer.pixel(camera, view, pixel, SAMPLES, pass, arena).0.as_dvec3());
+                        [0, 1].map(|pass| tracer.pixel(camera, view as u32, pixel, SAMPLES, pass, arena).0.as_dvec3());
                     let own = glam::Vec3::from_array(picture[pixel]).as_dvec3();
                     let mean = 0.5 * (first + second);
                     [(own - first).dot(own - second), first.dot(second), (own - mean).element_sum(), mean.element_sum()]

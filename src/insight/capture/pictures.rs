@@ -170,7 +170,7 @@ fn compared(
         halves: drawn.map(|picture| picture.radiance.map(|&radiance| radiance * gain)),
         coverage,
         distance: Image::from_pixels(width, height, centres),
-        has_mask: own.states.pixels().iter().any(|state| state.is_background()),
+        has_mask: own.has_mask(),
         camera,
     }
 }

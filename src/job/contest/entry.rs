@@ -4,7 +4,7 @@ use super::clock::Clock;
 use super::contestant::Contestant;
 use super::pace::Pace;
 use super::snapshot::{Progress, Snapshots};
-use crate::error::{Error, ErrorKind, Place, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::fit::{FitSettings, Fitter, StepOutcome};
 use crate::render::Surface;
 use crate::scene::{ReadSettings, Scene};
@@ -55,14 +55,7 @@ pub fn base_settings(scene: &Scene, changes: Option<&Path>, seed: u64) -> Result
         ..Default::default()
     };
     let Some(path) = changes else { return Ok(own) };
-    let text = std::fs::read_to_string(path).map_err(|source| Error::reading(path, source))?;
-    let changes: toml::Table = toml::from_str(&text).map_err(|source| {
-        Error::new(ErrorKind::Malformed, format!("not a settings file: {}", source.message()))
-            .at(Place::File(path.into()))
-    })?;
-    let mut table = toml::Table::try_from(&own).unwrap_or_default();
-    table.extend(changes);
-    let settings = FitSettings::from_toml(&table.to_string())?;
+    let (settings, _) = own.changed_by_file(path)?;
     settings.validate()?;
     Ok(settings)
 }

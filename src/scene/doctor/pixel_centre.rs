@@ -8,7 +8,7 @@
 
 use super::Report;
 use super::edge_profile::Profiles;
-use super::probe::{centre_of, has_mask, hit_at};
+use super::probe::{centre_of, hit_at};
 use crate::error::{Finding, Severity};
 use crate::math::evenly_spread;
 use crate::math::statistics::Moments;
@@ -98,7 +98,7 @@ impl CentreMeasurement {
 /// little of a silhouette is in the pictures.
 pub fn measure(scene: &Scene, bvh: &Bvh) -> Option<CentreMeasurement> {
     let valid: Vec<&View> = scene.views.iter().filter(|view| view.camera.validate(1e-3).is_ok()).collect();
-    let masked: Vec<&View> = valid.iter().copied().filter(|view| has_mask(view)).collect();
+    let masked: Vec<&View> = valid.iter().copied().filter(|view| view.has_mask()).collect();
     measure_by_masks(&spread(&masked), bvh).or_else(|| measure_by_photo_edges(&spread(&valid), bvh))
 }
 

@@ -1,6 +1,6 @@
 //! First hits of a view on a coarse grid of pixels, shared by all checks that need rays.
 
-use crate::scene::{Camera, Mesh, PixelState, View};
+use crate::scene::{Camera, Mesh, View};
 use crate::trace::{Bvh, Hit};
 use glam::{Vec2, Vec3};
 
@@ -68,9 +68,4 @@ pub fn area_in_pixel(camera: &Camera, place_in_world: Vec3, normal_in_world: Vec
     let depth = -to_camera.dot(camera.forward_in_world());
     // The pixel's solid angle, (depth / distance)^3 / focal^2, times distance^2 / cosine.
     depth.powi(3) / (to_camera.length() * camera.focal_pixels.x * camera.focal_pixels.y * cosine)
-}
-
-/// Whether the view has a mask: some pixel is background.
-pub fn has_mask(view: &View) -> bool {
-    view.states.pixels().iter().any(|state| matches!(state, PixelState::Background | PixelState::BackgroundClipped))
 }

@@ -1,6 +1,6 @@
 //! Do the masks agree with the mesh's silhouette?
 
-use super::probe::{Probe, has_mask};
+use super::probe::Probe;
 use super::{Report, names_of};
 use crate::error::{Finding, Severity};
 use crate::math::statistics::quantile;
@@ -16,7 +16,7 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
     let mut overlaps = Vec::new();
     let mut low = Vec::new();
     for ((view, probes), line) in scene.views.iter().zip(probes).zip(&mut report.views) {
-        if !has_mask(view) || probes.is_empty() {
+        if !view.has_mask() || probes.is_empty() {
             continue;
         }
         let (mut both, mut either) = (0usize, 0usize);

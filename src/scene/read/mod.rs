@@ -140,7 +140,7 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
                     "masks-incomplete",
                     format!("{without} of {} views have no mask: rays decide there", views.len()),
                 )
-                .remedy("add the missing masks, or ignore masks"),
+                .remedy("add the missing masks, or ignore all with --masks ignore"),
             );
         }
     }

@@ -170,7 +170,7 @@ fn apply_mask(
             format!("the mask is {} x {} but the photo is {} x {}", mask.width(), mask.height(), size.0, size.1),
         )
         .at(Place::File(path.into()))
-        .remedy("make the mask in the size of the photo, or ignore masks"));
+        .remedy("make the mask in the size of the photo, or ignore all with --masks ignore"));
     }
     let is_object: Image<bool> = if is_twin { object_of_twin(&mask, photo) } else { mask.map(|value| *value >= 0.5) };
     let mut object_pixels = 0usize;
@@ -238,9 +238,11 @@ fn shrink(photo: &Photo, states: &Image<PixelState>, factor: usize) -> (Photo, I
             (false, false, true) => PixelState::BackgroundClipped,
         }
     });
+    let halves = || small.map(|pixel| to_half(*pixel));
     let photo = match photo {
         Photo::Linear32(_) => Photo::Linear32(small),
-        _ => Photo::Linear16(small.map(|pixel| to_half(*pixel))),
+        Photo::Linear16(_) => Photo::Linear16(halves()),
+        Photo::Srgb8(_) | Photo::MeanOfSrgb8(_) => Photo::MeanOfSrgb8(halves()),
     };
     (photo, small_states)
 }
@@ -279,6 +281,7 @@ mod tests {
         assert_eq!((photo.width(), photo.height()), (2, 2));
         let expected = crate::scene::photo::linear_from_srgb8([255, 0, 0]).x / 2.0;
         assert!((photo.radiance(0, 0).x - expected).abs() < 1e-3);
+        assert!(!photo.is_linear(), "it is a photograph of eight bits still, and is fitted as one");
         assert_eq!(
             small.pixels(),
             [PixelState::SurfaceClipped, PixelState::Ignored, PixelState::Surface, PixelState::Surface]

@@ -7,6 +7,7 @@
 //! would be integrated anew otherwise, which is what takes the time.
 
 use super::super::block::MOST_NODES;
+use super::super::lobe_evidence::LobeBelief;
 use super::super::lobe_prior::LobePrior;
 use super::super::lobe_tree::LobeSharing;
 use super::super::tile::{Tile, forgiven, least_noise};
@@ -46,8 +47,9 @@ pub struct TileAlternatives {
     pub texels: Vec<u32>,
     /// Their diffuse reflectance under each [`Alternative`] that has one of its own; empty for the others.
     pub rho: [Vec<[f32; 3]>; ALTERNATIVES],
-    /// The one lobe that all share.
+    /// The one lobe that all share, and what is believed of it.
     pub one: Lobe,
+    pub(super) one_belief: LobeBelief,
     /// The lobes of their own.
     pub own: Vec<Lobe>,
     /// The noise of each alternative; `None` where nothing could be solved.
@@ -137,6 +139,7 @@ impl TileAlternatives {
         made.chosen_lobes = chosen_lobes;
         made.own = own;
         made.one = one.mean.map(|value| value as f32);
+        made.one_belief = one;
         // What is not solved anew has the noise of the solver's own choice.
         let of_own = noise[Alternative::OwnLobes.index()];
         made.noise = of_own.map(|of_own| noise.map(|noise| noise.unwrap_or(of_own)));

@@ -32,9 +32,10 @@ pub struct Undecided {
 }
 
 impl Undecided {
-    /// Of a tile's alternatives; `one` is what is believed of the lobe that all its texels share.
-    pub fn of(alternatives: &mut TileAlternatives, one: LobeBelief) -> Self {
+    /// Of a tile's alternatives: the lobe that all its texels share is the one their diffuse reflectance was solved with.
+    pub fn of(alternatives: &mut TileAlternatives) -> Self {
         let rho = [Alternative::Diffuse, Alternative::OneLobe].map(|choice| alternatives.rho[choice.index()].clone());
+        let one = alternatives.one_belief;
         Undecided { one, rho, lobes: std::mem::take(&mut alternatives.chosen_lobes) }
     }
 

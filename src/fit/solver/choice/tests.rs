@@ -54,9 +54,10 @@ fn photograph(held_out: usize, noise: f32, lobe_of: impl Fn(usize) -> Option<[f3
     let at = cache.point_light(&estimate, &planes);
     let mut random = SequentialRandom::new(9);
     let mut normal = move || random.next_normal();
-    for target in cache.targets.iter().chain(cache.held_out.iter().map(|(target, _)| target)) {
-        let (view, grid) = (target.view, &cache.transport.grid);
-        let footprints = ViewFootprints::trace(&made.surface, grid, &target.camera, &cache.first_hits);
+    let judging = cache.held_out.iter().map(|(target, _)| (target.view, &target.camera));
+    for (view, camera) in cache.views.iter().copied().zip(&cache.cameras).chain(judging) {
+        let grid = &cache.transport.grid;
+        let footprints = ViewFootprints::trace(&made.surface, grid, camera, &cache.first_hits);
         let mut picture = vec![Vec3::ZERO; 64 * 48];
         let mut around = SeenLight::default();
         for point in &footprints.points {
