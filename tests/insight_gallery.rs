@@ -35,7 +35,7 @@ fn quick_picture() -> PictureSettings {
 }
 
 fn light(name: &str) -> NamedLight {
-    NamedLight { name: name.into(), environment: light_of(name, 16).unwrap().1 }
+    NamedLight { name: name.into(), environment: light_of(name, 16).unwrap().environment }
 }
 
 /// Maps of the trial's ball and floor that differ from texel to texel.
@@ -315,6 +315,25 @@ fn a_run_is_moved_into_a_new_folder_and_the_command_line_does_the_same() {
         let typed = ["gauge", &run, wrong[0], wrong[1], "-o", &none];
         assert_ne!(patina(&typed), success, "{wrong:?}");
         assert!(!path("none").exists());
+    }
+
+    // Lights of one name from several folders, and dots in names: each has pictures of its own.
+    let dark = |name: &str, radiance: f32| {
+        file::write_exr_rgb(&path(name), &RgbImage::filled(8, 4, Vec3::splat(radiance))).unwrap();
+        text(name)
+    };
+    let lights = [dark("a/sky.v2.exr", 1.0), dark("b/sky.v2.exr", 2.0)];
+    let mut relight = vec!["relight", &run, "--views", "0000", "--samples", "1", "--shrink", "8", "--env"];
+    relight.extend(lights.iter().map(String::as_str));
+    assert_eq!(patina(&relight), success);
+    let pictures = ["0000_sky.v2", "0000_sky.v2_2"].map(|name| {
+        assert!(path("run").join(format!("relight/{name}.png")).is_file(), "{name}");
+        file::read_rgb(&path("run").join(format!("relight/{name}.exr"))).unwrap()
+    });
+    assert_eq!((pictures[0].width(), pictures[0].height()), (pictures[1].width(), pictures[1].height()));
+    for wrong in [["--rotate", "nan"], ["--bounces", "0"], ["--bounces", "17"], ["--samples", "0"]] {
+        let typed = ["relight", &run, "--env", "noon", wrong[0], wrong[1]];
+        assert_ne!(patina(&typed), success, "{wrong:?}");
     }
 
     let turn = ["relight", &run, "--env", "overcast", "--turntable", "2", "--size", "24x18", "--samples", "2"];

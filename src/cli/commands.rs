@@ -1,19 +1,20 @@
 //! `patina check`, `relight`, `render` and `compare`.
 
-use super::arguments::{CheckOptions, CompareOptions, Layer, RelightOptions, RenderOptions};
-use crate::error::{Error, ErrorKind, Place, Result};
+use super::arguments::{CheckOptions, CompareOptions, Layer, ReadOptions, RelightOptions, RenderOptions};
+use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::export::RunFolder;
+use crate::files::unrepeated;
 use crate::fit::Suited;
 use crate::fit::views::{ViewUse, uses_of};
 use crate::image::file;
 use crate::insight::report::number;
 use crate::insight::scores::{aggregate, score_halves};
-use crate::job::pictures::{light_of, matched, parameters, relit, surface_of};
+use crate::job::pictures::{OpenedLight, light_of, matched, parameters, relit, surface_of};
 use crate::job::prepare::RunSettings;
 use crate::job::regions;
 use crate::job::shown::{exposure_of, fully_covered, in_halves};
 use crate::render::measured_regions::render_regions;
-use crate::render::picture::{PictureSettings, layers, render as render_picture};
+use crate::render::picture::{Picture, PictureSettings, layers, render as render_picture};
 use crate::render::{Parameters, Surface};
 use crate::scene::{Background, Scene, doctor};
 use crate::trace::Bvh;
@@ -58,12 +59,8 @@ pub fn check(options: &CheckOptions, json: bool) -> Result<()> {
     Ok(())
 }
 
-/// The scene whose cameras a command uses.
-fn camera_scene(
-    folder: &RunFolder,
-    given: Option<&Path>,
-    read: Option<crate::scene::ReadSettings>,
-) -> Result<(Scene, RunSettings)> {
+/// The scene whose cameras a command uses, read as the run read its own but for what was typed.
+fn camera_scene(folder: &RunFolder, given: Option<&Path>, typed: &ReadOptions) -> Result<(Scene, RunSettings)> {
     let settings: RunSettings = folder.read_settings()?;
     let path = given.map_or_else(|| settings.scene.clone(), Path::to_path_buf);
     if path.as_os_str().is_empty() {
@@ -71,7 +68,7 @@ fn camera_scene(
         let demo = crate::scene::demo::build(&crate::scene::demo::DemoSettings { seed, ..Default::default() })?;
         return Ok((demo.scene, settings));
     }
-    let read = read.unwrap_or_else(|| settings.read.clone());
+    let read = typed.over(settings.read.clone());
     Ok((crate::scene::read(&path, &read)?, settings))
 }
 
@@ -92,10 +89,38 @@ fn chosen_views(scene: &Scene, names: &[String], otherwise: impl Fn(&Scene) -> V
         .collect()
 }
 
+/// Says that a picture is written: its path, or an event with it.
+pub(super) fn tell_written(path: &Path, json: bool) {
+    match json {
+        true => println!("{}", serde_json::json!({"event": "written", "path": path})),
+        false => println!("{}", path.display()),
+    }
+}
+
+/// Says what was noticed, a line each.
+fn tell_findings(findings: &[Finding], json: bool) {
+    for finding in findings {
+        match json {
+            true => println!("{}", serde_json::json!({"event": "finding", "finding": finding})),
+            false => eprintln!("{finding}"),
+        }
+    }
+}
+
+/// Says that pixels of a picture were not finite, if any were: they are black in it.
+pub(super) fn tell_non_finite(picture: &Picture, name: &str, json: bool) {
+    if picture.non_finite_pixels > 0 {
+        let message = format!("{} pixels of {name} were not finite and are black", picture.non_finite_pixels);
+        let finding = Finding::new(Severity::Warning, "picture-not-finite", message)
+            .remedy("the light or the maps hold numbers too large to trace: look at them, or lower the light");
+        tell_findings(&[finding], json);
+    }
+}
+
 /// Renders a run under other lights.
-pub fn relight(options: &RelightOptions) -> Result<()> {
+pub fn relight(options: &RelightOptions, json: bool) -> Result<()> {
     let folder = RunFolder::open(&options.run)?;
-    let (scene, settings) = camera_scene(&folder, options.cameras.as_deref(), None)?;
+    let (scene, settings) = camera_scene(&folder, options.cameras.as_deref(), &ReadOptions::default())?;
     let result = folder.read_result()?;
     let (surface, own) = surface_of(&result)?;
     let output = options.output.clone().unwrap_or_else(|| folder.path().join("relight"));
@@ -113,12 +138,14 @@ pub fn relight(options: &RelightOptions) -> Result<()> {
     };
     let regions = regions::read(&options.material, &options.region, options.library.as_deref())?;
     let regions = regions.map(|(regions, findings)| {
-        findings.iter().for_each(|finding| println!("{finding}"));
+        tell_findings(&findings, json);
         regions
     });
-    for name in &options.env {
-        let (stem, light) = light_of(name, 256)?;
-        let light = light.rotated_about_up(options.rotate.to_radians());
+    let lights = options.env.iter().map(|name| light_of(name, 256)).collect::<Result<Vec<_>>>()?;
+    let names: Vec<String> = lights.iter().map(|light| light.name.clone()).collect();
+    lights.iter().for_each(|light| tell_findings(&light.findings, json));
+    for (stem, light) in unrepeated(&names).into_iter().zip(lights) {
+        let light = light.environment.rotated_about_up(options.rotate.to_radians());
         let light = if options.absolute { light } else { matched(&light, &result.environment).0 };
         if let Some(frames) = options.turntable.turntable {
             let Some(&first) = views.first() else {
@@ -130,7 +157,7 @@ pub fn relight(options: &RelightOptions) -> Result<()> {
             let folder = output.join(format!("turntable_{stem}"));
             let (turn, exposure, picture) = (&options.turntable, options.exposure, &picture_settings);
             let regions = regions.as_ref();
-            super::turntable::write(&folder, &surface, &lit, regions, &start, turn, frames, picture, exposure)?;
+            super::turntable::write(&folder, &surface, &lit, regions, &start, turn, frames, picture, exposure, json)?;
             continue;
         }
         for &view in &views {
@@ -143,22 +170,24 @@ pub fn relight(options: &RelightOptions) -> Result<()> {
                 }
                 None => relit(&surface, &own, &light, &camera, view, &picture_settings, &stop),
             };
-            let base = output.join(format!("{}_{stem}", scene.views[view].name));
-            file::write_exr_rgb(&base.with_extension("exr"), &picture.radiance)?;
+            // Names of photos and lights may hold dots: nothing after one is an extension.
+            tell_non_finite(&picture, &scene.views[view].name, json);
+            let path = |extension: &str| output.join(format!("{}_{stem}.{extension}", scene.views[view].name));
+            file::write_exr_rgb(&path("exr"), &picture.radiance)?;
             let bytes = file::srgb8_from_linear(&picture.radiance, options.exposure);
-            file::write_png_srgb8(&base.with_extension("png"), &bytes)?;
-            println!("{}", base.with_extension("png").display());
+            file::write_png_srgb8(&path("png"), &bytes)?;
+            tell_written(&path("png"), json);
         }
     }
     Ok(())
 }
 
 /// Renders pictures and layers of a run, or of the truth of an exchange folder.
-pub fn render(options: &RenderOptions) -> Result<()> {
+pub fn render(options: &RenderOptions, json: bool) -> Result<()> {
     let is_run = RunFolder::open(&options.run).is_ok_and(|folder| folder.is_run());
     let (scene, surface, mut own, strength) = if is_run {
         let folder = RunFolder::open(&options.run)?;
-        let (scene, settings) = camera_scene(&folder, options.cameras.as_deref(), Some(options.read.settings()))?;
+        let (scene, settings) = camera_scene(&folder, options.cameras.as_deref(), &options.read)?;
         let (surface, own) = surface_of(&folder.read_result()?)?;
         (scene, surface, own, if settings.fit.has_lobe() { 1.0 } else { 0.0 })
     } else {
@@ -166,7 +195,8 @@ pub fn render(options: &RenderOptions) -> Result<()> {
         (scene, surface, own, 1.0)
     };
     if let Some(name) = &options.env {
-        let (_, light) = light_of(name, 256)?;
+        let OpenedLight { environment: light, findings, .. } = light_of(name, 256)?;
+        tell_findings(&findings, json);
         own.light = light.radiance.pixels().iter().map(|radiance| radiance.to_array()).collect();
         own.environment_size = (light.width(), light.height());
     }
@@ -189,6 +219,9 @@ pub fn render(options: &RenderOptions) -> Result<()> {
         let needs_light = options.aov.iter().any(|layer| matches!(layer, Layer::Shaded | Layer::Variance));
         let shaded = needs_light
             .then(|| render_picture(&surface, camera, &own, view as u32, &picture_settings, &AtomicBool::new(false)));
+        if let Some(picture) = &shaded {
+            tell_non_finite(picture, name, json);
+        }
         let flat = layers(&surface, camera, &own, 16);
         for layer in &options.aov {
             match (layer, &shaded) {
@@ -206,7 +239,10 @@ pub fn render(options: &RenderOptions) -> Result<()> {
                 (Layer::Shaded | Layer::Variance, None) => {}
             }
         }
-        println!("{name}");
+        match json {
+            true => println!("{}", serde_json::json!({"event": "written", "view": name, "folder": output})),
+            false => println!("{name}"),
+        }
     }
     Ok(())
 }
@@ -227,7 +263,8 @@ fn truth_of(path: &Path, options: &RenderOptions) -> Result<(Scene, Surface, Par
 pub fn compare(options: &CompareOptions, json: bool) -> Result<()> {
     let folder = RunFolder::open(&options.run)?;
     let settings: RunSettings = folder.read_settings()?;
-    let scene = crate::scene::read(&options.scene, &options.read.settings())?;
+    // As the run read it: views that it held out are those that judge it.
+    let scene = crate::scene::read(&options.scene, &options.read.over(settings.read.clone()))?;
     let (surface, own) = surface_of(&folder.read_result()?)?;
     let picture_settings = PictureSettings {
         samples: options.samples,
@@ -249,7 +286,8 @@ pub fn compare(options: &CompareOptions, json: bool) -> Result<()> {
         if json {
             println!(
                 "{}",
-                serde_json::json!({"view": view.name, "held_out": view.held_out, "use": kind, "scores": scores})
+                serde_json::json!({"event": "view", "view": view.name, "held_out": view.held_out, "use": kind,
+                "scores": scores})
             );
         } else {
             let kind = kind.label();
@@ -268,8 +306,13 @@ pub fn compare(options: &CompareOptions, json: bool) -> Result<()> {
     }
     for (name, kind) in [("held-out views", ViewUse::HeldOut), ("training views", ViewUse::Training)] {
         let of_kind: Vec<_> = scored.iter().filter(|(own, _)| *own == kind).map(|(_, scores)| scores).collect();
-        if !of_kind.is_empty() && !json {
-            let score = aggregate(of_kind);
+        if of_kind.is_empty() {
+            continue;
+        }
+        let score = aggregate(of_kind);
+        if json {
+            println!("{}", serde_json::json!({"event": "aggregate", "name": name, "score": score}));
+        } else {
             println!(
                 "{name}: RMSE {:.4}, PSNR {:.2} dB, SSIM {:.3}; scale-aligned {:.4}, {:.2} dB, {:.3}",
                 score.raw.rmse_linear,

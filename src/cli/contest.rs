@@ -243,3 +243,36 @@ pub(super) fn teller(event: &'static str, json: bool) -> impl Fn(&str) {
         false => eprintln!("{text}"),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::contest::read_arguments;
+    use crate::scene::ReadSettings;
+    use crate::scene::settings::{BackgroundChoice, ColourEncoding, MaskUse, PixelCentre, Up};
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        read: ReadOptions,
+    }
+
+    #[test]
+    fn every_option_of_reading_reaches_the_process_of_a_fit() {
+        let read = ReadSettings {
+            up: Up::NegZ,
+            pixel_centre: PixelCentre::Integer,
+            hold_out_every: 5,
+            max_views: 7,
+            masks: MaskUse::Ignore,
+            background: BackgroundChoice::Environment,
+            encoding: ColourEncoding::Linear,
+            shrink: 2,
+        };
+        for read in [read, ReadSettings::default()] {
+            let line = std::iter::once("entry".to_string()).chain(read_arguments(&read));
+            assert_eq!(Line::parse_from(line).read.settings(), read);
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! `patina demo`, `fit` and `resume`: drive a job and show its events.
 
 use super::arguments::{DemoOptions, FitOptions, ResumeOptions};
-use crate::error::{Error, ErrorKind, Place, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::export::RunFolder;
 use crate::fit::{FitSettings, Method, Suited};
 use crate::insight::report::data::ReportData;
@@ -22,21 +22,15 @@ pub fn demo(options: &DemoOptions, json: bool) -> Result<()> {
     let mut settings = demo::settings();
     settings.fit.seed = options.seed;
     if let Some(path) = &options.settings {
-        let text = std::fs::read_to_string(path).map_err(|source| Error::reading(path, source))?;
-        let changes: toml::Table = toml::from_str(&text).map_err(|source| {
-            Error::new(ErrorKind::Malformed, format!("not a settings file: {}", source.message()))
-                .at(Place::File(path.clone()))
-        })?;
-        let chosen: Vec<String> = changes.keys().cloned().collect();
-        if Method::means_adam(&chosen) {
+        let (changed, chosen) = settings.fit.changed_by_file(path)?;
+        settings.fit = changed;
+        if Method::means_adam(&chosen) && !chosen.iter().any(|name| name == "method") {
             settings.fit.method = Method::Paper;
         }
-        let mut table = toml::Table::try_from(&settings.fit).unwrap_or_default();
-        table.extend(changes);
-        settings.fit = FitSettings::from_toml(&table.to_string())?;
     }
     settings.fit.method = options.method.unwrap_or(settings.fit.method);
-    let demo_settings = DemoSettings { seed: options.seed, ..DemoSettings::default() };
+    // By the seed of the fit the scene is made anew when the run is taken up or relit.
+    let demo_settings = DemoSettings { seed: settings.fit.seed, ..DemoSettings::default() };
     let (prepared, fitter, settings) = with_bar(json, |tell| {
         let opened = open::open_demo(&demo_settings, &stop, tell)?;
         open::start_new(opened, settings, &stop, tell)
@@ -76,10 +70,10 @@ pub fn run_settings(options: &FitOptions) -> Result<RunSettings> {
     let mut settings = match &options.settings {
         Some(path) => {
             let text = std::fs::read_to_string(path).map_err(|source| Error::reading(path, source))?;
-            toml::from_str::<RunSettings>(&text).map_err(|source| {
-                Error::new(ErrorKind::Malformed, format!("settings are not understood: {}", source.message()))
-                    .at(Place::File(path.clone()))
-                    .remedy("take the settings.toml of a run folder as a pattern")
+            crate::files::settings_of_toml::<RunSettings>(&text, path).map_err(|error| {
+                let remedy =
+                    "take the settings.toml of a run folder as a pattern: settings of the fit stand under [fit]";
+                Error::new(error.kind(), error.message()).at(error.place().clone()).remedy(remedy)
             })?
         }
         None => RunSettings { fit: FitSettings::preset(options.preset.unwrap_or_default()), ..Default::default() },

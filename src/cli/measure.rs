@@ -38,13 +38,12 @@ pub fn bench_scale(options: &BenchOptions, json: bool) -> Result<()> {
         false => scale::cases_along(&options.triangles, &options.views, &options.maps),
     };
     let extent = if options.whole { scale::Extent::WholeFit } else { scale::Extent::OneStep };
-    let table = scale::run(&cases, &options.methods, extent, &options.output, &|case| {
-        if !json {
-            eprintln!("{case}");
-        }
-    })?;
+    let table = scale::run(&cases, &options.methods, extent, &options.output, &super::contest::teller("scale", json))?;
     table.write(&options.output, "scale")?;
-    println!("{}", table.to_markdown());
+    if !json {
+        println!("{}", table.to_markdown());
+    }
+    super::contest::teller("scale", json)(&format!("table: {}", options.output.join("scale.md").display()));
     Ok(())
 }
 

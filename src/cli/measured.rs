@@ -28,9 +28,9 @@ use std::sync::atomic::AtomicBool;
 pub fn run(task: &MeasuredTask, json: bool) -> Result<()> {
     match task {
         MeasuredTask::List(options) => list(options, json),
-        MeasuredTask::Show(options) => show(options),
-        MeasuredTask::Thumbnails(options) => thumbnails(options),
-        MeasuredTask::Convert(options) => convert(options),
+        MeasuredTask::Show(options) => show(options, json),
+        MeasuredTask::Thumbnails(options) => thumbnails(options, json),
+        MeasuredTask::Convert(options) => convert(options, json),
         MeasuredTask::Fit(options) => fit(options, json),
         MeasuredTask::Project(options) => project(options, json),
         MeasuredTask::Rivals(options) => rivals(options, json),
@@ -82,7 +82,15 @@ fn list(options: &ListOptions, json: bool) -> Result<()> {
     Ok(())
 }
 
-fn show(options: &ShowOptions) -> Result<()> {
+/// Says what was written where: a line of text, or an event.
+fn tell_written(what: &str, path: &Path, json: bool) {
+    match json {
+        true => println!("{}", serde_json::json!({"event": "written", "what": what, "path": path})),
+        false => println!("{what}: {}", path.display()),
+    }
+}
+
+fn show(options: &ShowOptions, json: bool) -> Result<()> {
     let (table, name) = table_of(&options.source)?;
     let light = light_of(options.env.as_ref())?;
     let value = |at| table.lookup(at).unwrap_or_default();
@@ -90,11 +98,11 @@ fn show(options: &ShowOptions) -> Result<()> {
     file::write_png_srgb8(&options.output.join("sphere.png"), &picture)?;
     write_bytes(&options.output.join("lobes.svg"), pictures::lobes_svg(&[(&name, &value)]).as_bytes())?;
     write_bytes(&options.output.join("lobes.csv"), pictures::lobes_csv(&value).as_bytes())?;
-    println!("{name}: {} cells measured: {}", table.counted_cells().len(), options.output.display());
+    tell_written(&format!("{name}: {} cells measured", table.counted_cells().len()), &options.output, json);
     Ok(())
 }
 
-fn thumbnails(options: &ThumbnailOptions) -> Result<()> {
+fn thumbnails(options: &ThumbnailOptions, json: bool) -> Result<()> {
     let fits = NeuralFits::read(&options.library)?;
     let light = light_of(options.env.as_ref())?;
     let tiles: Vec<_> = fits
@@ -107,14 +115,14 @@ fn thumbnails(options: &ThumbnailOptions) -> Result<()> {
         })
         .collect();
     file::write_png_srgb8(&options.output, &pictures::sheet(&tiles, None))?;
-    println!("{} materials: {}", tiles.len(), options.output.display());
+    tell_written(&format!("{} materials", tiles.len()), &options.output, json);
     Ok(())
 }
 
-fn convert(options: &ConvertOptions) -> Result<()> {
+fn convert(options: &ConvertOptions, json: bool) -> Result<()> {
     let (table, name) = table_of(&options.source)?;
     table.write(&options.output)?;
-    println!("{name}: {}", options.output.display());
+    tell_written(&name, &options.output, json);
     Ok(())
 }
 

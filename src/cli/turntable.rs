@@ -46,6 +46,7 @@ pub fn write(
     frames: u32,
     picture: &PictureSettings,
     exposure_stops: f32,
+    json: bool,
 ) -> Result<()> {
     let settings = TurntableSettings {
         frames: frames as usize,
@@ -56,7 +57,7 @@ pub fn write(
     let display = DisplaySettings { exposure_stops, ..Default::default() };
     let stop = AtomicBool::new(false);
     for path in write_turntable(folder, surface, lit, regions, &settings, picture, &display, &stop, &|_| {})? {
-        println!("{}", path.display());
+        super::commands::tell_written(&path, json);
     }
     Ok(())
 }

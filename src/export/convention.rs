@@ -17,7 +17,18 @@ FILES
   mesh.obj       the surface with its atlas coordinates, in world units
   seen.exr       how many photographs saw a texel; 0: never seen, the maps there are filled in, not measured
   loss.csv       the loss of every step;  report.json, report.html  scores;  settings.toml  settings of the run
+  capture.csv    how each photograph lies against the model's picture: shift, roll, gain, doubtful mask
   checkpoint     state to resume from
+  earlier        the result that was here before, until a new fit has its own
+
+FILES OF THE SOLVER
+  diffuse_deviation.exr, specular_deviation.exr, roughness_deviation.exr
+                 standard deviations of the maps, in their units; 1.645 of them either way hold nine tenths
+  lobe_sharing.exr  number of texels that share a texel's lobe; 0 where no photograph shows the texel best
+  choices.exr    what views that took no part chose: 1 no lobe, 2 one lobe a region, 3 lobes of their own, 0 not judged
+  environment_evidence.exr  what a texel of the light is known by: highlights (red), background (green), diffuse light
+                 and shadows (blue), as shares of 1; the rest is belief
+  light_scale.json  relative deviation of the factor that light and reflectance have in common; null: left open
 
 REFLECTION
   f = rho_d / pi + D F G / (4 (n.i)(n.o)),   without the cosine
@@ -59,6 +70,9 @@ mod tests {
     fn the_sheet_starts_with_its_mark_and_fits_a_terminal() {
         assert!(SHEET.starts_with(FIRST_LINE));
         assert!(SHEET.lines().all(|line| line.chars().count() <= 120));
+        for word in super::super::run_folder::earlier::files_of_a_run() {
+            assert!(SHEET.contains(word), "{word}");
+        }
         for word in ["roughness.exr", "sqrt(a) = r^(1/4)", "linear", "+y up", "SCALE"] {
             assert!(SHEET.contains(word), "{word}");
         }

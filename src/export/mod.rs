@@ -5,8 +5,8 @@
 //! beside the maps, so that nobody has to guess what roughness means. [`exchange`]
 //! writes a scene and its truth for other renderers.
 //!
-//! What this folder refuses to do: it deletes nothing, and it writes into no folder that holds other things. Every file
-//! is written whole or not at all.
+//! What this folder refuses to do: it deletes nothing but an earlier result once a newer one is whole, and it writes into
+//! no folder that holds other things. Every file is written whole or not at all.
 
 pub mod convention;
 pub mod exchange;

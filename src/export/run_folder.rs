@@ -13,8 +13,10 @@
 //! | `light_scale.json` | how far photos leave the factor open that light and reflectance have in common: `relative_deviation`, null where they say nothing | `patina fit --method solver`, at its end |
 //! | `loss.csv` | the loss of every step | `patina fit` |
 //! | `capture.csv` | how each photo lies against the model's picture: shift, roll, gain, doubtful mask | `patina fit`, at its end |
-//! | `report.json report.html` | scores and pictures | `patina fit`, `patina compare` |
+//! | `report.json report.html` | scores and pictures | `patina fit`, at its end |
+//! | `earlier` | the result that was here before, a run folder of its own | `patina fit` at its start, until its end |
 
+pub(super) mod earlier;
 mod stated;
 
 use super::{LossRow, convention, loss_log, obj};
@@ -24,6 +26,8 @@ use crate::light::Environment;
 use crate::material::MaterialMaps;
 use crate::scene::Mesh;
 use std::path::{Path, PathBuf};
+
+pub use earlier::EARLIER;
 
 /// What a fit found.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,8 +49,8 @@ pub struct RunFolder {
 }
 
 impl RunFolder {
-    /// Makes a run folder, or takes one that is there already. Nothing in it is deleted; a file is replaced when its
-    /// successor is complete.
+    /// Makes a run folder, or takes one that is there already. Nothing in it is deleted; a result in it is set aside by a
+    /// new fit ([`Self::set_result_aside`]), and each file is replaced when its successor is complete.
     ///
     /// # Errors
     /// `Unwritable` when the folder cannot be made, or when it holds other things than a run: a scene's own `mesh.obj`
@@ -67,7 +71,7 @@ impl RunFolder {
             }
         }
         std::fs::create_dir_all(path).map_err(|source| Error::writing(path, source))?;
-        crate::files::write_bytes(&folder.file("convention.txt"), convention::SHEET.as_bytes())?;
+        crate::files::write_bytes(&folder.file(MARK_FILE), convention::SHEET.as_bytes())?;
         Ok(folder)
     }
 
@@ -85,8 +89,7 @@ impl RunFolder {
 
     /// Whether the folder bears the mark of a run.
     pub fn is_run(&self) -> bool {
-        std::fs::read(self.file("convention.txt"))
-            .is_ok_and(|bytes| bytes.starts_with(convention::FIRST_LINE.as_bytes()))
+        std::fs::read(self.file(MARK_FILE)).is_ok_and(|bytes| bytes.starts_with(convention::FIRST_LINE.as_bytes()))
     }
 
     /// Whether every file of a [`RunResult`] is there.
@@ -129,10 +132,15 @@ impl RunFolder {
     pub fn read_result(&self) -> Result<RunResult> {
         let missing: Vec<&str> = RESULT_FILES.into_iter().filter(|name| !self.file(name).is_file()).collect();
         if let Some(first) = missing.first() {
-            let remedy = if self.checkpoint_path().is_file() {
-                "the fit has not ended: go on with `patina resume RUN`"
-            } else {
-                "make the run again with `patina fit SCENE -o RUN`"
+            let remedy = match (self.checkpoint_path().is_file(), self.has_earlier()) {
+                (true, false) => "the fit has not ended: go on with `patina resume RUN`",
+                (true, true) => {
+                    "the fit has not ended: go on with `patina resume RUN`, or name RUN/earlier, the result before it"
+                }
+                (false, false) => "make the run again with `patina fit SCENE -o RUN`",
+                (false, true) => {
+                    "make the run again with `patina fit SCENE -o RUN`, or name RUN/earlier, the result before"
+                }
             };
             let message = format!("the run has no {}", missing.join(", no "));
             return Err(Error::new(ErrorKind::Missing, message).at(Place::File(self.file(first))).remedy(remedy));
@@ -190,12 +198,18 @@ impl RunFolder {
 
     /// Reads `report.json`. An error names the line.
     pub fn read_report_json<T: serde::de::DeserializeOwned>(&self) -> Result<T> {
-        let text = self.read_text("report.json", "patina compare RUN SCENE")?;
+        let command = self.command_for_a_report();
+        let text = self.read_text("report.json", command)?;
         serde_json::from_str(&text).map_err(|source| {
             Error::new(ErrorKind::Malformed, source.to_string())
                 .at(Place::Line(self.file("report.json"), source.line()))
-                .remedy("make it again with `patina compare RUN SCENE`")
+                .remedy(format!("make it again with `{command}`"))
         })
+    }
+
+    /// What makes a report: the end of a fit.
+    fn command_for_a_report(&self) -> &'static str {
+        if self.checkpoint_path().is_file() { "patina resume RUN" } else { "patina fit SCENE -o RUN" }
     }
 
     fn read_text(&self, name: &str, command: &str) -> Result<String> {
@@ -212,7 +226,12 @@ impl RunFolder {
     }
 }
 
+/// How each photograph lies against the model's picture.
+pub const CAPTURE_FILE: &str = "capture.csv";
+/// The mark of a run folder: [`convention::SHEET`].
+const MARK_FILE: &str = "convention.txt";
 const RESULT_FILES: [&str; 6] = ["diffuse.exr", "specular.exr", "roughness.exr", "seen.exr", "env.exr", "mesh.obj"];
+
 /// The same error with the command that makes the file as its remedy, where the file is missing or damaged.
 fn made_by(error: Error, command: &str) -> Error {
     if !matches!(error.kind(), ErrorKind::Missing | ErrorKind::Malformed) {

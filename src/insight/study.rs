@@ -42,6 +42,8 @@ pub struct StudyTable {
     /// The measures.
     pub columns: Vec<Column>,
     rows: Vec<(String, Vec<Vec<f64>>)>,
+    /// What several values of a cell are, and what is printed of them: a sentence.
+    caption: String,
     /// Sentences below the table: what was run, what it shows.
     pub notes: Vec<String>,
 }
@@ -54,8 +56,14 @@ impl StudyTable {
             row_heading: row_heading.into(),
             columns: columns.iter().map(|(name, unit)| Column { name: (*name).into(), unit: (*unit).into() }).collect(),
             rows: Vec::new(),
+            caption: "Median over seeds, in brackets the quartiles.".into(),
             notes: Vec::new(),
         }
+    }
+
+    /// The same table with another sentence about what several values of a cell are: by default they are of seeds.
+    pub fn with_caption(self, caption: &str) -> Self {
+        StudyTable { caption: caption.into(), ..self }
     }
 
     /// Adds the values of one seed to a row, one a column; the row is made when it is new. Missing values become NaN,
@@ -120,7 +128,7 @@ impl StudyTable {
         if self.rows.is_empty() {
             text += "\nNo case was run.\n";
         }
-        text += "\nMedian over seeds, in brackets the quartiles.\n";
+        text += &format!("\n{}\n", self.caption);
         for note in &self.notes {
             text += &format!("\n{note}\n");
         }
@@ -255,6 +263,9 @@ mod tests {
         let markdown = table.to_markdown();
         assert!(markdown.contains("| none | 0.3 (0.2 – 0.4) | 12 (11 – 13) |"), "{markdown}");
         assert!(markdown.contains("20 (20 – 20), 1 failed"), "{markdown}");
+        assert!(markdown.contains("Median over seeds"));
+        let once = table.clone().with_caption("One value a case.").to_markdown();
+        assert!(once.contains("One value a case.") && !once.contains("seeds"), "{once}");
         let mut partial = table.clone();
         partial.add_some("rays alone", &[Some(7.0)]);
         assert!(partial.to_markdown().contains("| rays alone | 7 | – |"), "{}", partial.to_markdown());

@@ -176,16 +176,19 @@ pub fn start_new(
 /// # Errors
 /// A setting out of range, a known light that cannot be read; `Stopped` when the flag is raised.
 pub fn begin(
-    prepared: Prepared,
+    mut prepared: Prepared,
     settings: RunSettings,
     stop: &AtomicBool,
     tell: Tell,
 ) -> Result<(Prepared, Fitter, RunSettings)> {
     settings.fit.validate()?;
-    let known_light = match settings.known_light.as_os_str().is_empty() {
-        true => None,
-        false => Some(Environment::read(&settings.known_light)?.0),
-    };
+    let mut known_light = None;
+    if !settings.known_light.as_os_str().is_empty() {
+        let (light, findings) = Environment::read(&settings.known_light)?;
+        // A light whose sun is clipped gives other maps: who gave it hears of it.
+        prepared.findings.extend(findings);
+        known_light = Some(light);
+    }
     let (scene, surface) = (Arc::clone(&prepared.scene), Arc::clone(&prepared.surface));
     let fitter =
         told(OpenStage::Start, stop, tell, || Fitter::new(scene, surface, settings.fit.clone(), known_light.as_ref()))?;

@@ -1,6 +1,6 @@
 //! Pictures of a run under its own light and under others.
 
-use crate::error::Result;
+use crate::error::{Finding, Result};
 use crate::export::RunResult;
 use crate::light::Environment;
 use crate::light::sky::{SkySettings, sun_and_sky};
@@ -24,8 +24,19 @@ pub fn surface_of(result: &RunResult) -> Result<(Surface, Parameters<f32>)> {
     Ok((surface, parameters(&result.maps, &result.environment)))
 }
 
+/// A light that was read or made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OpenedLight {
+    /// The name of the sky, or of the file without its ending.
+    pub name: String,
+    /// The light.
+    pub environment: Environment,
+    /// What was noticed on reading: texels that were repaired, a range that holds no sun.
+    pub findings: Vec<Finding>,
+}
+
 /// A light by its file, or by the name of a built-in sky: `noon`, `evening` or `overcast`.
-pub fn light_of(name: &str, height: usize) -> Result<(String, Environment)> {
+pub fn light_of(name: &str, height: usize) -> Result<OpenedLight> {
     let sky = match name {
         "noon" => Some(SkySettings::noon()),
         "evening" => Some(SkySettings::evening()),
@@ -33,14 +44,17 @@ pub fn light_of(name: &str, height: usize) -> Result<(String, Environment)> {
         _ => None,
     };
     match sky {
-        Some(sky) => Ok((name.into(), sun_and_sky(2 * height, height, &sky))),
+        Some(sky) => {
+            let environment = sun_and_sky(2 * height, height, &sky);
+            Ok(OpenedLight { name: name.into(), environment, findings: Vec::new() })
+        }
         None => {
             let path = Path::new(name);
-            let (environment, _) = Environment::read(path)?;
-            let stem = path.file_stem().map_or_else(|| name.into(), |stem| stem.to_string_lossy().into_owned());
+            let (environment, findings) = Environment::read(path)?;
+            let name = path.file_stem().map_or_else(|| name.into(), |stem| stem.to_string_lossy().into_owned());
             let environment =
                 if environment.height() > height { environment.resampled(2 * height, height) } else { environment };
-            Ok((stem, environment))
+            Ok(OpenedLight { name, environment, findings })
         }
     }
 }

@@ -15,7 +15,7 @@ use std::time::Instant;
 
 /// Everything a run was started with: `settings.toml` of the run folder.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, rename_all = "kebab-case")]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct RunSettings {
     /// The scene's folder or file; empty for a scene made in code.
     pub scene: PathBuf,

@@ -106,7 +106,8 @@ pub fn study_table(rows: &[RivalRow]) -> StudyTable {
             ("sphere, log-RMSE", ""),
             ("parameters", ""),
         ],
-    );
+    )
+    .with_caption("Median over materials, in brackets the quartiles.");
     for row in rows {
         let error = row.error;
         let [displayed, log] = row.sphere.map_or([f64::NAN; 2], |sphere| [sphere.displayed_rmse, sphere.log_rmse]);
@@ -119,7 +120,6 @@ pub fn study_table(rows: &[RivalRow]) -> StudyTable {
             summary.model, summary.mean, summary.median, summary.largest, summary.materials
         ));
     }
-    table.notes.push("One value a material; medians and quartiles are over materials.".into());
     table.notes.push(DATA_STATEMENT.into());
     table
 }

@@ -1,12 +1,12 @@
 //! How time and memory grow with triangles, views and maps: `patina bench scale`.
 //!
 //! Scenes are bumpy spheres in code with exact triangle counts; photographs are one colour, since only cost is looked
-//! at. Peak memory is that of the whole process so far, so cases run from small to large.
+//! at. Peak memory is that of the whole process so far, that is, of the largest case up to there.
 
 use super::contest::Contestant;
 use super::prepare::timed;
 use crate::atlas::{self, AtlasSettings};
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::{Error, ErrorKind, Place, Result};
 use crate::fit::settings::Steps;
 use crate::fit::{FitSettings, Fitter, StepOutcome};
 use crate::image::Image;
@@ -67,7 +67,11 @@ pub enum Extent {
     WholeFit,
 }
 
-/// Runs the cases by each method and gathers seconds and memory; `tell` hears of each case before it runs.
+/// Runs the cases by each method and writes seconds and memory to `folder`, anew after each; `tell` hears of each case
+/// before it runs.
+///
+/// # Errors
+/// A case of no triangles, views or texels; files that cannot be written.
 pub fn run(
     cases: &[ScaleCase],
     methods: &[Contestant],
@@ -75,16 +79,23 @@ pub fn run(
     folder: &Path,
     tell: &dyn Fn(&str),
 ) -> Result<StudyTable> {
+    for &ScaleCase { triangles, views, map_size } in cases {
+        for (name, value) in [("triangles", triangles), ("views", views), ("maps", map_size)] {
+            if value == 0 {
+                return Err(Error::new(ErrorKind::InvalidSetting, "must be at least 1").at(Place::Setting(name.into())));
+            }
+        }
+    }
     let columns = [
         ("mesh file read", "s"),
         ("atlas", "s"),
         ("tracer", "s"),
         ("prepare fit", "s"),
         (if extent == Extent::WholeFit { "whole fit" } else { "one step" }, "s"),
-        ("peak memory", "MiB"),
+        ("peak memory so far", "MiB"),
     ];
     let title = format!("Growth with triangles, views and maps, {} threads", rayon::current_num_threads());
-    let mut table = StudyTable::new(&title, "case", &columns);
+    let mut table = StudyTable::new(&title, "case", &columns).with_caption("One value a case, in the order they ran.");
     for &case in cases {
         for &method in methods {
             let name = format!(
@@ -107,6 +118,8 @@ pub fn run(
             let mut row: Vec<f64> = timings.iter().map(|time| time.seconds).collect();
             row.push(peak_bytes().map_or(f64::NAN, |bytes| bytes as f64 / (1 << 20) as f64));
             table.add(&name, &row);
+            // Whoever stops a later case keeps this one.
+            table.write(folder, "scale")?;
         }
     }
     Ok(table)

@@ -180,8 +180,8 @@ pub(super) fn relit_strips(
     let turned = |degrees: f32| (format!("the fitted light turned by {degrees} degrees"), degrees.to_radians());
     let mut lights = Vec::new();
     for name in ["noon", "evening", "overcast"] {
-        let (name, light) = light_of(name, settings.fit.environment_height.max(64))?;
-        lights.push((format!("built-in sky: {name}"), matched(&light, &result.environment).0));
+        let sky = light_of(name, settings.fit.environment_height.max(64))?;
+        lights.push((format!("built-in sky: {}", sky.name), matched(&sky.environment, &result.environment).0));
     }
     for (name, radians) in [turned(90.0), turned(180.0)] {
         lights.push((name, result.environment.rotated_about_up(radians)));

@@ -127,6 +127,9 @@ impl Worker {
     fn run(mut self, mut prepared: Prepared) -> Result<()> {
         // Nothing is lost yet: a folder that cannot be written is an error here, and a warning from now on.
         let steps_done = self.fitter.state().step;
+        if steps_done == 0 {
+            self.saver.folder().set_result_aside()?;
+        }
         crate::export::obj::write(&self.saver.folder().file("mesh.obj"), self.fitter.surface().mesh())?;
         if steps_done == 0 {
             // The checkpoint of an earlier run in the folder must not be taken for one of this run.
@@ -189,7 +192,14 @@ impl Worker {
         let folder = self.saver.folder();
         let tell = |event: Event| self.teller.send(event);
         match outcome::write(&self.fitter, prepared, &self.settings, folder, self.began, &self.stop, &tell) {
-            Ok(data) => self.teller.send(Event::Finished(Box::new(data))),
+            Ok(data) => {
+                if let Err(error) = folder.remove_earlier() {
+                    let message = format!("the result before this one was not removed: {}", error.message());
+                    let finding = Finding::new(Severity::Note, "earlier-result-stays", message);
+                    self.teller.send(Event::Finding(finding.at(error.place().clone())));
+                }
+                self.teller.send(Event::Finished(Box::new(data)));
+            }
             // All steps are done and saved: who stops now gives up the report, and nothing failed.
             Err(error) if error.kind() == ErrorKind::Stopped => {
                 let finding = Finding::new(Severity::Note, "report-not-made", error.message());

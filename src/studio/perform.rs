@@ -159,7 +159,13 @@ fn perform_on_view(act: Act, model: &mut Model) {
         Act::LayerSpecular => edits.layer = Layer::Specular,
         Act::LayerRoughness => edits.layer = Layer::Roughness,
         Act::LayerNormal => edits.layer = Layer::Normal,
-        Act::LayerTimesSeen => edits.layer = Layer::TimesSeen,
+        Act::LayerTimesSeen => {
+            edits.layer = Layer::TimesSeen;
+            // A run that was opened brings its own.
+            if model.project.as_ref().is_some_and(|project| project.times_seen.is_none()) {
+                model.measure_layers();
+            }
+        }
         Act::LayerDiffuseDeviation => edits.layer = Layer::DiffuseDeviation,
         Act::LayerSpecularDeviation => edits.layer = Layer::SpecularDeviation,
         Act::LayerRoughnessDeviation => edits.layer = Layer::RoughnessDeviation,

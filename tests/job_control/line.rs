@@ -1,12 +1,14 @@
 //! What is typed, against presets and files.
 
 use clap::Parser;
+use patina::Place;
 use patina::cli::arguments::{Arguments, Task};
 use patina::cli::fit::{run_settings, suit};
 use patina::fit::{FitSettings, Method, Preset};
 use patina::image::Image;
 use patina::job::open::OpenedScene;
-use patina::scene::{Photo, Scene};
+use patina::scene::settings::{ColourEncoding, MaskUse, Up};
+use patina::scene::{Photo, ReadSettings, Scene};
 
 #[test]
 fn what_is_typed_wins_over_a_preset_and_over_a_file() {
@@ -39,6 +41,39 @@ fn what_is_typed_wins_over_a_preset_and_over_a_file() {
 }
 
 #[test]
+fn how_a_scene_is_read_can_be_typed() {
+    let of = |more: &[&str]| {
+        let words = ["patina", "fit", "scene", "-o", "run"].iter().chain(more);
+        let Some(Task::Fit(options)) = Arguments::try_parse_from(words).unwrap().task else { unreachable!() };
+        run_settings(&options).unwrap().read
+    };
+    assert_eq!(of(&[]), ReadSettings::default());
+    assert_eq!(of(&["--up", "-Z"]).up, Up::NegZ, "as the remedies of the reader name it");
+    assert_eq!(of(&["--up", "+x"]).up, Up::X);
+    let read = of(&["--masks", "ignore", "--encoding", "linear"]);
+    assert_eq!((read.masks, read.encoding), (MaskUse::Ignore, ColourEncoding::Linear));
+}
+
+#[test]
+fn a_settings_file_of_another_form_is_refused_with_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("settings.toml");
+    let of = |text: &str| {
+        patina::files::write_bytes(&file, text.as_bytes()).unwrap();
+        let words = ["patina", "fit", "scene", "-o", "run", "--settings", file.to_str().unwrap()];
+        let Some(Task::Fit(options)) = Arguments::try_parse_from(words).unwrap().task else { unreachable!() };
+        run_settings(&options)
+    };
+    // As `bench fit` and `demo` read it: without sections it would set nothing here.
+    for (text, line) in [("map-size = 512\n", 1), ("[read]\n[Fit]\n", 2), ("[atlas]\nkep_uv = \"keep\"\n", 2)] {
+        let error = of(text).unwrap_err();
+        assert_eq!(error.place(), &Place::Line(file.clone(), line), "{error}");
+        assert!(error.remedy_text().contains("[fit]"), "{error}");
+    }
+    assert_eq!(of("[fit]\nmap-size = 512\n").unwrap().fit.map_size, 512);
+}
+
+#[test]
 fn photos_are_given_to_the_solver_unless_something_else_was_asked_for() {
     let linear = crate::support::scene().0;
     let mut bytes = Scene::clone(&linear);
@@ -46,6 +81,7 @@ fn photos_are_given_to_the_solver_unless_something_else_was_asked_for() {
     bytes.views[0].photo = Photo::Srgb8(Image::filled(size.0, size.1, [90; 3]));
     let of = |scene: &Scene, more: &[&str]| suited(scene, None, more).method;
     assert_eq!(of(&linear, &[]), Method::Solver);
+    assert_eq!(of(&linear, &["--light-smoothness", "0.1"]), Method::Paper, "the solver has a wish of its own");
     assert_eq!(of(&linear, &["--map-size", "64", "--preset", "careful"]), Method::Solver);
     assert_eq!(of(&linear, &["--method", "paper"]), Method::Paper);
     assert_eq!(of(&linear, &["--consistency", "exact"]), Method::Paper, "the solver knows no consistency");

@@ -133,6 +133,8 @@ fn every_act_does_something(way: Way) {
         model.switches.looking_through = false;
         studio.press(Modifiers::NONE, Key::Escape);
         if was_left || info.act == Act::Start {
+            // What is open would stay until the run is read.
+            studio.model().close();
             studio.model().open(finished_run().into());
             studio.wait("the run", |model| model.project.is_some());
         }

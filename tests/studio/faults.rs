@@ -1,11 +1,15 @@
 //! What goes wrong while the window is open: it lives, says so with a remedy, and the last checkpoint stays.
 
-use super::support::{ENDLESS, TestStudio, write_small_scene};
+use super::support::{ENDLESS, TestStudio, small_scene, write_small_scene};
 use patina::files::{temporary_beside, write_bytes};
+use patina::studio::act::Act;
+use patina::studio::act::availability::availability;
 use patina::studio::model::FitStatus;
+use patina::studio::model::opening::PREPARING_TITLE;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 /// Pauses and waits until the worker holds; its checkpoint is written then.
 fn pause(studio: &mut TestStudio) {
@@ -174,7 +178,7 @@ fn a_scene_that_vanished_keeps_its_run_from_going_on_and_says_what_to_do() {
     // Opened anew, the run shows its maps, and says why it cannot go on.
     let run = studio.run_folder();
     studio.model().open(run);
-    studio.wait("the run", |model| model.project.is_some());
+    studio.wait("the run", |model| model.project.as_ref().is_some_and(|own| own.is_run && own.scene.is_none()));
     assert!(studio.model().project.as_ref().unwrap().maps.is_some());
     assert!(studio.is_grey("Go on from the checkpoint"));
     studio.click("Photos");
@@ -236,15 +240,43 @@ fn a_run_that_a_crash_interrupted_is_found_at_the_next_start_and_goes_on() {
 }
 
 #[test]
-fn a_preparation_that_is_cancelled_leaves_a_scene_that_says_so() {
-    let mut studio = TestStudio::opening(Some(super::support::small_scene().into()));
-    studio.wait("the scene", |model| model.project.is_some());
-    studio.model().tasks.stop_all();
-    studio.frames(3);
-    // Nothing is prepared: the button is grey rather than dead.
-    if studio.model().project.as_ref().unwrap().surface.is_none() {
-        assert!(studio.is_grey("Start the fit"));
+fn what_is_no_scene_leaves_the_open_one_and_its_fit_alone() {
+    let mut studio = TestStudio::with_running_fit();
+    let (run, folder) = (studio.run_folder(), studio.folder.path().to_path_buf());
+    let (paper, damaged) = (folder.join("paper.pdf"), folder.join("damaged"));
+    write_bytes(&paper, b"no scene").unwrap();
+    // A folder that calls itself a scene, and cannot be read.
+    std::fs::create_dir(&damaged).unwrap();
+    write_bytes(&damaged.join("scene.toml"), b"= no settings").unwrap();
+    for (path, name) in [(paper, "paper.pdf"), (damaged, "damaged")] {
+        studio.model().dropped(path);
+        studio.wait("the error", |model| model.log.banner().is_some());
+        assert!(studio.log().contains(name), "{}", studio.log());
+        studio.click("Dismiss");
+        let done = studio.steps_done();
+        studio.wait_for_step(done + 1);
+        assert_eq!(studio.model().fit.status, FitStatus::Running);
+        assert_eq!(studio.run_folder(), run);
     }
-    studio.act(patina::studio::act::Act::CloseProject);
+}
+
+#[test]
+fn a_preparation_that_is_cancelled_leaves_a_scene_that_says_so() {
+    let mut studio = TestStudio::new();
+    studio.model().open(small_scene().into());
+    // News are taken in by hand: with the scene, nothing can have come that was prepared of it.
+    let began = Instant::now();
+    while studio.model().project.is_none() {
+        assert!(began.elapsed() < Duration::from_secs(240), "{}", studio.log());
+        std::thread::sleep(Duration::from_millis(5));
+        studio.model().poll();
+    }
+    studio.model().tasks.stop(PREPARING_TITLE);
+    studio.frames(3);
+    // The button is grey rather than dead, and says what helps.
+    assert!(studio.is_grey("Start the fit"));
+    let why = availability(Act::Start, studio.model()).unwrap_err();
+    assert!(why.contains("open it again"), "{why}");
+    studio.act(Act::CloseProject);
     studio.control("Open the built-in demo");
 }

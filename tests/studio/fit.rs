@@ -102,6 +102,23 @@ fn a_fit_goes_on_after_a_stop_with_settings_changed_in_between() {
 }
 
 #[test]
+fn after_a_stop_a_new_run_takes_the_settings_that_a_checkpoint_does_not() {
+    let mut studio = TestStudio::with_running_fit();
+    studio.click("Stop");
+    studio.wait("the end", |model| model.fit.status == FitStatus::Stopped);
+    let stopped = studio.run_folder();
+    studio.click("Map size");
+    studio.click("128 x 128");
+    studio.click("Start anew");
+    let before = stopped.clone();
+    studio.wait("the new run", move |model| model.fit.folder.as_ref().is_some_and(|own| own.path() != before));
+    studio.wait_for_step(1);
+    assert_eq!(studio.log().matches("The fit begins").count(), 2, "{}", studio.log());
+    assert_eq!(studio.model().project.as_ref().unwrap().settings.fit.map_size, 128);
+    assert!(stopped.join("checkpoint").is_file(), "the run before stays");
+}
+
+#[test]
 fn a_setting_changes_while_the_fit_runs_and_what_cannot_change_is_grey() {
     let mut studio = TestStudio::with_running_fit();
     for fixed in ["Map size", "Quick", "Balanced", "Careful"] {

@@ -1,6 +1,7 @@
 //! The manners of a good tool: undo, the palette, themes, help, zoom, the stage alone.
 
 use super::support::{Key, Modifiers, TestStudio};
+use patina::image::histogram::auto_exposure;
 use patina::studio::act::{Act, LIST};
 use patina::studio::layout::Panel;
 use patina::studio::model::Dialog;
@@ -156,5 +157,8 @@ fn display_keys_change_what_they_say() {
     studio.press(Modifiers::NONE, Key::R);
     assert_eq!(studio.model().edits.display, patina::image::display::DisplaySettings::default());
     studio.press(Modifiers::NONE, Key::N);
-    assert!(studio.model().edits.display.exposure_stops.is_finite());
+    let project = studio.model().project.as_ref().unwrap();
+    let measured = auto_exposure(&project.thumbnails[project.chosen_view]);
+    assert!(measured != 0.0 && measured.abs() <= 20.0, "{measured}");
+    assert_eq!(studio.model().edits.display.exposure_stops, measured);
 }

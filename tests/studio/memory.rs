@@ -65,6 +65,11 @@ fn a_remembered_light_that_vanished_is_told_and_the_others_are_there() {
     studio.wait("the error", |model| model.log.banner().is_some());
     assert!(studio.says("gone.hdr") && studio.says("What helps"), "{}", studio.log());
     assert_eq!(studio.model().shelf.lights().len(), 3);
+    // Told once: the next start does without it.
+    assert!(studio.log().contains("no longer remembered") && studio.model().preferences.lights.is_empty());
+    let mut again = TestStudio::in_folder(studio.close(), None);
+    again.wait("what is read at the start", |model| !model.tasks.is_busy());
+    assert!(again.model().log.banner().is_none(), "{}", again.log());
 }
 
 #[test]

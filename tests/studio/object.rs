@@ -186,7 +186,8 @@ fn a_result_that_cannot_be_written_is_kept_and_can_be_saved_elsewhere() {
     let elsewhere = studio.folder.path().join("elsewhere");
     studio.click("Save result to…");
     studio.replace_text("Path", &elsewhere.display().to_string());
-    studio.click("Open this");
+    assert!(!studio.says("A folder or file can also be dropped"), "nothing is dropped to be written");
+    studio.click("Save here");
     studio.wait_for_word("Saved");
     assert!(elsewhere.join("object.json").is_file() && result_folder(&mut studio) == elsewhere);
 }
@@ -357,7 +358,7 @@ fn both_workspaces_keep_what_is_theirs() {
     studio.act(Act::OpenPhoto);
     studio.frames(2);
     studio.replace_text("Path", &folder.join("ball.exr").display().to_string());
-    studio.click("Open this");
+    studio.click("Add this");
     assert_eq!(studio.model().edits.object.photos.len(), 1);
     studio.act(Act::OpenDemo);
     assert_eq!(studio.model().workspace, Workspace::Scene, "a scene is shown where scenes are");

@@ -14,6 +14,7 @@ use patina::studio::act::Act;
 use patina::studio::layout::Panel;
 use patina::studio::model::Workspace;
 use patina::studio::model::object::ObjectStatus;
+use patina::studio::model::object_form::Effort;
 use std::path::Path;
 
 /// Side of the photo of the mesh in pixels, and its field of view in radians.
@@ -58,6 +59,7 @@ fn a_finished_result_is_opened_again_from_its_folder() {
     }
     let form = again.model().edits.object.clone();
     assert!(form.photos.len() == 1 && form.is_sphere && form.photos[0].ends_with("ball.exr"), "{form:?}");
+    assert_eq!((form.effort, form.light_rows, form.pixels), (Effort::Quick, Some(16), Some(300)), "its settings");
     again.wait("the relit pictures", |model| !model.object.relit.is_empty());
     again.act(Act::PanelStarts);
     assert!(again.says("What the photo leaves open") && again.says("Starts that were followed"));

@@ -1,6 +1,7 @@
 //! Each panel, empty and filled.
 
 use super::support::{Key, Modifiers, Role, TestStudio};
+use eframe::egui::accesskit::Toggled;
 use eframe::egui::{Event, PointerButton, Pos2};
 use egui_kittest::kittest::NodeT;
 use patina::error::{Finding, Place, Severity};
@@ -58,7 +59,7 @@ fn maps_are_switched_by_their_buttons() {
         studio.control("Map");
     }
     studio.click("Seen");
-    assert!(studio.control("Seen").accesskit_node().toggled().is_some());
+    assert_eq!(studio.control("Seen").accesskit_node().toggled(), Some(Toggled::True));
     studio.click("Borders");
     assert!(studio.model().switches.chart_borders);
     studio.press(Modifiers::NONE, Key::B);

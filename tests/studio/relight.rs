@@ -128,7 +128,7 @@ fn a_light_comes_by_path_or_by_drop_lights_the_stage_and_goes_again() {
     studio.press(Modifiers::COMMAND, Key::L);
     assert!(studio.says("Add an HDR map to the shelf"));
     studio.type_text(&by_path.display().to_string());
-    studio.click("Open this");
+    studio.click("Add this");
     studio.wait_for_word("Left is on the shelf");
     studio.click_role(Role::RadioButton, "left");
     assert_eq!(studio.model().edits.relight.first, LightName::File(by_path.clone()));
@@ -144,6 +144,29 @@ fn a_light_comes_by_path_or_by_drop_lights_the_stage_and_goes_again() {
     assert!(studio.controls("left").is_empty());
     assert_eq!(studio.model().edits.relight.first, LightName::Fitted, "what lit the stage is gone");
     assert_eq!(studio.model().preferences.lights.len(), 1);
+}
+
+#[test]
+fn what_is_read_for_the_shelf_outlives_the_scene_that_is_closed() {
+    let mut studio = TestStudio::with_finished_run();
+    let path = write_light(studio.folder.path(), "late.hdr");
+    // No frame between the two takes it in.
+    studio.model().add_light(path.clone());
+    studio.model().close();
+    studio.wait_for_word("Late is on the shelf");
+    assert!(studio.model().project.is_none());
+    assert!(studio.model().shelf.find(&LightName::File(path)).is_some());
+}
+
+#[test]
+fn a_remembered_light_is_there_although_a_run_is_opened_at_the_start() {
+    let folder = Arc::new(tempfile::tempdir().unwrap());
+    let path = write_light(folder.path(), "left.hdr");
+    let text = format!("{{ \"lights\": [{:?}] }}", path.display().to_string());
+    patina::files::write_bytes(&folder.path().join("studio.json"), text.as_bytes()).unwrap();
+    let mut studio = TestStudio::in_folder(folder, Some(super::support::finished_run().into()));
+    let name = LightName::File(path);
+    studio.wait("run and light", |model| model.project.is_some() && model.shelf.find(&name).is_some());
 }
 
 #[test]

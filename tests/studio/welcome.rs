@@ -105,8 +105,7 @@ fn a_scene_is_read_again_in_another_way() {
     assert!(studio.says("Not in force yet"));
     studio.control("Read the scene again").click_accesskit();
     studio.frames(1);
-    studio.wait("the scene", |model| model.project.is_some());
+    studio.wait("the scene", |model| model.project.as_ref().is_some_and(|own| own.settings.read.shrink == 2));
     let project = studio.model().project.as_ref().unwrap();
-    assert_eq!(project.settings.read.shrink, 2);
     assert_eq!(project.scene.as_ref().unwrap().views[0].camera.width, 24);
 }

@@ -27,7 +27,7 @@ pub struct AuditOptions {
 /// What to measure.
 #[derive(Debug, Subcommand)]
 pub enum BenchTask {
-    /// Growth with triangles, views and map size: read, atlas, tracer, one step, peak memory.
+    /// Growth with triangles, views and map size: read, atlas, tracer, one step, peak memory so far.
     Scale(BenchOptions),
     /// Error against seconds: this program's methods and Mitsuba fit the same exchange scenes, judged alike.
     Fit(crate::cli::contest::ContestArguments),
@@ -114,7 +114,7 @@ pub struct BenchOptions {
 pub enum StudyTask {
     /// What consistency between views changes: errors of pictures, maps and light for its settings, over seeds.
     Mvcl(MvclOptions),
-    /// What one photo tells of light and reflectance: figures 3 to 5 of the paper, and shadows.
+    /// What one photo tells of light and reflectance: figures 2 to 5 of the paper, and shadows.
     Ibrdf(crate::cli::object::StudyIbrdfOptions),
 }
 

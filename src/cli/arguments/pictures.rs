@@ -1,8 +1,33 @@
 //! What can be typed to make pictures of runs and compare pictures. The text of each field is its help.
 
 use super::ReadOptions;
+use crate::render::path::MAX_BOUNCES;
 use clap::Args;
 use std::path::PathBuf;
+
+/// A number that is one.
+fn finite(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        _ => Err("give a finite number".into()),
+    }
+}
+
+/// A whole number of paths a pixel.
+fn paths(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(number @ 1..=65_536) => Ok(number),
+        _ => Err("give a whole number from 1 to 65536".into()),
+    }
+}
+
+/// A whole number of surface hits.
+fn hits(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(number) if (1..=MAX_BOUNCES).contains(&number) => Ok(number),
+        _ => Err(format!("give a whole number from 1 to {MAX_BOUNCES}")),
+    }
+}
 
 /// Options of `patina relight`.
 #[derive(Debug, Args)]
@@ -19,22 +44,22 @@ pub struct RelightOptions {
     #[arg(long, num_args = 1..)]
     pub views: Vec<String>,
     /// Turn the light about the vertical, in degrees.
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite)]
     pub rotate: f32,
     /// Keep the light as strong as its file says; otherwise its mean is matched to that of the fitted light.
     #[arg(long)]
     pub absolute: bool,
     /// Paths a pixel.
-    #[arg(long, default_value_t = 64)]
+    #[arg(long, default_value_t = 64, value_parser = paths)]
     pub samples: usize,
-    /// Surface hits on the longest path.
-    #[arg(long, default_value_t = 3)]
+    /// Surface hits on the longest path, 1 to 16.
+    #[arg(long, default_value_t = 3, value_parser = hits)]
     pub bounces: usize,
     /// Shrink pictures by this whole factor.
     #[arg(long, default_value_t = 1)]
     pub shrink: usize,
     /// Exposure of the PNG files, in stops.
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite)]
     pub exposure: f32,
     /// Hide the light behind the surface.
     #[arg(long)]
@@ -94,10 +119,10 @@ pub struct RenderOptions {
     #[arg(long)]
     pub env: Option<String>,
     /// Paths a pixel.
-    #[arg(long, default_value_t = 64)]
+    #[arg(long, default_value_t = 64, value_parser = paths)]
     pub samples: usize,
-    /// Surface hits on the longest path.
-    #[arg(long, default_value_t = 3)]
+    /// Surface hits on the longest path, 1 to 16.
+    #[arg(long, default_value_t = 3, value_parser = hits)]
     pub bounces: usize,
     /// Seed of the random numbers.
     #[arg(long, default_value_t = 1)]
@@ -121,10 +146,10 @@ pub struct CompareOptions {
     /// The scene with the photographs.
     pub scene: PathBuf,
     /// Paths a pixel.
-    #[arg(long, default_value_t = 32)]
+    #[arg(long, default_value_t = 32, value_parser = paths)]
     pub samples: usize,
-    /// Surface hits on the longest path; that of the run when not given.
-    #[arg(long)]
+    /// Surface hits on the longest path, 1 to 16; that of the run when not given.
+    #[arg(long, value_parser = hits)]
     pub bounces: Option<usize>,
     /// How the scene is read.
     #[command(flatten)]

@@ -2,7 +2,7 @@
 
 use crate::atlas::KeepUv;
 use crate::fit::{FitSettings, Method, Preset};
-use crate::scene::settings::{BackgroundChoice, PixelCentre, Up};
+use crate::scene::settings::{BackgroundChoice, ColourEncoding, MaskUse, PixelCentre, Up};
 use clap::{Args, FromArgMatches};
 use std::path::PathBuf;
 
@@ -27,7 +27,7 @@ pub struct DemoOptions {
 #[derive(Clone, Debug, Default, Args)]
 pub struct ReadOptions {
     /// Which axis of the data set points up: auto, or one of +x -x +y -y +z -z.
-    #[arg(long)]
+    #[arg(long, allow_hyphen_values = true)]
     pub up: Option<Up>,
     /// Where the data set puts pixel centres: auto, integer or half.
     #[arg(long)]
@@ -44,6 +44,12 @@ pub struct ReadOptions {
     /// What pixels without surface show: auto, environment or black.
     #[arg(long)]
     pub scene_background: Option<BackgroundChoice>,
+    /// Whether masks of the photographs are used: use or ignore.
+    #[arg(long)]
+    pub masks: Option<MaskUse>,
+    /// How the numbers of the photographs are encoded: auto, srgb or linear.
+    #[arg(long)]
+    pub encoding: Option<ColourEncoding>,
 }
 
 impl ReadOptions {
@@ -71,6 +77,12 @@ impl ReadOptions {
         }
         if let Some(background) = self.scene_background {
             settings.background = background;
+        }
+        if let Some(masks) = self.masks {
+            settings.masks = masks;
+        }
+        if let Some(encoding) = self.encoding {
+            settings.encoding = encoding;
         }
         settings
     }

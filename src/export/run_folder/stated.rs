@@ -6,6 +6,16 @@ use crate::error::{Error, ErrorKind, Place, Result};
 use crate::image::{GreyImage, RgbImage, file};
 use crate::material::MaterialMaps;
 
+/// All of them.
+pub(super) const STATED_FILES: [&str; 7] = [
+    DEVIATION_FILES[0],
+    DEVIATION_FILES[1],
+    DEVIATION_FILES[2],
+    LIGHT_EVIDENCE_FILE,
+    LIGHT_SCALE_FILE,
+    CHOICES_FILE,
+    LOBE_SHARING_FILE,
+];
 /// Standard deviations of diffuse, specular and roughness map, where the solver made them.
 const DEVIATION_FILES: [&str; 3] = ["diffuse_deviation.exr", "specular_deviation.exr", "roughness_deviation.exr"];
 /// What each texel of the light is known by, where the solver made it.

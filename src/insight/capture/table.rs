@@ -3,7 +3,7 @@
 use super::ViewCapture;
 
 /// Name of the table in a run folder.
-pub const FILE: &str = "capture.csv";
+pub const FILE: &str = crate::export::run_folder::CAPTURE_FILE;
 
 /// One line a view, with all digits; what could not be measured is empty. Names are quoted.
 pub fn to_csv(views: &[ViewCapture]) -> String {

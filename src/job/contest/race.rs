@@ -12,6 +12,7 @@ use crate::job::against_truth::resampled;
 use crate::job::demo::photograph;
 use crate::render::Surface;
 use crate::scene::demo::{self, DemoSettings};
+use crate::scene::settings::PixelCentre;
 use crate::scene::{ReadSettings, Scene};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -150,8 +151,15 @@ fn able(options: &ContestOptions, contest: &mut Contest, tell: &dyn Fn(&str)) ->
 
 /// Why Mitsuba cannot run, if so.
 fn mitsuba_trouble(options: &ContestOptions) -> Option<String> {
-    if options.read.shrink > 1 {
-        return Some("it reads photos at their full size".into());
+    let default = ReadSettings::default();
+    let own = ReadSettings {
+        // Which views it fits to it is told by their names.
+        hold_out_every: default.hold_out_every,
+        max_views: default.max_views,
+        ..options.read.clone()
+    };
+    if own != default {
+        return Some("it reads exchange folders as they are: photos at their full size, in their own world".into());
     }
     let script = options.scripts.join("fit_exchange.py");
     if !script.is_file() {
@@ -263,9 +271,7 @@ impl Race<'_> {
             command.arg("--threads").arg(threads.to_string());
         }
         command.args(["bench", "entry"]).arg(self.scene).args(["--method", method.name()]);
-        command.args(["--hold-out-every", &self.options.read.hold_out_every.to_string()]);
-        command.args(["--shrink", &self.options.read.shrink.to_string()]);
-        command.args(["--max-views", &self.options.read.max_views.to_string()]);
+        command.args(read_arguments(&self.options.read));
         if let Some(settings) = &self.options.settings {
             command.arg("--settings").arg(settings);
         }
@@ -289,6 +295,28 @@ impl Race<'_> {
         command.args(["--began", &clock::now().to_string()]);
         command
     }
+}
+
+/// The options by which `patina bench entry` reads a scene in the same way.
+pub fn read_arguments(read: &ReadSettings) -> Vec<String> {
+    fn word<T: clap::ValueEnum>(value: &T) -> String {
+        value.to_possible_value().map(|value| value.get_name().to_string()).unwrap_or_default()
+    }
+    let centre = match read.pixel_centre {
+        PixelCentre::Auto => "auto",
+        PixelCentre::Integer => "integer",
+        PixelCentre::Half => "half",
+    };
+    vec![
+        format!("--up={}", read.up),
+        format!("--pixel-centre={centre}"),
+        format!("--hold-out-every={}", read.hold_out_every),
+        format!("--max-views={}", read.max_views),
+        format!("--masks={}", word(&read.masks)),
+        format!("--scene-background={}", word(&read.background)),
+        format!("--encoding={}", word(&read.encoding)),
+        format!("--shrink={}", read.shrink),
+    ]
 }
 
 /// Runs a process to its end; says what went wrong, if anything.

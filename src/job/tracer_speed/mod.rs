@@ -19,7 +19,7 @@ mod rivals;
 use self::paths::{Workload, relative_deviation};
 use self::rays::RaySets;
 use super::pictures::parameters;
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::{Error, ErrorKind, Place, Result};
 use crate::fit::FitSettings;
 use crate::image::Image;
 use crate::insight::study::StudyTable;
@@ -68,7 +68,7 @@ pub struct TracerOptions {
     pub output: PathBuf,
 }
 
-/// Times every scene; `tell` hears of each.
+/// Times every scene, and writes the table anew after each; `tell` hears of each.
 ///
 /// # Errors
 /// A scene that cannot be read, rays that cannot be written. Where Python, Mitsuba or Embree is absent, a note of the
@@ -76,15 +76,22 @@ pub struct TracerOptions {
 pub fn run(options: &TracerOptions, tell: &dyn Fn(&str)) -> Result<StudyTable> {
     let threads = rayon::current_num_threads();
     let mut table =
-        StudyTable::new(&format!("Rays, paths and gradients a second, {threads} threads"), "scene", &COLUMNS);
+        StudyTable::new(&format!("Rays, paths and gradients a second, {threads} threads"), "scene", &COLUMNS)
+            .with_caption("Median over repetitions, in brackets the quartiles.");
     for path in &options.scenes {
         tell(&format!("timing {}", path.display()));
         let scene = crate::scene::read(path, &Default::default())?;
         let name = scene.name.clone();
         time(&scene, &name, options, &mut table)?;
         time_mitsuba(path, &name, options, &mut table);
+        table.write(&options.output, "tracer")?;
     }
     for &triangles in &options.triangles {
+        if triangles == 0 {
+            return Err(Error::new(ErrorKind::InvalidSetting, "must be at least 1")
+                .at(Place::Setting("triangles".into()))
+                .remedy("give numbers of triangles above 0"));
+        }
         let name = format!("sphere of {triangles}");
         tell(&format!("timing a {name} triangles"));
         let scene = grey_sphere(triangles, options.most_views.max(1));
@@ -94,6 +101,7 @@ pub fn run(options: &TracerOptions, tell: &dyn Fn(&str)) -> Result<StudyTable> {
             crate::export::exchange::write(&scene, truth, &Default::default(), &folder)?;
             time_mitsuba(&folder, &name, options, &mut table);
         }
+        table.write(&options.output, "tracer")?;
     }
     table.notes.push(format!(
         "Rays of up to {} views with one ray a pixel; paths and gradients with {} samples a pixel. A gradient counts its \

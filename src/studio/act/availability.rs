@@ -1,6 +1,8 @@
 //! Whether an act can be done now, and why not.
 
 use super::{Act, Group};
+use crate::studio::model::opening::PREPARING_TITLE;
+use crate::studio::model::starting::TITLE as STARTING_TITLE;
 use crate::studio::model::{FitStatus, Model, Workspace};
 
 /// `Ok` when the act can be done; otherwise why not, as a short sentence without a full stop.
@@ -69,9 +71,13 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
         Act::Start => {
             need(project.is_some(), "open a scene first")?;
             need(has_views, "this run's scene is not here, so there are no photos to fit")?;
-            need(project.is_some_and(|project| project.surface.is_some()), "the scene is still being prepared")?;
+            let why = match model.tasks.is_running(PREPARING_TITLE) {
+                true => "the scene is still being prepared",
+                false => "the scene was not prepared to its end: open it again",
+            };
+            need(project.is_some_and(|project| project.surface.is_some()), why)?;
             need(!status.is_live(), "a fit is in progress")?;
-            need(!model.tasks.is_running(crate::studio::model::starting::TITLE), "the fit is about to start")
+            need(!model.tasks.is_running(STARTING_TITLE), "the fit is about to start")
         }
         Act::PauseOrGoOn => {
             need(matches!(status, FitStatus::Running | FitStatus::Pausing | FitStatus::Paused), "no fit is in progress")

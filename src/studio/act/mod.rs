@@ -277,7 +277,7 @@ pub const LIST: &[ActInfo] = &[
 
     info(Act::Palette, Group::Window, "All acts…", "Finds an act by its name.", with(CTRL, Key::K)),
     info(Act::Help, Group::Window, "Keys and help", "Lists every act and its key.", key(Key::F1)),
-    info(Act::NextTheme, Group::Window, "Next theme", "Goes through dark, light and high contrast.", with(CTRL_SHIFT, Key::T)),
+    info(Act::NextTheme, Group::Window, "Next theme", "Goes through dark, light, high contrast and as the system.", with(CTRL_SHIFT, Key::T)),
     info(Act::ZoomIn, Group::Window, "Larger interface", "Makes text and controls larger.", with(CTRL, Key::Plus)),
     info(Act::ZoomOut, Group::Window, "Smaller interface", "Makes text and controls smaller.", with(CTRL, Key::Minus)),
     info(Act::ZoomReset, Group::Window, "Interface at its own size", "Text and controls as the system says.", with(CTRL, Key::Num0)),

@@ -1,7 +1,7 @@
 //! Windows over the window: which there are, and what becomes of a path that is typed or picked in one.
 
 use super::{Done, Model, lights};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What a path is picked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,9 +106,18 @@ impl Model {
 
     /// Reads an HDR map and puts it on the shelf.
     pub fn add_light(&mut self, path: PathBuf) {
-        self.tasks.spawn(format!("Reading {}", path.display()), move |_| {
-            lights::read(&path).map(|light| Done::LightRead(Box::new(light)))
+        self.tasks.spawn(title_of_light(&path), move |_| {
+            lights::read(&path).map(|(light, noticed)| Done::LightRead(Box::new(light), noticed))
         });
+    }
+
+    /// Forgets a remembered light that could not be read, by the title of its task: it is told of once.
+    pub(super) fn forget_light(&mut self, title: &str) {
+        let count = self.preferences.lights.len();
+        self.preferences.lights.retain(|path| title_of_light(path) != title);
+        if self.preferences.lights.len() < count {
+            self.log.note("The light is no longer remembered: add it again when its file is back");
+        }
     }
 
     /// Opens the system's file dialog on a thread of its own.
@@ -138,4 +147,9 @@ impl Model {
             Ok(Done::Picked(purpose, path))
         });
     }
+}
+
+/// Title of the task that reads a light.
+fn title_of_light(path: &Path) -> String {
+    format!("Reading {}", path.display())
 }

@@ -6,6 +6,7 @@ use super::object::RelitObject;
 use super::object_form::{ObjectForm, is_photo};
 use super::{Done, Model, Workspace, store};
 use crate::error::{Error, ErrorKind, Place};
+use crate::files::unrepeated;
 use crate::job::object::{self, ObjectJobOptions, ObjectOutcome, ObjectRequest, ReopenedObject};
 use crate::light::Environment;
 use std::path::{Path, PathBuf};
@@ -45,18 +46,22 @@ impl Model {
         }
         let inputs = opened.outcome.parts.inputs.clone();
         let files = inputs.files;
-        let form = &mut self.edits.object;
-        *form = ObjectForm {
+        let mut form = ObjectForm {
             photos: files.photos,
             masks: files.masks,
-            is_sphere: files.mesh.is_none(),
+            is_sphere: files.mesh.is_none() && files.normals.is_empty(),
             mesh: files.mesh.map(|mesh| mesh.display().to_string()).unwrap_or_default(),
             cameras: files.cameras,
+            normals: files.normals,
             light: inputs.light.map(|light| light.display().to_string()).unwrap_or_default(),
             model: inputs.model,
             lobes: inputs.lobes,
-            ..form.clone()
+            ..ObjectForm::default()
         };
+        if !form.take_settings(&opened.outcome.parts.settings) {
+            self.log.note("Some settings of the result are not in this form: another estimation takes the usual ones");
+        }
+        self.edits.object = form;
         self.history.restart(&self.edits);
         self.object.show(opened);
         if let Some(folder) = self.object.outcome.as_ref().and_then(|outcome| outcome.folder.clone()) {
@@ -102,9 +107,13 @@ impl Model {
 
     /// Lights of the shelf that are none of a scene's, with names that suit files.
     fn named_lights(&self) -> Vec<(String, Arc<Environment>)> {
-        let own = self.shelf.lights().iter().filter(|light| is_free(&light.name));
-        let safe = |name: String| name.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
-        own.take(MOST_RELIGHTS).map(|light| (safe(light.name.label()), Arc::clone(&light.environment))).collect()
+        let own = self.shelf.lights().iter().filter(|light| is_free(&light.name)).take(MOST_RELIGHTS);
+        let safe =
+            |name: String| -> String { name.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect() };
+        let (names, lights): (Vec<String>, Vec<Arc<Environment>>) =
+            own.map(|light| (safe(light.name.label()), Arc::clone(&light.environment))).unzip();
+        // Files of one name from two folders are two lights.
+        unrepeated(&names).into_iter().zip(lights).collect()
     }
 
     /// Takes in what the estimation told; a new result is shown under the lights of the shelf.
@@ -178,6 +187,7 @@ impl Model {
         let what = match ending.as_str() {
             "obj" | "ply" => {
                 (form.mesh, form.is_sphere) = (path.display().to_string(), false);
+                form.normals.clear();
                 "the mesh"
             }
             "json" | "txt" => {

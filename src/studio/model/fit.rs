@@ -6,6 +6,7 @@ use crate::export::RunFolder;
 use crate::fit::{FitSettings, LossRow};
 use crate::insight::report::data::ReportData;
 use crate::job::{Command, Event, JobHandle, Progress, Snapshot};
+use crate::scene::Scene;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -100,6 +101,21 @@ impl FitControl {
             settings_confirmed: Some(settings),
             ..FitControl::default()
         };
+    }
+
+    /// Factor of each photo of the scene that a fit with exposure gains found: by the newest snapshot, or by the report
+    /// of a run that was opened; empty for ones.
+    pub fn gains(&self, scene: Option<&Scene>) -> Vec<f32> {
+        if let Some(snapshot) = &self.snapshot {
+            return snapshot.log_gains.iter().map(|gain| gain.exp()).collect();
+        }
+        let (Some(scene), Some(report)) = (scene, &self.report) else { return Vec::new() };
+        let reported = |name: &str| {
+            let line = report.views.iter().find(|line| line.name == name);
+            let gain = line.map_or(1.0, |line| line.exposure_gain as f32);
+            if gain.is_finite() && gain > 0.0 { gain } else { 1.0 }
+        };
+        scene.views.iter().map(|view| reported(&view.name)).collect()
     }
 
     /// Sends a command; a job that is gone is no error here, its last event says why.

@@ -1,6 +1,6 @@
 //! The shelf of lights, and which of them lights the stage.
 
-use crate::error::Result;
+use crate::error::{Finding, Result};
 use crate::image::{RgbImage, resize};
 use crate::job::pictures::{light_of, matched};
 use crate::light::Environment;
@@ -74,13 +74,13 @@ impl ShelfLight {
     }
 }
 
-/// Reads a light from its file, at the size the shelf keeps.
+/// Reads a light from its file, at the size the shelf keeps, with what was noticed.
 ///
 /// # Errors
 /// Those of [`Environment::read`].
-pub fn read(path: &Path) -> Result<ShelfLight> {
-    let (_, environment) = light_of(&path.to_string_lossy(), 2 * SHELF_HEIGHT)?;
-    Ok(ShelfLight::new(LightName::File(path.into()), Arc::new(environment)))
+pub fn read(path: &Path) -> Result<(ShelfLight, Vec<Finding>)> {
+    let read = light_of(&path.to_string_lossy(), 2 * SHELF_HEIGHT)?;
+    Ok((ShelfLight::new(LightName::File(path.into()), Arc::new(read.environment)), read.findings))
 }
 
 /// All lights that can light the stage.
@@ -93,7 +93,7 @@ impl Shelf {
     /// The built-in skies.
     pub fn built_in() -> Self {
         let sky = |name: &str| {
-            let (_, environment) = light_of(name, SHELF_HEIGHT).ok()?;
+            let environment = light_of(name, SHELF_HEIGHT).ok()?.environment;
             Some(ShelfLight::new(LightName::Sky(name.into()), Arc::new(environment)))
         };
         Shelf { lights: ["noon", "evening", "overcast"].into_iter().filter_map(sky).collect() }

@@ -220,13 +220,21 @@ impl Model {
 
     /// Takes in what tasks and the job brought. True when something changed.
     pub fn poll(&mut self) -> bool {
-        let mut changed = false;
+        let (mut changed, mut is_another_scene) = (false, false);
         for (title, outcome) in self.tasks.finished() {
             changed = true;
+            if is_another_scene && done::OF_A_SCENE.contains(&title.as_str()) {
+                // It ended in the same moment, and is of the scene that was open before.
+                continue;
+            }
+            is_another_scene |= matches!(outcome, Ok(Done::SceneRead(_) | Done::RunOpened(_)));
             match outcome {
                 Ok(done) => self.take_in(done),
                 Err(error) if error.kind() == crate::ErrorKind::Stopped => self.log.note(format!("Stopped: {title}")),
-                Err(error) => self.log.error(&error),
+                Err(error) => {
+                    self.log.error(&error);
+                    self.forget_light(&title);
+                }
             }
         }
         changed |= self.fit.poll(&mut self.log);
@@ -242,7 +250,8 @@ impl Model {
             Done::Prepared(prepared) => self.scene_was_prepared(*prepared),
             Done::RunOpened(run) => self.run_was_opened(*run),
             Done::FitStarted(started) => self.fit_was_started(*started),
-            Done::LightRead(light) => {
+            Done::LightRead(light, noticed) => {
+                self.note_findings(&noticed);
                 if let LightName::File(path) = &light.name
                     && !self.preferences.lights.contains(path)
                 {
@@ -260,7 +269,7 @@ impl Model {
                     count => format!("Saved {count} pictures, the first is {first}"),
                 });
             }
-            Done::Layers(layers) => self.layers_were_measured(*layers),
+            Done::Layers(maps, layers) => self.layers_were_measured(&maps, *layers),
             Done::Strip(pictures) => {
                 if let Some(project) = &mut self.project {
                     project.strip = pictures;

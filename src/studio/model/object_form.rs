@@ -50,6 +50,8 @@ pub struct ObjectForm {
     pub mesh: String,
     /// Its cameras.
     pub cameras: Vec<PathBuf>,
+    /// One picture of normals a photo in place of a mesh, as in a result that was opened; none otherwise.
+    pub normals: Vec<PathBuf>,
     /// The light, where it is known; empty where it is estimated.
     pub light: String,
     /// Model of the reflectance.
@@ -60,7 +62,7 @@ pub struct ObjectForm {
     pub prior: LightPriorKind,
     /// How much is done.
     pub effort: Effort,
-    /// Rows of the estimated light, where it is another number than the effort's: 16, 32, 64 or 128.
+    /// Rows of the estimated light, where it is another number than the effort's: 16, 32, 64, 128 or 180.
     pub light_rows: Option<usize>,
     /// Pixels that are used, likewise.
     pub pixels: Option<usize>,
@@ -78,6 +80,7 @@ impl Default for ObjectForm {
             is_sphere: true,
             mesh: String::new(),
             cameras: Vec::new(),
+            normals: Vec::new(),
             light: String::new(),
             model: ModelKind::default(),
             lobes: 2,
@@ -117,16 +120,35 @@ impl ObjectForm {
             return missing("photos", "no photo is named", "add a photo, or drop one on the window");
         }
         let mesh = self.mesh.trim();
-        if !self.is_sphere && mesh.is_empty() {
+        let has_mesh = !self.is_sphere && self.normals.is_empty();
+        if has_mesh && mesh.is_empty() {
             return missing("mesh", "no mesh is named", "name an OBJ or PLY file, or take the object for a sphere");
         }
         Ok(ObjectFiles {
             photos: self.photos.clone(),
             masks: self.masks.clone(),
-            mesh: (!self.is_sphere).then(|| mesh.into()),
-            cameras: if self.is_sphere { Vec::new() } else { self.cameras.clone() },
+            mesh: has_mesh.then(|| mesh.into()),
+            normals: self.normals.clone(),
+            cameras: if has_mesh { self.cameras.clone() } else { Vec::new() },
             ..ObjectFiles::default()
         })
+    }
+
+    /// Takes up the settings of a result. False when the form cannot ask for all of them: then it asks for the rest as
+    /// the program takes it by itself.
+    pub fn take_settings(&mut self, settings: &ObjectSettings) -> bool {
+        let (prior, shadows, seed) = (settings.prior, settings.shadows, settings.seed);
+        (self.prior, self.shadows, self.seed) = (prior, shadows, seed);
+        let asks_for = |effort: &Effort| {
+            let (light_height, pixels) = (settings.light_height, settings.pixels);
+            *settings == ObjectSettings { prior, shadows, seed, light_height, pixels, ..effort.settings() }
+        };
+        let found = Effort::NAMED.map(|(effort, ..)| effort).into_iter().find(asks_for);
+        self.effort = found.unwrap_or_default();
+        let usual = self.effort.settings();
+        self.light_rows = Some(settings.light_height).filter(|rows| *rows != usual.light_height);
+        self.pixels = Some(settings.pixels).filter(|pixels| *pixels != usual.pixels);
+        found.is_some()
     }
 }
 
@@ -134,4 +156,43 @@ impl ObjectForm {
 pub fn is_photo(path: &Path) -> bool {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
     ["png", "jpg", "jpeg", "exr", "pfm"].contains(&ending.as_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_settings_of_a_result_are_asked_for_again_as_far_as_the_form_can() {
+        let asked = ObjectForm {
+            effort: Effort::Quick,
+            light_rows: Some(16),
+            pixels: Some(300),
+            prior: LightPriorKind::Gradient,
+            shadows: false,
+            seed: 7,
+            ..ObjectForm::default()
+        };
+        let mut again = ObjectForm { effort: Effort::Released, pixels: Some(5), ..ObjectForm::default() };
+        assert!(again.take_settings(&asked.settings()));
+        assert_eq!(again, asked);
+        let other = ObjectSettings { outer_loops: 3, ..ObjectSettings::default() };
+        assert!(!again.take_settings(&other), "the form has no field for rounds");
+        assert_eq!((again.effort, again.light_rows, again.pixels), (Effort::Usual, None, None));
+    }
+
+    #[test]
+    fn pictures_of_normals_are_the_shape_until_another_is_named() {
+        let normals: Vec<PathBuf> = vec!["normals.exr".into()];
+        let form = ObjectForm {
+            photos: vec!["photo.exr".into()],
+            normals: normals.clone(),
+            is_sphere: false,
+            ..ObjectForm::default()
+        };
+        let files = form.files().unwrap();
+        assert_eq!((files.mesh, files.normals), (None, normals));
+        let form = ObjectForm { normals: Vec::new(), mesh: "ball.obj".into(), ..form };
+        assert_eq!(form.files().unwrap().mesh, Some("ball.obj".into()));
+    }
 }

@@ -1,6 +1,7 @@
 //! From a path to a project: reading, checking and preparing happen beside the window, step by step, and each step shows
-//! what it brought.
+//! what it brought. What is open stays until another scene was read.
 
+use super::done::OF_A_SCENE;
 use super::lights::{LightName, ShelfLight};
 use super::log::Message;
 use super::project::Atlas;
@@ -23,6 +24,8 @@ use std::sync::Arc;
 
 /// Title of the task that opens a scene or run.
 pub const TITLE: &str = "Opening";
+/// Title of the task that makes the atlas of a scene that was read.
+pub const PREPARING_TITLE: &str = "Preparing";
 /// Longest side of the small picture of a photo, in pixels.
 const THUMBNAIL_SIDE: usize = 128;
 
@@ -72,10 +75,11 @@ impl Model {
         self.open_with(path, ReadSettings::default());
     }
 
-    /// Opens a scene that is to be read in a certain way, or a run folder.
+    /// Opens a scene that is to be read in a certain way, or a run folder. What is open is closed once the other was
+    /// read: a path that leads to neither takes nothing away.
     pub fn open_with(&mut self, path: PathBuf, read: ReadSettings) {
         self.workspace = Workspace::Scene;
-        self.close();
+        self.tasks.stop(TITLE);
         self.log.dismiss();
         let path = std::path::absolute(&path).unwrap_or(path);
         let mut settings = RunSettings { scene: path.clone(), read, ..RunSettings::default() };
@@ -104,7 +108,7 @@ impl Model {
     /// Photographs and opens the built-in scene.
     pub fn open_demo(&mut self) {
         self.workspace = Workspace::Scene;
-        self.close();
+        self.tasks.stop(TITLE);
         self.tasks.spawn(TITLE, move |context| {
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
             let settings = demo::settings();
@@ -115,7 +119,7 @@ impl Model {
 
     /// Opens a scene that was made in code.
     pub fn open_made(&mut self, scene: Scene, settings: RunSettings) {
-        self.close();
+        self.tasks.stop(TITLE);
         self.tasks.spawn(TITLE, move |_| {
             let opened = OpenedScene { scene, report: Default::default(), timings: Vec::new() };
             Ok(Done::SceneRead(Box::new(SceneRead::new(None, settings, opened))))
@@ -137,7 +141,7 @@ impl Model {
 
     /// Goes back to the first page. A fit in progress is stopped; its checkpoint keeps what was done.
     pub fn close(&mut self) {
-        self.tasks.stop_all();
+        OF_A_SCENE.iter().for_each(|title| self.tasks.stop(title));
         self.fit.forget();
         self.project = None;
         self.cursor = None;
@@ -148,6 +152,7 @@ impl Model {
     }
 
     pub(super) fn scene_was_read(&mut self, read: SceneRead) {
+        self.close();
         self.note_findings(&read.findings);
         if let Some(path) = &read.path {
             self.preferences.remember(path, false);
@@ -186,7 +191,7 @@ impl Model {
         });
         self.history.restart(&self.edits);
         self.first_light();
-        self.tasks.spawn(TITLE, move |context| {
+        self.tasks.spawn(PREPARING_TITLE, move |context| {
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
             let prepared = prepare_with(scene, findings, &settings, timings, &context.stop, &tell)?;
             let atlas = Atlas::of(Arc::clone(&prepared.surface));
@@ -213,6 +218,7 @@ impl Model {
     }
 
     pub(super) fn run_was_opened(&mut self, read: RunRead) {
+        self.close();
         let RunRead { folder, run, atlas, thumbnails, clipped_shares } = read;
         self.note_findings(&run.findings);
         self.preferences.remember(folder.path(), true);
@@ -267,7 +273,7 @@ impl Model {
         }
     }
 
-    fn note_findings(&mut self, findings: &[Finding]) {
+    pub(super) fn note_findings(&mut self, findings: &[Finding]) {
         for finding in findings {
             self.log.add(Message::from(finding));
         }

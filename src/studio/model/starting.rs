@@ -1,5 +1,6 @@
 //! From a project to a fit, and settings that change on the way.
 
+use super::viewing::{ENTANGLEMENT_TITLE, LAYERS_TITLE, STRIP_TITLE};
 use super::{Done, FitStatus, Model, store};
 use crate::error::Result;
 use crate::export::RunFolder;
@@ -21,6 +22,8 @@ pub struct Started {
     folder: RunFolder,
     settings: FitSettings,
     surface: Arc<Surface>,
+    /// Whether it goes on from a checkpoint, and its curve with it.
+    goes_on: bool,
 }
 
 impl Started {
@@ -33,7 +36,7 @@ impl Started {
     ) -> Result<Self> {
         let (fit, surface) = (settings.fit.clone(), Arc::clone(&prepared.surface));
         let job = job::start_with(prepared, fitter, settings, folder.clone(), options)?;
-        Ok(Started { job, folder, settings: fit, surface })
+        Ok(Started { job, folder, settings: fit, surface, goes_on: false })
     }
 }
 
@@ -48,19 +51,22 @@ impl Model {
 
     /// Starts a fit of what is open, or goes on with one from its checkpoint.
     pub fn start_fit(&mut self) {
+        match self.fit.folder.clone().filter(|_| crate::studio::panel::fit::can_go_on(self)) {
+            Some(folder) => self.go_on_with(folder),
+            None => self.start_anew(),
+        }
+    }
+
+    /// Starts a fit of what is open in a new run, with the settings as they are. A checkpoint of the run before stays.
+    pub fn start_anew(&mut self) {
         let Some(project) = &self.project else { return };
         let (Some(scene), Some(surface)) = (project.scene.clone(), project.surface.clone()) else { return };
-        if let Some(folder) = self.fit.folder.clone().filter(|_| crate::studio::panel::fit::can_go_on(self)) {
-            return self.go_on_with(folder);
-        }
         let mut settings = project.settings.clone();
         settings.fit = self.edits.fit.clone();
         let path = store::new_run_folder(&self.runs_folder(), &project.title);
         let (findings, timings, quality) = (project.findings.clone(), project.timings.clone(), project.quality.clone());
         // The atlas keeps its charts apart at the size it was made for; other map sizes need another atlas.
         let same_atlas = project.settings.fit.map_size == settings.fit.map_size || project.is_run;
-        self.fit.losses.clear();
-        self.fit.report = None;
         let options = self.job_options();
         self.tasks.spawn(TITLE, move |context| {
             let folder = RunFolder::create(&path)?;
@@ -94,18 +100,31 @@ impl Model {
                 settings.fit = wanted;
             }
             let started = Started::new(prepared, fitter, settings, folder, options)?;
-            Ok(Done::FitStarted(Box::new(started)))
+            Ok(Done::FitStarted(Box::new(Started { goes_on: true, ..started })))
         });
     }
 
     pub(super) fn fit_was_started(&mut self, started: Started) {
-        let Started { job, folder, settings, surface } = started;
+        let Started { job, folder, settings, surface, goes_on } = started;
+        // What is still being measured is of the maps before.
+        [LAYERS_TITLE, ENTANGLEMENT_TITLE, STRIP_TITLE].iter().for_each(|title| self.tasks.stop(title));
         if let Some(project) = &mut self.project {
             if project.surface.as_ref().is_none_or(|own| !Arc::ptr_eq(own, &surface)) {
                 // The atlas was made anew for another size of the maps.
                 project.take_surface(surface);
+                if !goes_on {
+                    // What is known of texels is known of those of the atlas before.
+                    (project.times_seen, project.coverage) = (None, None);
+                    (project.photo_error, project.disagreement) = (None, None);
+                }
             }
             project.settings.fit = settings.clone();
+            project.entanglement = None;
+            project.strip.clear();
+        }
+        if !goes_on {
+            // Only now: a start that fails leaves the curve and the scores of the run before.
+            self.fit.losses.clear();
         }
         self.preferences.remember(folder.path(), true);
         self.log.note(format!("The run is written to {}", folder.path().display()));

@@ -8,6 +8,7 @@ use crate::job::entanglement::{EntanglementSettings, entanglement};
 use crate::job::gallery::{self, NamedLight, Turning, TurntableSettings};
 use crate::job::pictures::parameters;
 use crate::light::Environment;
+use crate::material::MaterialMaps;
 use crate::render::Parameters;
 use crate::render::picture::PictureSettings;
 use crate::scene::Camera;
@@ -24,6 +25,8 @@ const STRIP_SAMPLES: usize = 24;
 pub const ENTANGLEMENT_TITLE: &str = "Comparing under other lights";
 /// Title of the task that measures the error of the photos.
 pub const LAYERS_TITLE: &str = "Measuring the error of the photos";
+/// Title of the task that draws the view under every light.
+pub const STRIP_TITLE: &str = "Drawing the strip";
 
 impl Model {
     /// Moves the eye so that the whole scene is seen.
@@ -181,17 +184,24 @@ impl Model {
             let layers = surface_layers(&scene, &surface, &own, &settings, &context.stop, &|share| {
                 context.tell("rendering", share);
             })?;
-            Ok(Done::Layers(Box::new(layers)))
+            Ok(Done::Layers(maps, Box::new(layers)))
         });
     }
 
-    pub(super) fn layers_were_measured(&mut self, layers: SurfaceLayers) {
+    pub(super) fn layers_were_measured(&mut self, maps: &Arc<MaterialMaps>, layers: SurfaceLayers) {
         let Some(project) = &mut self.project else { return };
+        if project.maps.as_ref().is_none_or(|own| !Arc::ptr_eq(own, maps)) {
+            self.log.note("The maps changed while the error of the photos was measured: measure it again");
+            return;
+        }
         project.photo_error_range = [0.0, high_end(&layers.photo_error)];
         project.disagreement_range = [0.0, high_end(&layers.disagreement)];
         project.photo_error = Some(Arc::new(layers.photo_error));
         project.disagreement = Some(Arc::new(layers.disagreement));
-        project.times_seen = Some(Arc::new(layers.times_seen));
+        // The counts that a run brings are of its photos at their full size: coarser ones do not replace them.
+        if project.times_seen.as_ref().is_none_or(|own| own.width() <= layers.times_seen.width()) {
+            project.times_seen = Some(Arc::new(layers.times_seen));
+        }
         project.coverage = Some(Arc::new(layers.coverage));
         for (own, measured) in project.view_errors.iter_mut().zip(&layers.views) {
             *own = Some(measured.rmse as f32).filter(|rmse| rmse.is_finite());
@@ -201,8 +211,7 @@ impl Model {
 
     /// Factor of each photo that a fit with exposure gains found; empty for ones.
     pub fn gains(&self) -> Vec<f32> {
-        let snapshot = self.fit.snapshot.as_ref();
-        snapshot.map(|snapshot| snapshot.log_gains.iter().map(|gain| gain.exp()).collect()).unwrap_or_default()
+        self.fit.gains(self.project.as_ref().and_then(|project| project.scene.as_deref()))
     }
 
     /// Opens the dialog that asks how and where to save.
@@ -290,7 +299,7 @@ impl Model {
             .iter()
             .filter_map(|name| Some(NamedLight { name: name.label(), environment: self.traced_light(name)? }))
             .collect();
-        self.tasks.spawn("Drawing the strip", move |context| {
+        self.tasks.spawn(STRIP_TITLE, move |context| {
             let tell = |share: f32| context.tell("rendering", share);
             let pictures = gallery::relight_strip(&surface, &own, &camera, &lights, &settings, &context.stop, &tell)?;
             let pictures = pictures.into_iter().map(|picture| Arc::new(picture.radiance));

@@ -13,8 +13,18 @@ pub struct CurvesMemory {
     logarithmic: bool,
     stage: Option<String>,
     /// The finished plot lines and what they were made of.
-    made: Option<(usize, bool, bool, Option<String>)>,
+    made: Option<MadeOf>,
     lines: Series,
+}
+
+/// What plot lines depend on.
+#[derive(PartialEq)]
+struct MadeOf {
+    rows: usize,
+    run: [u64; 4],
+    over_seconds: bool,
+    logarithmic: bool,
+    stage: Option<String>,
 }
 
 impl Default for CurvesMemory {
@@ -45,10 +55,13 @@ impl Series {
 pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut CurvesMemory) {
     let rows = &model.fit.losses;
     if rows.is_empty() {
+        (memory.made, memory.stage) = (None, None);
         return empty(ui, "No curve yet", "The error of every step appears here once a fit runs");
     }
     let mut stages: Vec<String> = rows.iter().map(|row| row.stage.clone()).collect();
     stages.dedup();
+    // A stage of another run is none of this one.
+    memory.stage = memory.stage.take().filter(|stage| stages.contains(stage));
     ui.horizontal_wrapped(|ui| {
         ui.selectable_value(&mut memory.over_seconds, false, "Over steps");
         ui.selectable_value(&mut memory.over_seconds, true, "Over seconds");
@@ -65,12 +78,25 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut CurvesMemory) {
         list.response.accessible_name("Stage of the fit").on_hover_text("The stage whose curve is shown");
         figures(ui, rows);
     });
-    let key = (rows.len(), memory.over_seconds, memory.logarithmic, memory.stage.clone());
+    let key = MadeOf {
+        rows: rows.len(),
+        run: identity(rows),
+        over_seconds: memory.over_seconds,
+        logarithmic: memory.logarithmic,
+        stage: memory.stage.clone(),
+    };
     if memory.made.as_ref() != Some(&key) {
         memory.lines = series(rows, memory.over_seconds, memory.logarithmic, memory.stage.as_deref());
         memory.made = Some(key);
     }
     plot(ui, memory);
+}
+
+/// Tells curves of one length apart: those of another run differ in time and loss of their first or last step.
+fn identity(rows: &[LossRow]) -> [u64; 4] {
+    let of = |row: Option<&LossRow>| row.map_or([0, 0], |row| [row.seconds.to_bits(), row.loss.to_bits()]);
+    let [[first_seconds, first_loss], [last_seconds, last_loss]] = [of(rows.first()), of(rows.last())];
+    [first_seconds, first_loss, last_seconds, last_loss]
 }
 
 /// The newest figures, each with a dot in the colour of its curve: they are the legend.
@@ -214,6 +240,7 @@ mod tests {
             held_out_rmse: (step == 3).then_some(0.5),
         };
         let rows = [row(1, "coarse", 0.04), row(2, "coarse", -0.01), row(3, "fine", 0.25)];
+        assert_ne!(identity(&rows), identity(&[row(1, "coarse", 0.04), row(2, "coarse", 0.01), row(3, "fine", 0.5)]));
         let lines = series(&rows, true, true, None);
         assert_eq!(lines.borders.len(), 2);
         assert_eq!(lines.all[0], [2.0, 0.2f64.log10()]);

@@ -150,7 +150,12 @@ fn path(ui: &mut Ui, model: &mut Model, purpose: PickFor, text: &mut String) -> 
     let mut done = false;
     ui.horizontal(|ui| {
         let typed = !text.trim().is_empty();
-        if ui.add_enabled(typed, Button::new("Open this")).clicked() || (enter && typed) {
+        let confirm = match purpose {
+            PickFor::ObjectResult => "Save here",
+            PickFor::Light | PickFor::ObjectPhoto => "Add this",
+            _ => "Open this",
+        };
+        if ui.add_enabled(typed, Button::new(confirm)).clicked() || (enter && typed) {
             match purpose {
                 PickFor::Light => model.add_light(text.trim().into()),
                 PickFor::ObjectPhoto | PickFor::ObjectResult | PickFor::Material => {
@@ -166,7 +171,9 @@ fn path(ui: &mut Ui, model: &mut Model, purpose: PickFor, text: &mut String) -> 
         }
         done |= ui.button("Cancel").clicked();
     });
-    ui.label(RichText::new("A folder or file can also be dropped on the window").weak());
+    if purpose != PickFor::ObjectResult {
+        ui.label(RichText::new("A folder or file can also be dropped on the window").weak());
+    }
     done
 }
 

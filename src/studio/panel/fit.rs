@@ -2,9 +2,10 @@
 
 use super::{act_button, act_button_named, form, heading, reading};
 use crate::error::Place;
-use crate::fit::{FitSettings, Preset};
+use crate::fit::{FitSettings, Method, Preset};
 use crate::insight::report::number;
 use crate::studio::act::Act;
+use crate::studio::act::availability::availability;
 use crate::studio::model::store::Follow;
 use crate::studio::model::{FitStatus, Model, PickFor};
 use crate::studio::theme;
@@ -45,6 +46,10 @@ fn facts(ui: &mut Ui, model: &Model) {
     let held_out = project.scene.as_ref().map_or(0, |scene| scene.views.iter().filter(|view| view.held_out).count());
     let triangles = number::whole(project.mesh.triangles.len() as u64);
     ui.label(RichText::new(format!("{triangles} triangles, {views} photos, {held_out} held out to judge")).weak());
+    if model.edits.fit.method != Method::Paper {
+        // The figure is Adam's: the solver keeps other things.
+        return;
+    }
     let size = model.edits.fit.map_size as u64;
     // Texels, their gradient and two moments, of 32 bytes each, with a third more for the mip chain.
     let bytes = size * size * 32 * 4 * 4 / 3;
@@ -75,13 +80,32 @@ fn controls(ui: &mut Ui, model: &mut Model) {
             act_button_named(ui, model, Act::Start, "Fit again");
         }
         FitStatus::Idle | FitStatus::Stopped | FitStatus::Failed(_) => {
-            let label = if can_go_on(model) { "Go on from the checkpoint" } else { "Start the fit" };
+            let goes_on = can_go_on(model);
+            let label = if goes_on { "Go on from the checkpoint" } else { "Start the fit" };
             act_button_named(ui, model, Act::Start, label);
+            if goes_on {
+                start_anew(ui, model);
+            }
         }
     });
     if let Some(then) = model.fit.last_checkpoint {
         let ago = number::duration(then.elapsed().as_secs_f64());
         ui.label(RichText::new(format!("Last checkpoint {ago} ago")).weak());
+    }
+}
+
+/// A checkpoint takes only what may change while a fit runs; a new run takes every setting.
+fn start_anew(ui: &mut Ui, model: &mut Model) {
+    let available = availability(Act::Start, model);
+    let button = ui
+        .add_enabled(available.is_ok(), egui::Button::new("Start anew"))
+        .on_hover_text("Starts a new run with the settings as they are; this run and its checkpoint stay on disk");
+    let button = match available {
+        Ok(()) => button,
+        Err(why) => button.on_disabled_hover_text(format!("Not now: {why}")),
+    };
+    if button.clicked() {
+        model.start_anew();
     }
 }
 

@@ -73,7 +73,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut MapsMemory) {
             let button = egui::Button::selectable(memory.map == map, name);
             let response = ui.add_enabled(there, button).on_hover_text(help);
             let why = match map {
-                Map::TimesSeen => "Counted when a fit is done, or with the error of the photos",
+                Map::TimesSeen => "Measure it first: View, Measure photo error; a finished run brings it along",
                 Map::Told(_) => model.why_untold(),
                 _ => "Measure it first: View, Measure photo error",
             };

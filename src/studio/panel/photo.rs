@@ -48,6 +48,7 @@ pub struct PhotoMemory {
     key: u64,
     render: Option<(usize, Arc<RgbImage>)>,
     seen: u64,
+    failures: u64,
 }
 
 /// Draws the panel.
@@ -127,7 +128,7 @@ fn controls(ui: &mut Ui, model: &mut Model, memory: &mut PhotoMemory, name: &str
             model.project.as_ref().is_some_and(|project| project.maps.is_some() && project.surface.is_some());
         for (show, label, help) in [
             (Show::Photo, "Photo alone", "The photo as it was read, linear"),
-            (Show::Render, "Fit", "The same view, path traced with the fitted maps and light"),
+            (Show::Render, "Fit", "The same view, path traced with the fitted maps and light, in the photo's exposure"),
             (Show::Wipe, "Wipe", "Photo left, fit right; drag the line"),
             (Show::Difference, "Difference", "Luminance of photo minus fit"),
         ] {
@@ -200,8 +201,17 @@ fn render(model: &mut Model, memory: &mut PhotoMemory, view: usize) {
     {
         memory.seen = number;
         if picture.key == memory.key {
-            memory.render = Some((view, Arc::new(picture.picture.clone())));
+            // What the fit takes for the photo's exposure is no difference between the two.
+            let gain = model.gains().get(view).copied().unwrap_or(1.0);
+            memory.render = Some((view, Arc::new(picture.picture.map(|radiance| *radiance * gain))));
         }
+    }
+    if let Some(preview) = &memory.preview
+        && let Some((number, failure)) = preview.failures.newest()
+        && number > memory.failures
+    {
+        memory.failures = number;
+        model.log.error(&failure.error);
     }
 }
 

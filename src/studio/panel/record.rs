@@ -1,6 +1,7 @@
 //! The texel under the cursor: its values, the photos that see it, and what each of them says.
 
 use super::{empty, heading};
+use crate::error::{Error, ErrorKind};
 use crate::image::value_scale::three_digits;
 use crate::insight::record::{RecordSettings, TexelRecord, texel_record};
 use crate::job::background;
@@ -19,8 +20,21 @@ const SAMPLES: usize = 32;
 /// What the panel keeps.
 #[derive(Default)]
 pub struct RecordMemory {
-    record: Option<(u64, Box<TexelRecord>)>,
-    pending: Option<(u64, Receiver<TexelRecord>)>,
+    record: Option<(Question, Box<TexelRecord>)>,
+    pending: Option<(Question, Receiver<TexelRecord>)>,
+    /// A question whose thread fell: it is not asked again.
+    failed: Option<Question>,
+}
+
+/// The texel that is asked about, and a number that changes with whatever the answer depends on.
+#[derive(Clone, Copy, PartialEq)]
+struct Question {
+    place: [u32; 2],
+    key: u64,
+}
+
+fn place_of(cursor: &Cursor) -> [u32; 2] {
+    [cursor.uv.x.to_bits(), cursor.uv.y.to_bits()]
 }
 
 /// Draws the panel.
@@ -28,6 +42,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut RecordMemory) {
     let Some(cursor) = model.cursor else {
         return empty(ui, "No texel", "Point at the stage, a map or a photo; a click on the stage pins the texel");
     };
+    take_in(model, memory);
     ask(ui, model, &cursor, memory);
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.horizontal(|ui| {
@@ -40,7 +55,9 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut RecordMemory) {
         ui.label(
             RichText::new(format!("position {x:.3} {y:.3} {z:.3}, u {:.4} v {:.4}", cursor.uv.x, cursor.uv.y)).weak(),
         );
-        match &memory.record {
+        let place = place_of(&cursor);
+        // What another texel said is not shown for this one; older maps stand until the new ones were asked.
+        match memory.record.as_ref().filter(|(own, _)| own.place == place) {
             Some((_, record)) => body(ui, model, record),
             None if !cursor.pinned => {
                 ui.label("Click the surface to see what every photo says of it");
@@ -48,11 +65,32 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut RecordMemory) {
             None if model.project.as_ref().is_none_or(|project| project.maps.is_none()) => {
                 ui.label("There are no maps yet: start a fit");
             }
+            None if memory.pending.is_none() && memory.failed.is_some_and(|own| own.place == place) => {
+                ui.label("The photos could not be asked: see Messages");
+            }
             None => {
                 ui.label("Asking the photos");
             }
         }
     });
+}
+
+/// Takes in the record that a thread made, or that it fell.
+fn take_in(model: &mut Model, memory: &mut RecordMemory) {
+    let Some((question, receiver)) = &memory.pending else { return };
+    match receiver.try_recv() {
+        Ok(record) => memory.record = Some((*question, Box::new(record))),
+        Err(TryRecvError::Empty) => return,
+        Err(TryRecvError::Disconnected) => {
+            // The thread is gone without a record: the same question would end the same way.
+            memory.failed = Some(*question);
+            model.log.error(
+                &Error::new(ErrorKind::Internal, "the photos could not be asked about a texel")
+                    .remedy("a defect of this program; other texels can still be asked about"),
+            );
+        }
+    }
+    memory.pending = None;
 }
 
 /// Asks for the record of a pinned texel, once.
@@ -67,26 +105,11 @@ fn ask(ui: &Ui, model: &Model, cursor: &Cursor, memory: &mut RecordMemory) {
         return;
     }
     let mut hasher = DefaultHasher::new();
-    let place = [cursor.uv.x.to_bits(), cursor.uv.y.to_bits()];
+    let place = place_of(cursor);
     (place, Arc::as_ptr(maps) as usize, &model.edits.fit.exclude).hash(&mut hasher);
-    let key = hasher.finish();
-    if let Some((own, receiver)) = &memory.pending {
-        match receiver.try_recv() {
-            Ok(record) => {
-                memory.record = Some((*own, Box::new(record)));
-                memory.pending = None;
-            }
-            Err(TryRecvError::Empty) => return,
-            Err(TryRecvError::Disconnected) => {
-                // The thread is gone without a record: the same question would end the same way.
-                let own = *own;
-                memory.pending = None;
-                memory.record = memory.record.take().filter(|(known, _)| *known == own);
-                return;
-            }
-        }
-    }
-    if memory.record.as_ref().is_some_and(|(own, _)| *own == key) {
+    let question = Question { place, key: hasher.finish() };
+    let is_answered = memory.record.as_ref().is_some_and(|(own, _)| *own == question);
+    if memory.pending.is_some() || is_answered || memory.failed == Some(question) {
         return;
     }
     let ray = crate::trace::Ray {
@@ -112,7 +135,7 @@ fn ask(ui: &Ui, model: &Model, cursor: &Cursor, memory: &mut RecordMemory) {
         context.request_repaint();
     });
     if spawned.is_ok() {
-        memory.pending = Some((key, receiver));
+        memory.pending = Some((question, receiver));
     }
 }
 

@@ -57,10 +57,12 @@ fn left(ui: &mut Ui, model: &mut Model) {
                 number::duration(progress.seconds_left)
             ));
         }
-        let rmse = row.surface_rmse.unwrap_or_else(|| row.image_loss.max(0.0).sqrt());
-        ui.label(format!("RMSE {rmse:.4}")).on_hover_text(
-            "Root mean squared error of linear radiance over the unclipped surface of the last step's photos",
-        );
+        let (rmse, over) = match row.surface_rmse {
+            Some(surface) => (surface, "the unclipped surface of the last step's photos"),
+            None => (row.image_loss.max(0.0).sqrt(), "every pixel of the last step's photos that is evidence"),
+        };
+        ui.label(format!("RMSE {rmse:.4}"))
+            .on_hover_text(format!("Root mean squared error of linear radiance over {over}"));
     }
 }
 

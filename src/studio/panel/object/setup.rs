@@ -158,6 +158,15 @@ fn browse(ui: &mut Ui, model: &mut Model, purpose: PickFor, what: &str) {
 
 fn shape(ui: &mut Ui, model: &mut Model, memory: &mut SetupMemory) {
     let form = &mut model.edits.object;
+    if !form.normals.is_empty() {
+        ui.label("By pictures of normals, as in the result that was opened");
+        let button = ui.button("Take another shape").on_hover_text("A sphere, or a mesh with its cameras");
+        if button.clicked() {
+            form.normals.clear();
+            form.is_sphere = form.mesh.is_empty();
+        }
+        return;
+    }
     ui.horizontal_wrapped(|ui| {
         ui.radio_value(&mut form.is_sphere, true, "A sphere")
             .on_hover_text("It fills the shorter side of the photo and is seen from infinitely far along -z");

@@ -3,12 +3,14 @@
 mod frame;
 mod traced;
 
+use crate::error::Finding;
 use crate::image::value_scale::three_digits;
 use crate::insight::cursor::place_in_view;
 use crate::studio::act::Act;
 use crate::studio::layout::Panel;
 use crate::studio::model::edits::PhotoLook;
-use crate::studio::model::log::capitalised;
+use crate::studio::model::log::{Message, capitalised};
+use crate::studio::model::viewing::LAYERS_TITLE;
 use crate::studio::model::{Cursor, FitStatus, Model};
 use crate::studio::stage::eye::Eye;
 use crate::studio::stage::{self, Layer, Stage, StageFrame};
@@ -31,6 +33,8 @@ pub struct StageMemory {
     dragging: Option<Dragging>,
     last_moved: Option<Instant>,
     last_eye: Option<Eye>,
+    /// What the stage could not show as it is, as last told.
+    told: Vec<Finding>,
 }
 
 /// What a drag moves.
@@ -84,6 +88,11 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut StageMemory) {
         );
     };
     let response = stage.show(ui, &frame);
+    let findings = stage.status().findings;
+    for finding in findings.iter().filter(|finding| !memory.told.contains(finding)) {
+        model.log.add(Message::from(finding));
+    }
+    memory.told = findings;
     memory.rect = Some(response.rect);
     let response = response.on_hover_cursor(CursorIcon::Crosshair);
     interact(ui, model, memory, &frame, &response);
@@ -256,8 +265,13 @@ fn decorate(ui: &mut Ui, model: &Model, frame: &StageFrame, rect: Rect, traced: 
     let quick = lit && frame.content.traced.is_none();
     let clay = model.project.as_ref().is_some_and(|project| project.maps.is_none());
     let is_untold = told.is_some_and(|what| !model.project.as_ref().is_some_and(|own| own.known.has(what)));
+    let is_measured = model.edits.layer.is_quantity() && told.is_none();
     let right = match (quick, clay) {
         _ if is_untold => model.why_untold(),
+        _ if is_measured && frame.content.quantity.is_none() => match model.tasks.is_running(LAYERS_TITLE) {
+            true => "Being measured",
+            false => "Not measured: View, Measure photo error",
+        },
         (_, true) if lit => "No materials yet: start the fit",
         (true, _) if matches!(model.fit.status, FitStatus::Running | FitStatus::Pausing) => {
             "Quick look without shadows; pause to see it traced"

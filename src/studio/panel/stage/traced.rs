@@ -22,6 +22,8 @@ pub struct Traced {
     sides: [Option<Side>; 2],
     joined: Option<(u64, Arc<RgbImage>)>,
     failed: bool,
+    /// Addresses of the surface and the maps that are drawn.
+    drawn: (usize, usize),
 }
 
 struct Side {
@@ -51,6 +53,16 @@ impl Traced {
         size: Vec2,
         settled: bool,
     ) -> TracedPicture {
+        let surface = model.project.as_ref().and_then(|project| project.surface.clone());
+        let maps = model.project.as_ref().and_then(|project| project.maps.clone());
+        let drawn = (
+            surface.as_ref().map_or(0, |own| Arc::as_ptr(own) as usize),
+            maps.as_ref().map_or(0, |own| Arc::as_ptr(own) as usize),
+        );
+        if self.drawn != drawn {
+            // Where one could not be drawn, another may be.
+            (self.drawn, self.failed) = (drawn, false);
+        }
         let wanted = model.switches.traced
             && !self.failed
             && model.edits.layer == Layer::Lit
@@ -59,8 +71,6 @@ impl Traced {
                 FitStatus::Idle | FitStatus::Paused | FitStatus::Stopped | FitStatus::Finished
             )
             && size.min_elem() >= 16.0;
-        let surface = model.project.as_ref().and_then(|project| project.surface.clone());
-        let maps = model.project.as_ref().and_then(|project| project.maps.clone());
         let (true, Some(surface), Some(maps)) = (wanted, surface, maps) else {
             self.cancel();
             return TracedPicture::default();
@@ -141,7 +151,7 @@ impl Traced {
                 && number > own.failures
             {
                 own.failures = number;
-                self.failed = true;
+                self.failed |= failure.key == own.key;
                 model.log.error(&failure.error);
             }
         }
