@@ -1,7 +1,8 @@
 //! A fit's state as one file, written whole or not at all.
 //!
 //! Layout: the line `PATINA CHECKPOINT 1`, eight bytes with the length of a JSON text, that text, then the arrays as
-//! `f32` in a fixed order, in the byte order of the machine, which is little-endian on all that are supported, then eight bytes with a checksum over all before them.
+//! `f32` in a fixed order, in the byte order of the machine, which is little-endian on all that are supported, then
+//! eight bytes with a checksum over all before them.
 
 use super::adam::Moments;
 use super::schedule::Stage;
@@ -39,6 +40,9 @@ struct Header {
 }
 
 /// Writes a state; the file that was there before stays until the new one is complete.
+///
+/// # Errors
+/// `Unwritable`, with the place.
 pub fn write(path: &Path, state: &FitState) -> Result<()> {
     let header = Header {
         plan: state.plan.clone(),
@@ -129,6 +133,9 @@ pub fn summary(path: &Path) -> Result<Summary> {
 }
 
 /// Reads a state back, bit for bit.
+///
+/// # Errors
+/// `Missing`, `Unreadable` or `Malformed`, with the place.
 pub fn read(path: &Path) -> Result<FitState> {
     let bytes = std::fs::read(path).map_err(|source| {
         Error::reading(path, source).remedy("a run writes it while it goes; start the run again with `patina fit`")

@@ -65,6 +65,9 @@ pub struct Fitter {
 
 impl Fitter {
     /// A new fit of a scene. `surface` holds the mesh with the atlas; `known_light` starts from a given environment.
+    ///
+    /// # Errors
+    /// A setting out of range; a scene of which nothing can be evidence, or whose photos and cameras do not go together.
     pub fn new(
         scene: Arc<Scene>,
         surface: Arc<Surface>,
@@ -91,6 +94,9 @@ impl Fitter {
     ///
     /// Settings that may change while a fit runs may differ from those of the run so far: it then goes on with the new
     /// ones, as after [`Fitter::change`].
+    ///
+    /// # Errors
+    /// As of [`Fitter::new`]; a state of another scene, other sizes or another plan.
     pub fn resume(
         scene: Arc<Scene>,
         surface: Arc<Surface>,
@@ -278,6 +284,9 @@ impl Fitter {
     }
 
     /// Steps until the fit is done. Whether it is, and `stop` was not raised before; it may be gone on with then.
+    ///
+    /// # Errors
+    /// As of [`Fitter::step`].
     pub fn finish(&mut self, stop: &AtomicBool) -> Result<bool> {
         loop {
             match self.step(stop)? {
@@ -289,6 +298,9 @@ impl Fitter {
     }
 
     /// Does one step. `stop` may be raised by another thread at any time: the step in progress is then dropped.
+    ///
+    /// # Errors
+    /// `NonFinite` when too much of a step is not finite; photos of which none shows the surface.
     pub fn step(&mut self, stop: &AtomicBool) -> Result<StepOutcome> {
         let began = Instant::now();
         if !self.look_at_held_out(stop) {

@@ -11,7 +11,10 @@ const MOST_UNKNOWNS_OF_LIGHT: usize = 2048;
 const MOST_BYTES_OF_VISIBILITY: usize = 8 << 30;
 
 impl FitSettings {
-    /// Checks every range; the error names the setting.
+    /// Checks every range.
+    ///
+    /// # Errors
+    /// `InvalidSetting` with the name of the first that is out of its range.
     pub fn validate(&self) -> Result<()> {
         let wrong = |name: &str, message: &str| {
             Err(Error::new(ErrorKind::InvalidSetting, message).at(Place::Setting(name.into())))

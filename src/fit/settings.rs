@@ -72,7 +72,7 @@ pub struct FitSettings {
     /// file, maps are made smaller where less holds what the photos resolve, but not below 256.
     #[arg(long, default_value_t = FitSettings::default().map_size)]
     pub map_size: usize,
-    /// Height of the environment in texels; it is twice as wide.
+    /// Height of the environment in texels, 2 to 1024; it is twice as wide. The solver seeks one of up to 64.
     #[arg(long, default_value_t = FitSettings::default().environment_height)]
     pub environment_height: usize,
     /// Two steps as in the paper, or one.
@@ -84,25 +84,25 @@ pub struct FitSettings {
     /// Optimiser steps of the second step: all maps and light.
     #[arg(long, default_value_t = FitSettings::default().steps_all)]
     pub steps_all: usize,
-    /// Views in one optimiser step.
+    /// Views in one optimiser step, at least 1.
     #[arg(long, default_value_t = FitSettings::default().views_per_step)]
     pub views_per_step: usize,
     /// Pixels in one optimiser step over all its views; 0 takes every pixel. Consistency always takes every pixel.
     #[arg(long, default_value_t = FitSettings::default().pixels_per_step)]
     pub pixels_per_step: usize,
-    /// Paths a pixel in one optimiser step; an even number keeps the squared error unbiased.
+    /// Paths a pixel in one optimiser step, 1 to 4096; an even number keeps the squared error unbiased.
     #[arg(long, default_value_t = FitSettings::default().samples)]
     pub samples: usize,
-    /// Surface hits on the longest path; 1 is direct light only.
+    /// Surface hits on the longest path, 1 to 16; 1 is direct light only.
     #[arg(long, default_value_t = FitSettings::default().bounces)]
     pub bounces: usize,
-    /// Levels of coarse-to-fine: each halves photographs and maps once more. 1 works at full size only.
+    /// Levels of coarse-to-fine, 1 to 6: each halves photographs and maps once more. 1 works at full size only.
     #[arg(long, default_value_t = FitSettings::default().levels)]
     pub levels: usize,
     /// How samples are spread over a pixel.
     #[arg(long, value_enum, default_value_t)]
     pub pixel_filter: PixelFilter,
-    /// Multi-view gradient consistency.
+    /// Multi-view gradient consistency, in the second of two steps or in the one step there is.
     #[arg(long, value_enum, default_value_t)]
     pub consistency: Consistency,
     /// Background pixels as evidence for the light.
@@ -119,16 +119,16 @@ pub struct FitSettings {
     /// Keep the light as it is at the start; with `--env` on the command line, a light that is known.
     #[arg(long)]
     pub fixed_light: bool,
-    /// Step size of diffuse reflectance.
+    /// Step size of diffuse reflectance, 0 to 1.
     #[arg(long, default_value_t = FitSettings::default().rate_diffuse)]
     pub rate_diffuse: f32,
-    /// Step size of specular reflectance.
+    /// Step size of specular reflectance, 0 to 1.
     #[arg(long, default_value_t = FitSettings::default().rate_specular)]
     pub rate_specular: f32,
-    /// Step size of the logarithm of the microfacet width.
+    /// Step size of the logarithm of the microfacet width, 0 to 1.
     #[arg(long, default_value_t = FitSettings::default().rate_roughness)]
     pub rate_roughness: f32,
-    /// Step size of the light, relative to its mean plus the texel's own radiance.
+    /// Step size of the light, relative to its mean plus the texel's own radiance, 0 to 1.
     #[arg(long, default_value_t = FitSettings::default().rate_light)]
     pub rate_light: f32,
     /// Weight of the wish for a smooth light, for texels that no pixel says much of; 0 leaves it out.
@@ -144,14 +144,14 @@ pub struct FitSettings {
     /// long and smooths edges better.
     #[arg(long, default_value_t = FitSettings::default().first_hits_mib)]
     pub first_hits_mib: usize,
-    /// Rounds of the solver on the light: half of them on wide patches of sky, half with narrow ones where it is bright.
+    /// Rounds of the solver on the light, 2 to 64: half of them on wide patches of sky, half with narrow ones where it is bright.
     #[arg(long, default_value_t = FitSettings::default().solver_rounds)]
     pub solver_rounds: usize,
-    /// Width and height of the solver's grid over the atlas at whose points rays are traced; at most the maps' size is
-    /// used. When not given: 128 with polishing, else 256.
+    /// Width and height of the solver's grid over the atlas at whose points rays are traced, 16 to 4096; at most the maps'
+    /// size is used. When not given: 128 with polishing, else 256.
     #[arg(long, default_value_t = FitSettings::default().solver_grid)]
     pub solver_grid: usize,
-    /// Sizes of photos and maps at which the solver works, each half of the next: light and maps are found at the smallest
+    /// Sizes of photos and maps at which the solver works, 1 to 6, each half of the next: light and maps are found at the smallest
     /// first, then made better. The full size counts where polishing makes its maps, too. A size with maps below 128 x 128
     /// texels is left out. When not given: 3 with polishing, else 2.
     #[arg(long, default_value_t = FitSettings::default().solver_levels)]

@@ -2,7 +2,7 @@
 //!
 //! Where a direction reads the environment asks for two angles, and a texture for two floors, several times a path. Those
 //! of the C library are functions apart, tens of nanoseconds long; these are a short polynomial, good to a few units in the
-//! last place, and a cast. What paths ask for side by side is in [`super::vector::elementary`].
+//! last place, and a cast. What paths ask for side by side is in `vector::elementary`.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 

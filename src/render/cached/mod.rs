@@ -9,7 +9,7 @@
 //!    [`seen_light`]: the same as lobes see it.
 //! 5. [`footprint`]: what a camera sees, as shading points with lists of texels.
 //! 6. [`transport`]: all of it together, and the radiance it gives. Sums run on several numbers at a time
-//!    ([`crate::math::vector`]).
+//!    (`math::vector`).
 //!
 //! For fixed roughness the result is linear in the light; for fixed light and roughness it is linear in diffuse and
 //! specular reflectance. Nothing is random after the cache is traced, and nothing depends on the number of threads.

@@ -2,7 +2,7 @@
 //!
 //! What a hit asks for between its rays, angles, logarithms, random numbers, is a long chain of steps that wait for each
 //! other. For one path that took longer than its rays; for sixteen at a time it takes little longer than for one, with
-//! the vectors that the machine has ([`crate::math::vector`]). Rays, triangles and texels are still looked up one by one.
+//! the vectors that the machine has (`math::vector`). Rays, triangles and texels are still looked up one by one.
 //!
 //! `kernel` holds the arithmetic, `light_cells` the part of it that reads the light's table; this file is what is done path
 //! by path: find the point that was hit, cast the shadow ray and the next ray, and write the record ([`PathVertex`]).
