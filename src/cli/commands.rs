@@ -108,7 +108,7 @@ fn tell_findings(findings: &[Finding], json: bool) {
 }
 
 /// Says that pixels of a picture were not finite, if any were: they are black in it.
-pub(super) fn tell_non_finite(picture: &Picture, name: &str, json: bool) {
+fn tell_non_finite(picture: &Picture, name: &str, json: bool) {
     if picture.non_finite_pixels > 0 {
         let message = format!("{} pixels of {name} were not finite and are black", picture.non_finite_pixels);
         let finding = Finding::new(Severity::Warning, "picture-not-finite", message)
@@ -170,8 +170,8 @@ pub fn relight(options: &RelightOptions, json: bool) -> Result<()> {
                 }
                 None => relit(&surface, &own, &light, &camera, view, &picture_settings, &stop),
             };
-            // Names of photos and lights may hold dots: nothing after one is an extension.
             tell_non_finite(&picture, &scene.views[view].name, json);
+            // Names of photos and lights may hold dots: nothing after one is an extension.
             let path = |extension: &str| output.join(format!("{}_{stem}.{extension}", scene.views[view].name));
             file::write_exr_rgb(&path("exr"), &picture.radiance)?;
             let bytes = file::srgb8_from_linear(&picture.radiance, options.exposure);
