@@ -132,16 +132,13 @@ impl RunFolder {
     pub fn read_result(&self) -> Result<RunResult> {
         let missing: Vec<&str> = RESULT_FILES.into_iter().filter(|name| !self.file(name).is_file()).collect();
         if let Some(first) = missing.first() {
-            let remedy = match (self.checkpoint_path().is_file(), self.has_earlier()) {
-                (true, false) => "the fit has not ended: go on with `patina resume RUN`",
-                (true, true) => {
-                    "the fit has not ended: go on with `patina resume RUN`, or name RUN/earlier, the result before it"
-                }
-                (false, false) => "make the run again with `patina fit SCENE -o RUN`",
-                (false, true) => {
-                    "make the run again with `patina fit SCENE -o RUN`, or name RUN/earlier, the result before"
-                }
+            let how = if self.checkpoint_path().is_file() {
+                "the fit has not ended: go on with `patina resume RUN`"
+            } else {
+                "make the run again with `patina fit SCENE -o RUN`"
             };
+            let otherwise = if self.has_earlier() { ", or name RUN/earlier, the result before it" } else { "" };
+            let remedy = format!("{how}{otherwise}");
             let message = format!("the run has no {}", missing.join(", no "));
             return Err(Error::new(ErrorKind::Missing, message).at(Place::File(self.file(first))).remedy(remedy));
         }

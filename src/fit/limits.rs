@@ -1,6 +1,7 @@
 //! What settings of a fit may be.
 
 use super::settings::{Consistency, FitSettings, Method};
+use super::solver::light_shape::LightShape;
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::render::path::MAX_BOUNCES;
 
@@ -83,8 +84,8 @@ impl FitSettings {
             Err(Error::new(ErrorKind::InvalidSetting, message).at(Place::Setting(name.into())).remedy(remedy))
         };
         let height = self.environment_height;
-        // A light of even size is sought on patches of two by two texels.
-        let unknowns = if height.is_multiple_of(2) { height * height / 2 } else { 2 * height * height };
+        let (columns, rows) = LightShape::wide_hats((2 * height, height));
+        let unknowns = columns * rows;
         if !self.fixed_light && unknowns > MOST_UNKNOWNS_OF_LIGHT {
             let message = format!("{unknowns} unknowns of the light are more than the solver can hold");
             return too_large("environment-height", message, "give an even number up to 64, or --method paper");

@@ -144,16 +144,17 @@ pub struct FitSettings {
     /// long and smooths edges better.
     #[arg(long, default_value_t = FitSettings::default().first_hits_mib)]
     pub first_hits_mib: usize,
-    /// Rounds of the solver on the light, 2 to 64: half of them on wide patches of sky, half with narrow ones where it is bright.
+    /// Rounds of the solver on the light, 2 to 64: half of them on wide patches of sky, half with narrow ones where it is
+    /// bright.
     #[arg(long, default_value_t = FitSettings::default().solver_rounds)]
     pub solver_rounds: usize,
     /// Width and height of the solver's grid over the atlas at whose points rays are traced, 16 to 4096; at most the maps'
     /// size is used. When not given: 128 with polishing, else 256.
     #[arg(long, default_value_t = FitSettings::default().solver_grid)]
     pub solver_grid: usize,
-    /// Sizes of photos and maps at which the solver works, 1 to 6, each half of the next: light and maps are found at the smallest
-    /// first, then made better. The full size counts where polishing makes its maps, too. A size with maps below 128 x 128
-    /// texels is left out. When not given: 3 with polishing, else 2.
+    /// Sizes of photos and maps at which the solver works, 1 to 6, each half of the next: light and maps are found at the
+    /// smallest first, then made better. The full size counts where polishing makes its maps, too. A size with maps below
+    /// 128 x 128 texels is left out. When not given: 3 with polishing, else 2.
     #[arg(long, default_value_t = FitSettings::default().solver_levels)]
     pub solver_levels: usize,
     /// Whether views that took no part judge what lobes, light between surfaces and the light's resolution bought.

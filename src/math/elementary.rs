@@ -6,7 +6,8 @@
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
-/// The angle of `(x, y)` in `[-pi, pi]`, for both 0 that of the sign of `x`: 0, or pi for -0. Absolute error below 4e-7. Neither number may be infinite.
+/// The angle of `(x, y)` in `[-pi, pi]`, for both 0 that of the sign of `x`: 0, or pi for -0. Absolute error below
+/// 4e-7. Neither number may be infinite.
 #[inline(always)]
 pub fn atan2(y: f32, x: f32) -> f32 {
     let (x_size, y_size) = (x.abs(), y.abs());

@@ -61,7 +61,11 @@ impl Likelihood {
 
     /// Whether a measurement is a bound that this value keeps: then it says nothing of how far.
     pub fn is_kept_bound(&self, pixel: usize, channel: usize, value: f32) -> bool {
-        self.evidence[pixel][channel] != Evidence::Equal && self.residual(pixel, channel, value) == 0.0
+        self.is_bound_kept_by(pixel, channel, self.residual(pixel, channel, value))
+    }
+
+    fn is_bound_kept_by(&self, pixel: usize, channel: usize, residual: f64) -> bool {
+        residual == 0.0 && self.evidence[pixel][channel] != Evidence::Equal
     }
 
     /// Natural logarithms of picture over measurement, pixel by pixel; 0 where a bound is kept.
@@ -101,7 +105,7 @@ impl Likelihood {
                 }
                 let root = residual.hypot(self.width);
                 slopes.loss += scale * (root - self.width);
-                if residual == 0.0 && self.evidence[pixel][channel] != Evidence::Equal {
+                if self.is_bound_kept_by(pixel, channel, residual) {
                     continue;
                 }
                 let by_log = (f64::from(value).max(0.0) + self.epsilon).recip();

@@ -145,6 +145,16 @@ impl PixelCentre {
     }
 }
 
+impl fmt::Display for PixelCentre {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            PixelCentre::Auto => "auto",
+            PixelCentre::Integer => "integer",
+            PixelCentre::Half => "half",
+        })
+    }
+}
+
 impl FromStr for PixelCentre {
     type Err = Error;
     fn from_str(text: &str) -> Result<Self> {

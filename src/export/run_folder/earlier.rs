@@ -19,13 +19,13 @@ impl RunFolder {
     /// folder, which can be opened, relit and compared.
     ///
     /// # Errors
-    /// Files that cannot be moved; what was not moved stays where it was.
+    /// `Unwritable` when that subfolder holds other things than a run, or for files that cannot be moved: what was not moved
+    /// stays where it was.
     pub fn set_result_aside(&self) -> Result<()> {
         if !self.has_result() {
             return Ok(());
         }
-        let path = self.file(EARLIER);
-        let earlier = if path.is_dir() { RunFolder { path } } else { RunFolder::create(&path)? };
+        let earlier = RunFolder::create(&self.file(EARLIER))?;
         // What an older run had and this one has not must not stay among its files.
         earlier.remove_files()?;
         for name in files_of_a_run() {

@@ -88,7 +88,8 @@ impl SolverScene {
         })
     }
 
-    /// How far lobes are let go in a round: 0 in the first, 1 in the last, more in rounds on finer photos, which count as 1.
+    /// How far lobes are let go in a round: 0 in the first, 1 in the last, more in rounds on finer photos, which count
+    /// as 1.
     fn openness(&self, number: usize) -> f64 {
         let last = (self.settings.coarse_rounds + self.settings.fine_rounds).max(2) - 1;
         number as f64 / last as f64

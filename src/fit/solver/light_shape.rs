@@ -22,12 +22,17 @@ pub struct LightShape {
 }
 
 impl LightShape {
-    /// Wide hats over the sphere, and narrow hats at these texels. The wide hats are the texels themselves when the
-    /// light has an odd side or is too small to halve.
+    /// Numbers of wide hats along and across a light of this size: half of its texels, or all of them where it has an odd
+    /// side or is too small to halve.
+    pub fn wide_hats((width, height): (usize, usize)) -> (usize, usize) {
+        let is_halved = width.is_multiple_of(2) && height.is_multiple_of(2) && height >= 8;
+        if is_halved { (width / 2, height / 2) } else { (width, height) }
+    }
+
+    /// Wide hats over the sphere ([`Self::wide_hats`]), and narrow hats at these texels.
     pub fn new(size: (usize, usize), fine: Vec<u32>) -> Self {
         let (width, height) = size;
-        let halved = width % 2 == 0 && height % 2 == 0 && height >= 8;
-        let coarse = if halved { (width / 2, height / 2) } else { size };
+        let coarse = Self::wide_hats(size);
         let mut offsets = vec![0];
         let mut entries = Vec::new();
         for texel in 0..width * height {

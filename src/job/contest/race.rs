@@ -12,7 +12,6 @@ use crate::job::against_truth::resampled;
 use crate::job::demo::photograph;
 use crate::render::Surface;
 use crate::scene::demo::{self, DemoSettings};
-use crate::scene::settings::PixelCentre;
 use crate::scene::{ReadSettings, Scene};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -302,14 +301,9 @@ pub fn read_arguments(read: &ReadSettings) -> Vec<String> {
     fn word<T: clap::ValueEnum>(value: &T) -> String {
         value.to_possible_value().map(|value| value.get_name().to_string()).unwrap_or_default()
     }
-    let centre = match read.pixel_centre {
-        PixelCentre::Auto => "auto",
-        PixelCentre::Integer => "integer",
-        PixelCentre::Half => "half",
-    };
     vec![
         format!("--up={}", read.up),
-        format!("--pixel-centre={centre}"),
+        format!("--pixel-centre={}", read.pixel_centre),
         format!("--hold-out-every={}", read.hold_out_every),
         format!("--max-views={}", read.max_views),
         format!("--masks={}", word(&read.masks)),

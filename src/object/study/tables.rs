@@ -103,7 +103,8 @@ fn what_was_done(options: &StudyOptions, inputs: &Inputs) -> String {
     let text = format!(
         "Photos show the measured reflectance itself (MERL via neural fits), asked at every part of a light of {} x {} \
          texels and summed without noise, which is what the path tracer comes to as well; what is fitted is a light of {width} x {height} texels and a model at {} nodes, by {} pixels. Errors of \
-         light are over the sphere by solid angle, those of reflectance over all cells of the table (aligned ones over every eleventh), those of pictures \
+         light are over the sphere by solid angle, those of reflectance over all cells of the table (aligned ones over every \
+         eleventh), those of pictures \
          over the object; all are root mean squares of natural logarithms. Aligned: after the best factor per channel. \
          The material that is estimated is never among the starts. The neural model was trained on {} materials; rows of \
          materials that are among them say so. Held-out light: {}. Seed {}.",
