@@ -26,6 +26,7 @@
 //! | [`job`] | the only door between a fit and whoever watches it |
 //! | [`cli`] | the command line; it holds no algorithm |
 //! | `studio` | the window, behind the feature of that name; it holds no algorithm either |
+//! | `lab` | experiments on all of it, behind the feature of that name, with the program `patina-lab` |
 //!
 //! # Conventions
 //! * **World**: right-handed, +y up. Directions towards the light. Lengths in the units of the mesh.
@@ -76,6 +77,8 @@ pub mod fit;
 pub mod image;
 pub mod insight;
 pub mod job;
+#[cfg(any(feature = "lab", all(test, feature = "cli")))]
+pub mod lab;
 pub mod light;
 pub mod material;
 pub mod math;
@@ -87,5 +90,14 @@ pub mod scene;
 #[cfg(feature = "studio")]
 pub mod studio;
 pub mod trace;
+
+#[cfg(test)]
+extern crate self as patina;
+#[cfg(all(test, feature = "cli"))]
+#[path = "../tests/core/mod.rs"]
+mod core_tests;
+#[cfg(all(test, feature = "studio"))]
+#[path = "../tests/studio/mod.rs"]
+mod window_tests;
 
 pub use error::{Error, ErrorKind, Finding, Place, Result, Severity};

@@ -121,7 +121,7 @@ pub fn resume(options: &ResumeOptions, json: bool) -> Result<()> {
 }
 
 /// Raises a flag on Ctrl-C; a second Ctrl-C ends the program at once.
-pub(super) fn stop_on_interrupt(stop: Arc<AtomicBool>) {
+pub(crate) fn stop_on_interrupt(stop: Arc<AtomicBool>) {
     // Fails only if a handler exists already, as in tests.
     let _ = ctrlc::set_handler(move || {
         if stop.swap(true, Ordering::Relaxed) {

@@ -3,43 +3,35 @@
 mod arguments;
 
 pub use self::arguments::*;
-use super::fit::stop_on_interrupt;
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::files::write_bytes;
 use crate::image::file;
 use crate::insight::material_pictures::{self as pictures, ShowLight};
-use crate::job::rivals::{DATA_STATEMENT, RivalOptions};
 use crate::light::Environment;
 use crate::measured::analytic::OwnLobe;
 use crate::measured::analytic::own_lobe::MapValues;
+use crate::measured::baseline::Baseline;
 use crate::measured::fit_model::ModelFitSettings;
-use crate::measured::fits::{NeuralFits, PublishedFits};
+use crate::measured::fits::{DATA_STATEMENT, NeuralFits, PublishedFits};
 use crate::measured::metrics::TableError;
-use crate::measured::rivals::Rival;
 use crate::measured::sphere::{self, EnvironmentLevels};
 use crate::measured::{Category, MeasuredBrdf};
-use crate::neural::own_net::{self, OwnNetSettings};
 use crate::neural::source;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 /// Does what was asked.
 pub fn run(task: &MeasuredTask, json: bool) -> Result<()> {
     match task {
         MeasuredTask::List(options) => list(options, json),
         MeasuredTask::Show(options) => show(options, json),
-        MeasuredTask::Thumbnails(options) => thumbnails(options, json),
         MeasuredTask::Convert(options) => convert(options, json),
         MeasuredTask::Fit(options) => fit(options, json),
         MeasuredTask::Project(options) => project(options, json),
-        MeasuredTask::Rivals(options) => rivals(options, json),
-        MeasuredTask::Neural(task) => super::neural::run(task, json),
     }
 }
 
 /// The table of a source, and its name.
-fn table_of(source: &Source) -> Result<(MeasuredBrdf, String)> {
+pub(crate) fn table_of(source: &Source) -> Result<(MeasuredBrdf, String)> {
     let path = Path::new(&source.material);
     if let Some(published) = &source.published {
         let fits = PublishedFits::read(published)?;
@@ -60,7 +52,7 @@ fn table_of(source: &Source) -> Result<(MeasuredBrdf, String)> {
     }
 }
 
-fn light_of(env: Option<&PathBuf>) -> Result<ShowLight> {
+pub(crate) fn light_of(env: Option<&PathBuf>) -> Result<ShowLight> {
     let Some(path) = env else { return Ok(ShowLight::Lamps(sphere::showing_lamps())) };
     let (environment, findings) = Environment::read(path)?;
     findings.iter().for_each(|finding| eprintln!("{finding}"));
@@ -83,7 +75,7 @@ fn list(options: &ListOptions, json: bool) -> Result<()> {
 }
 
 /// Says what was written where: a line of text, or an event.
-fn tell_written(what: &str, path: &Path, json: bool) {
+pub(crate) fn tell_written(what: &str, path: &Path, json: bool) {
     match json {
         true => println!("{}", serde_json::json!({"event": "written", "what": what, "path": path})),
         false => println!("{what}: {}", path.display()),
@@ -102,23 +94,6 @@ fn show(options: &ShowOptions, json: bool) -> Result<()> {
     Ok(())
 }
 
-fn thumbnails(options: &ThumbnailOptions, json: bool) -> Result<()> {
-    let fits = NeuralFits::read(&options.library)?;
-    let light = light_of(options.env.as_ref())?;
-    let tiles: Vec<_> = fits
-        .materials
-        .iter()
-        .map(|fit| {
-            let table = fit.table();
-            let value = |at| table.lookup(at).unwrap_or_default();
-            (fit.name.clone(), pictures::sphere_of(&value, options.size as usize, &light))
-        })
-        .collect();
-    file::write_png_srgb8(&options.output, &pictures::sheet(&tiles, None))?;
-    tell_written(&format!("{} materials", tiles.len()), &options.output, json);
-    Ok(())
-}
-
 fn convert(options: &ConvertOptions, json: bool) -> Result<()> {
     let (table, name) = table_of(&options.source)?;
     table.write(&options.output)?;
@@ -127,29 +102,9 @@ fn convert(options: &ConvertOptions, json: bool) -> Result<()> {
 }
 
 fn fit(options: &MeasuredFitOptions, json: bool) -> Result<()> {
-    if options.model == own_net::KEY {
-        let (table, name) = table_of(&options.source)?;
-        let found = own_net::fit_own_net(&crate::neural::shipped()?, &table, &OwnNetSettings::default())?;
-        let command = format!("patina measured fit {name} --model {}", own_net::KEY);
-        found.named(&name, &command).write(&options.output.join(own_net::FILE))?;
-        let fitted = Fitted {
-            model: own_net::NAME,
-            table: found.model.table(&found.parameters),
-            error: found.error,
-            maps: None,
-            parameters: found.parameters,
-        };
-        return report_fit(&fitted, &name, &table, Some(&options.output), "fit", json);
-    }
-    let rival = Rival::of_key(&options.model).map_err(|error| {
-        Error::new(ErrorKind::InvalidSetting, error.message()).at(Place::Setting("model".into())).remedy(format!(
-            "{}, {}",
-            error.remedy_text(),
-            own_net::KEY
-        ))
-    })?;
+    let baseline = Baseline::of_key(&options.model).map_err(|error| error.at(Place::Setting("model".into())))?;
     let (table, name) = table_of(&options.source)?;
-    report_fit(&Fitted::of(rival, &table)?, &name, &table, Some(&options.output), "fit", json)
+    report_fit(&Fitted::of(baseline, &table)?, &name, &table, Some(&options.output), "fit", json)
 }
 
 fn project(options: &ProjectOptions, json: bool) -> Result<()> {
@@ -157,34 +112,34 @@ fn project(options: &ProjectOptions, json: bool) -> Result<()> {
     if !json {
         println!("{}: {}", found.name, found.origin);
     }
-    let fitted = Fitted::of(Rival::OwnLobe, &found.table)?;
+    let fitted = Fitted::of(Baseline::OwnLobe, &found.table)?;
     report_fit(&fitted, &found.name, &found.table, options.output.as_deref(), "project", json)
 }
 
 /// A model after its fit.
-struct Fitted {
-    model: &'static str,
-    table: MeasuredBrdf,
-    error: TableError,
-    maps: Option<MapValues>,
-    parameters: Vec<f64>,
+pub(crate) struct Fitted {
+    pub(crate) model: &'static str,
+    pub(crate) table: MeasuredBrdf,
+    pub(crate) error: TableError,
+    pub(crate) maps: Option<MapValues>,
+    pub(crate) parameters: Vec<f64>,
 }
 
 impl Fitted {
-    fn of(rival: Rival, table: &MeasuredBrdf) -> Result<Self> {
-        let fit = rival.fit(table, &ModelFitSettings::default())?;
+    fn of(baseline: Baseline, table: &MeasuredBrdf) -> Result<Self> {
+        let fit = baseline.fit(table, &ModelFitSettings::default())?;
         Ok(Fitted {
-            model: rival.name(),
+            model: baseline.name(),
             table: fit.table(),
             error: fit.error,
-            maps: (rival == Rival::OwnLobe).then(|| OwnLobe::map_values(&fit.parameters)),
+            maps: (baseline == Baseline::OwnLobe).then(|| OwnLobe::map_values(&fit.parameters)),
             parameters: fit.parameters,
         })
     }
 }
 
 /// Writes `STEM.json`, `STEM.binary`, spheres and lobes of a fit if a folder is given, and prints its errors.
-fn report_fit(
+pub(crate) fn report_fit(
     fit: &Fitted,
     name: &str,
     table: &MeasuredBrdf,
@@ -225,26 +180,6 @@ fn report_fit(
     }
     if let Some(output) = output {
         println!("{}", output.display());
-    }
-    Ok(())
-}
-
-fn rivals(options: &RivalsOptions, json: bool) -> Result<()> {
-    let stop = Arc::new(AtomicBool::new(false));
-    stop_on_interrupt(Arc::clone(&stop));
-    let study = RivalOptions {
-        library: options.library.clone(),
-        materials: options.materials.clone(),
-        models: options.models.clone(),
-        quick: options.quick,
-        output: options.output.clone(),
-    };
-    let table = crate::job::rivals::run(&study, &stop, &|row| match json {
-        true => println!("{}", serde_json::json!({"event": "rival", "row": row})),
-        false => eprintln!("{:<26} {:<22} log-RMSE {:.4}", row.material, row.model, row.error.log_rmse),
-    })?;
-    if !json {
-        println!("{}", table.to_markdown());
     }
     Ok(())
 }

@@ -1,25 +1,19 @@
 //! The command line; it holds no algorithm.
 //!
-//! [`arguments`] is what can be typed, [`fit`] drives a job and shows its events, [`measure`] audits and benches,
-//! [`contest`] holds methods against each other, [`study`] runs studies, [`measured`] is for measured reflectance and
-//! [`neural`] for its neural model, [`object`] is object mode, [`gauge`] moves the scale of a run,
-//! [`turntable`] belongs to `relight`, [`commands`] holds
-//! the rest. Whatever is asked here can be asked of the library in the same words.
+//! [`arguments`] is what can be typed, [`fit`] drives a job and shows its events, [`measured`] is for measured
+//! reflectance, [`object`] is object mode, [`gauge`] moves the scale of a run, [`turntable`] belongs to `relight`,
+//! [`commands`] holds the rest. Whatever is asked here can be asked of the library in the same words.
 
 pub mod arguments;
 pub mod commands;
-pub mod contest;
 pub mod fit;
 pub mod gauge;
-pub mod measure;
 pub mod measured;
-pub mod neural;
 pub mod object;
-pub mod study;
 pub mod turntable;
 
 use crate::error::{Error, ErrorKind, Result};
-use arguments::{Arguments, AuditTask, BenchTask, StudioOptions, StudyTask, Task};
+use arguments::{Arguments, StudioOptions, Task};
 use clap::Parser;
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -34,10 +28,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             return ExitCode::from(if usage.use_stderr() { 2 } else { 0 });
         }
     };
-    if let Some(threads) = arguments.threads {
-        // Fails only when a pool exists already, as in tests: then that one serves.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
-    }
+    use_threads(arguments.threads);
     let json = arguments.json;
     let outcome = match arguments.task {
         Some(Task::Demo(options)) => fit::demo(&options, json),
@@ -48,20 +39,24 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Task::Gauge(options)) => gauge::gauge(&options, json),
         Some(Task::Render(options)) => commands::render(&options, json),
         Some(Task::Compare(options)) => commands::compare(&options, json),
-        Some(Task::Audit(AuditTask::Gradients(options))) => measure::audit_gradients(&options, json),
-        Some(Task::Bench(BenchTask::Scale(options))) => measure::bench_scale(&options, json),
-        Some(Task::Bench(BenchTask::Fit(options))) => contest::fit(&options, json, arguments.threads),
-        Some(Task::Bench(BenchTask::Hard(options))) => contest::hard(&options, json),
-        Some(Task::Bench(BenchTask::Tracer(options))) => contest::tracer(&options, json, arguments.threads),
-        Some(Task::Bench(BenchTask::Entry(options))) => contest::entry(&options, json),
-        Some(Task::Bench(BenchTask::Studio(options))) => measure::bench_studio(&options, json),
         Some(Task::Object(options)) => object::object(&options, json),
-        Some(Task::Study(StudyTask::Ibrdf(options))) => object::study(&options, json),
-        Some(Task::Study(StudyTask::Mvcl(options))) => study::mvcl(&options, json),
         Some(Task::Measured(task)) => measured::run(&task, json),
         Some(Task::Studio(options)) => window(&options),
         None => window(&StudioOptions::default()),
     };
+    exit_code(outcome, json)
+}
+
+/// Limits the threads of the program.
+pub(crate) fn use_threads(threads: Option<usize>) {
+    if let Some(threads) = threads {
+        // Fails only when a pool exists already, as in tests: then that one serves.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    }
+}
+
+/// Shows an error and gives the code to exit with.
+pub(crate) fn exit_code(outcome: Result<()>, json: bool) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

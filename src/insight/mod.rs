@@ -1,19 +1,16 @@
-//! What can be said about a fit: scores, tables over seeds, and the report.
+//! What can be said about a fit: scores and the report.
 //!
 //! Read [`scores`] first: how a picture is compared with a photograph, and which pixels count. [`truth`] compares maps
-//! and light with a known truth, [`intervals`] stated uncertainties with it, [`report`] makes the one page that shows it all, [`study`] gathers numbers over seeds.
+//! and light with a known truth, [`intervals`] stated uncertainties with it, [`report`] makes the one page that shows it all.
 //! Every score comes twice, raw and scale-aligned, because reflectance times c with light over c is the same picture.
 //!
 //! [`capture`] tells after a fit what is wrong with photos, cameras, masks or mesh.
-//! [`coverage`] counts which texels photographs see. [`audit`] checks derivatives against differences. [`cursor`] leads
+//! [`coverage`] counts which texels photographs see. [`cursor`] leads
 //! between photo, surface and map; [`record`] says what each photo and the model say of one point,
-//! [`surface_layers`] what all photos together say of each texel. [`material_pictures`] shows measured reflectance,
-//! [`bar_picture`] bars without a browser.
+//! [`surface_layers`] what all photos together say of each texel. [`material_pictures`] shows measured reflectance.
 //!
 //! What this folder refuses to do: it changes no map, and scores only pictures that are handed to it.
 
-pub mod audit;
-pub mod bar_picture;
 pub mod capture;
 pub mod coverage;
 pub mod cursor;
@@ -25,7 +22,6 @@ pub mod plot;
 pub mod record;
 pub mod report;
 pub mod scores;
-pub mod study;
 pub mod surface_layers;
 pub mod truth;
 

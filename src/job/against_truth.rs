@@ -11,7 +11,7 @@ use crate::scene::Scene;
 
 /// Errors of maps, their stated deviations and light against the truth of a scene, without relit pictures; `None` where no truth is known. Maps
 /// are compared only where they lie on the texture coordinates of the truth.
-pub(super) fn truth_errors(
+pub(crate) fn truth_errors(
     scene: &Scene,
     surface: &Surface,
     maps: &MaterialMaps,
@@ -48,7 +48,7 @@ fn same_atlas(scene: &Scene, surface: &Surface) -> bool {
 }
 
 /// Maps read at the texel centres of another size.
-pub(super) fn resampled(maps: &MaterialMaps, (width, height): (usize, usize)) -> MaterialMaps {
+pub(crate) fn resampled(maps: &MaterialMaps, (width, height): (usize, usize)) -> MaterialMaps {
     if (maps.diffuse.width(), maps.diffuse.height()) == (width, height) {
         return maps.clone();
     }

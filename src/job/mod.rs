@@ -7,10 +7,7 @@
 //!
 //! [`open`] opens scenes and runs, begins fits and takes them up; [`prepare`] turns a scene into a surface with an atlas,
 //! [`worker`] is the thread and [`handle`] what a watcher holds of it, `save` keeps the run folder whole while it runs,
-//! [`outcome`] renders, scores and writes the run folder, [`demo`] makes the built-in scene, [`study`] fits many times over
-//! and makes tables, [`contest`] holds methods against each other by the clock, [`hard`] on cases that break fits;
-//! [`scale`] and [`tracer_speed`] time parts; [`rivals`] fits reflectance models to measured tables. [`preview`] draws for
-//! a window beside a fit. After a fit, [`gallery`] makes what a user shows, [`gauge`] moves its scale, [`entanglement`]
+//! [`outcome`] renders, scores and writes the run folder, [`demo`] makes the built-in scene. [`preview`] draws for a window beside a fit. After a fit, [`gallery`] makes what a user shows, [`gauge`] moves its scale, [`entanglement`]
 //! tells how much light is baked into the maps, [`regions`] reads measured materials for parts of a surface.
 //!
 //! [`object`] is the job of object mode, light and reflectance from photos of one object; [`materials`] its library of
@@ -18,14 +15,12 @@
 
 pub mod against_truth;
 pub mod background;
-pub mod contest;
 pub mod demo;
 pub mod entanglement;
 mod facts;
 pub mod gallery;
 pub mod gauge;
 pub mod handle;
-pub mod hard;
 pub mod materials;
 pub mod object;
 pub mod open;
@@ -34,15 +29,11 @@ pub mod pictures;
 pub mod prepare;
 pub mod preview;
 pub mod regions;
-pub mod rivals;
 mod save;
-pub mod scale;
 pub mod shown;
 pub mod slot;
 pub mod solver_told;
-pub mod study;
 pub mod time_left;
-pub mod tracer_speed;
 mod view;
 pub mod worker;
 

@@ -9,7 +9,7 @@ use crate::measured::metrics::LOG_FLOOR;
 use crate::measured::table::MeasuredBrdf;
 
 /// The cells of a column that count, with their places in the cube, by rising `theta_half`.
-pub(super) fn counted_in_column(
+pub(crate) fn counted_in_column(
     table: &MeasuredBrdf,
     difference: usize,
     azimuth: usize,
@@ -21,12 +21,12 @@ pub(super) fn counted_in_column(
 }
 
 /// `ln(stored + 1e-6)` of a cell.
-pub(super) fn log_stored(table: &MeasuredBrdf, cell: usize) -> [f64; 3] {
+pub(crate) fn log_stored(table: &MeasuredBrdf, cell: usize) -> [f64; 3] {
     table.raw_value(cell).map(|raw| (raw.max(0.0) + LOG_FLOOR).ln())
 }
 
 /// The cells of a table that count, column by column.
-pub(super) struct CountedColumns {
+pub(crate) struct CountedColumns {
     /// `theta_difference` and `phi_difference` in the cube.
     pub at: Vec<[f64; 2]>,
     /// Where the cells of each column begin; one more entry at the end.
@@ -38,7 +38,7 @@ pub(super) struct CountedColumns {
 }
 
 /// Cells of one step.
-pub(super) struct Batch {
+pub(crate) struct Batch {
     /// Which columns.
     pub columns: Vec<usize>,
     /// Which cells, the same number for each column.

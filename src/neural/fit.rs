@@ -149,7 +149,7 @@ pub fn fit_table(model: &FlowModel, table: &MeasuredBrdf, settings: &FlowFitSett
 /// row 0 for a library without codes.
 ///
 /// Errors: a library that holds no material, a table of which no cell counts.
-pub(super) fn nearest_codes(library: &Trained, table: &MeasuredBrdf, seed: u64) -> Result<[(usize, f64); 3]> {
+pub(crate) fn nearest_codes(library: &Trained, table: &MeasuredBrdf, seed: u64) -> Result<[(usize, f64); 3]> {
     let sample = Sample::draw(table, &FlowFitSettings { seed, columns: 120, ..FlowFitSettings::default() });
     let rows = library.log_colours.len();
     if sample.weight.is_empty() || rows == 0 {

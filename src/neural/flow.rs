@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Points that one thread takes at once: what the nets make of so many stays in the cache of a core.
-pub(super) const CHUNK: usize = 256;
+pub(crate) const CHUNK: usize = 256;
 
 /// A flow with its weights.
 #[derive(Clone, Debug)]

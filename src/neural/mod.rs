@@ -8,10 +8,10 @@
 //! it does). Below them are [`spline`], the transform of one coordinate, and [`dense`], the nets that choose it, on
 //! matrix products of [`product`]. [`columns`] is the fast path that training and fitting take, [`pass`] chooses it.
 //! * Training: [`library`] and [`target`] (what is learned), [`batch`] (the gradient of one step), [`train`], [`adam`],
-//!   [`run`] (a sitting, with checkpoints), [`weights`] (the file).
-//! * Use: [`model`] (reflectance from codes and colours, through [`lobes`], read between [`nodes`]), [`fit`] (to a table), [`own_net`] (all weights to one table), [`sampler`] (for a
+//!   [`weights`] (the file).
+//! * Use: [`model`] (reflectance from codes and colours, through [`lobes`], read between [`nodes`]), [`fit`] (to a table), [`sampler`] (for a
 //!   path tracer), [`embedding`] (the map of codes), [`between`] (materials between those of the library), [`source`]
-//!   (reflectance by name), [`speed`].
+//!   (reflectance by name).
 //!
 //! What is not claimed: a flow is reciprocal by the folded `phi_difference`, and the compact one has no seam there;
 //! neither keeps energy by construction, so albedo is measured ([`sampler::HalfVectorSampler::albedos`]), not promised.
@@ -21,7 +21,7 @@ pub mod adam;
 pub mod architecture;
 pub mod batch;
 pub mod between;
-mod cells;
+pub(crate) mod cells;
 pub mod columns;
 pub mod dense;
 pub mod embedding;
@@ -31,14 +31,11 @@ pub mod library;
 pub mod lobes;
 pub mod model;
 pub mod nodes;
-pub mod own_net;
 pub mod pass;
 pub mod product;
 mod product_wide;
-pub mod run;
 pub mod sampler;
 pub mod source;
-pub mod speed;
 pub mod spline;
 pub mod target;
 pub mod train;

@@ -15,7 +15,6 @@
 //! | [`picture`] | re-renders and relit pictures |
 //! | [`settings`], [`progress`] | what is asked, what is told |
 //! | [`read`](mod@read), [`result_folder`], [`result_read`], [`page`] | files that are read, what is left on disk, that read again |
-//! | [`study`] | the experiments of the paper |
 //!
 //! Any [`ReflectanceModel`](crate::measured::model::ReflectanceModel) can be estimated: it is asked for its values at
 //! nodes and nothing else. What this folder refuses to do: light that bounces between parts of the object, spatially
@@ -45,7 +44,6 @@ pub mod seen;
 pub mod settings;
 pub mod split;
 pub mod starts;
-pub mod study;
 pub mod transport;
 
 pub use geometry::ObjectGeometry;

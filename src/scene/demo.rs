@@ -138,7 +138,7 @@ fn parts() -> Vec<Part> {
 }
 
 /// The light of the photos of scenes made in code: a clear morning, the sun 38 degrees high and soft enough for 32 rows.
-pub(super) fn morning() -> Environment {
+pub(crate) fn morning() -> Environment {
     let settings = SkySettings {
         sun_elevation_radians: 38f32.to_radians(),
         sun_azimuth_radians: 50f32.to_radians(),
@@ -149,7 +149,7 @@ pub(super) fn morning() -> Environment {
 }
 
 /// The light they are relit under: a low warm sun on another side.
-pub(super) fn evening() -> Environment {
+pub(crate) fn evening() -> Environment {
     let settings = SkySettings {
         sun_elevation_radians: 14f32.to_radians(),
         sun_azimuth_radians: 245f32.to_radians(),
@@ -217,7 +217,7 @@ pub fn build(settings: &DemoSettings) -> Result<DemoScene> {
 }
 
 /// Views with black photos around an orbit: first `views` for the fit, then `held_out` between them.
-pub(super) fn views_of(orbit: &Orbit, views: usize, held_out: usize, seed: u64) -> Result<Vec<View>> {
+pub(crate) fn views_of(orbit: &Orbit, views: usize, held_out: usize, seed: u64) -> Result<Vec<View>> {
     if views == 0 || orbit.width == 0 || orbit.height == 0 {
         return Err(Error::new(ErrorKind::InvalidSetting, "a scene needs a view, and a view needs pixels")
             .at(Place::Setting(if views == 0 { "views" } else { "width" }.into()))

@@ -1,18 +1,16 @@
 //! What a fit is given: mesh, cameras, photographs; their readers and the pre-flight check.
 //!
 //! [`mesh`] and [`camera`] hold the geometry, [`photo`] the pixels, [`view`](View) joins them. [`read()`] makes a scene
-//! of a folder, [`doctor`] says whether a fit can work on it. [`demo`], [`study`] and [`hard`] are scenes made in code, out of what
+//! of a folder, [`doctor`] says whether a fit can work on it. [`demo`] is a scene made in code, out of what
 //! [`synthetic`] holds. Nothing here fits or renders.
 
 pub mod camera;
 pub mod demo;
 pub mod doctor;
-pub mod hard;
 pub mod mesh;
 pub mod photo;
 pub mod read;
 pub mod settings;
-pub mod study;
 pub mod synthetic;
 
 pub use camera::Camera;

@@ -22,7 +22,7 @@ pub fn run(options: StudioOptions) -> Result<()> {
 ///
 /// # Errors
 /// As of [`run`].
-pub(super) fn open(
+pub(crate) fn open(
     settings_file: Option<PathBuf>,
     app: impl FnOnce(&eframe::CreationContext<'_>) -> Box<dyn eframe::App>,
 ) -> Result<()> {

@@ -8,14 +8,11 @@
 //! 3-D and [`picture`] shows linear pictures: both know nothing of the rest. [`launch`] opens the window, or says in one
 //! sentence why there is none. [`pace`] decides how often a running fit is looked at.
 //!
-//! [`mod@bench`] acts like a person in front of it and measures.
-//!
 //! Nothing here blocks: reading, preparing, fitting, tracing and saving are threads that are polled once a frame, and a
 //! panic in any of them is a message.
 
 pub mod act;
 pub mod app;
-pub mod bench;
 pub mod launch;
 pub mod layout;
 pub mod model;

@@ -29,7 +29,9 @@ pub const ENDLESS: usize = 100_000;
 
 /// A folder that goes with the process' build folder rather than with the system's.
 fn lasting_folder() -> TempDir {
-    tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap()
+    let beside = std::env::current_exe().unwrap().parent().unwrap().join("tmp");
+    std::fs::create_dir_all(&beside).unwrap();
+    tempfile::tempdir_in(beside).unwrap()
 }
 
 /// Writes a small exchange folder with photos and a truth.

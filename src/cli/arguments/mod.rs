@@ -1,12 +1,8 @@
 //! What can be typed: the tasks, and the options of each by what they are about. The text of each field is its help.
 
-mod measure;
 mod pictures;
 mod scene;
 
-pub use measure::{
-    AuditOptions, AuditTask, BenchOptions, BenchPart, BenchStudioOptions, BenchTask, MvclOptions, StudyTask,
-};
 pub use pictures::{CompareOptions, Layer, RelightOptions, RenderOptions};
 pub use scene::{CheckOptions, DemoOptions, FitOptions, ReadOptions, ResumeOptions, TypedSettings};
 
@@ -54,15 +50,6 @@ pub enum Task {
     /// Look at measured reflectance, convert it, and fit models to it.
     #[command(subcommand)]
     Measured(super::measured::MeasuredTask),
-    /// Check the program against itself.
-    #[command(subcommand)]
-    Audit(AuditTask),
-    /// Measure time and memory.
-    #[command(subcommand)]
-    Bench(BenchTask),
-    /// Fit scenes with a known truth many times over and write tables and plots.
-    #[command(subcommand)]
-    Study(StudyTask),
 }
 
 /// Options of `patina studio`.

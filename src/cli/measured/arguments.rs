@@ -1,6 +1,5 @@
 //! What `patina measured` is asked.
 
-use crate::cli::neural::NeuralTask;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 
@@ -11,19 +10,12 @@ pub enum MeasuredTask {
     List(ListOptions),
     /// Draw a material: its sphere, its lobes as curves and as numbers.
     Show(ShowOptions),
-    /// Draw the spheres of all materials of a library on one sheet.
-    Thumbnails(ThumbnailOptions),
     /// Write a material as a table in MERL's `.binary` layout.
     Convert(ConvertOptions),
     /// Fit a model of few parameters to a material.
     Fit(MeasuredFitOptions),
     /// Project a measured, fitted or neural reflectance onto diffuse, specular and roughness, and state the error.
     Project(ProjectOptions),
-    /// Fit all such models to all materials of a library and compare their errors.
-    Rivals(RivalsOptions),
-    /// What concerns the neural model.
-    #[command(flatten)]
-    Neural(NeuralTask),
 }
 
 /// Options of `patina measured list`.
@@ -63,22 +55,6 @@ pub struct ShowOptions {
     pub output: PathBuf,
 }
 
-/// Options of `patina measured thumbnails`.
-#[derive(Debug, Args)]
-pub struct ThumbnailOptions {
-    /// Folder of the neural fits.
-    pub library: PathBuf,
-    /// Light the spheres by this environment in place of three lamps.
-    #[arg(long)]
-    pub env: Option<PathBuf>,
-    /// Side of a sphere in pixels.
-    #[arg(long, default_value_t = 104, value_parser = clap::value_parser!(u32).range(8..=512))]
-    pub size: u32,
-    /// The sheet, a PNG file.
-    #[arg(short, long)]
-    pub output: PathBuf,
-}
-
 /// Options of `patina measured convert`.
 #[derive(Debug, Args)]
 pub struct ConvertOptions {
@@ -96,8 +72,8 @@ pub struct MeasuredFitOptions {
     /// The material.
     #[command(flatten)]
     pub source: Source,
-    /// cook-torrance, cook-torrance-two, ggx, ward, dsbrdf, bivariate, maps (diffuse, specular and roughness), or ibrdf: a
-    /// neural model whose weights are all fitted to this one material.
+    /// cook-torrance, cook-torrance-two, ggx, ward, dsbrdf, bivariate, or maps (diffuse, specular and
+    /// roughness).
     #[arg(long)]
     pub model: String,
     /// Folder of the fit: `fit.json`, `fit.binary`, spheres and lobes side by side.
@@ -120,23 +96,4 @@ pub struct ProjectOptions {
     /// Folder for `project.json`, the spheres and the lobes side by side, and the table of the projection.
     #[arg(short, long)]
     pub output: Option<PathBuf>,
-}
-
-/// Options of `patina measured rivals`.
-#[derive(Debug, Args)]
-pub struct RivalsOptions {
-    /// Folder of the neural fits.
-    pub library: PathBuf,
-    /// Only these materials.
-    #[arg(long, value_delimiter = ',')]
-    pub materials: Vec<String>,
-    /// Only these models: ibrdf (one net per material), bivariate, dsbrdf, cook-torrance, cook-torrance-two, ggx, ward, maps.
-    #[arg(long, value_delimiter = ',')]
-    pub models: Vec<String>,
-    /// Every eighth material only.
-    #[arg(long)]
-    pub quick: bool,
-    /// Folder of the tables; a study that was stopped goes on there.
-    #[arg(short, long, default_value = "patina-rivals")]
-    pub output: PathBuf,
 }

@@ -60,22 +60,21 @@ fn relative_change(before: &[[f32; 3]], now: &[[f32; 3]]) -> f64 {
     if power > 0.0 { (change / power).sqrt() } else { 0.0 }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "cli"))]
 mod tests {
     use super::super::diffuse_system::DiffuseSystem;
     use super::super::{Solver, SolverSettings};
     use super::*;
+    use crate::core_tests::hard_scenes::bowl_of_plaster;
     use crate::light::Environment;
     use crate::material::texels::texels_from_maps;
     use crate::render::Surface;
-    use crate::scene::hard::{HardCase, HardSettings, build};
     use glam::Vec3;
 
     #[test]
     fn a_bowl_of_plaster_is_lit_by_what_was_found_of_it() {
         const SIZE: usize = 64;
-        let settings = HardSettings { size: 32, views: 8, held_out: 0, map_size: SIZE, ..HardSettings::default() };
-        let scene = build(HardCase::Plaster, &settings).unwrap().scene;
+        let scene = bowl_of_plaster(SIZE);
         let surface = Surface::new(scene.mesh.clone()).unwrap();
         let truth = scene.truth.as_ref().unwrap();
         let solver_settings = SolverSettings {

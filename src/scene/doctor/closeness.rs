@@ -100,36 +100,3 @@ fn count(scene: &Scene, bvh: &Bvh, view: &View, probes: &[Probe]) -> Counts {
     }
     counts
 }
-
-#[cfg(test)]
-mod tests {
-    use crate::scene::doctor::{SurfaceCheck, check};
-    use crate::scene::hard::{HardCase, HardSettings, build};
-
-    fn of(case: HardCase, size: usize) -> (SurfaceCheck, Vec<&'static str>) {
-        let views = if size > 100 { 2 } else { 8 };
-        let hard = build(case, &HardSettings { size, views, held_out: 1, ..Default::default() }).unwrap();
-        let report = check(&hard.scene);
-        (report.surface, report.findings.iter().map(|finding| finding.code).collect())
-    }
-
-    #[test]
-    fn walls_thinner_than_a_pixel_are_told_and_thicker_ones_are_not() {
-        let (thin, told) = of(HardCase::ThinShells, 48);
-        assert!(thin.thin_share > 0.2 && told.contains(&"mesh-thin"), "{thin:?} {told:?}");
-        // A wall of 0.006 where pixels are 0.003 wide and not 0.08.
-        let (thick, told) = of(HardCase::ThinShells, 1200);
-        assert!(thick.thin_share < 0.01 && !told.contains(&"mesh-thin"), "{thick:?} {told:?}");
-        let (plain, told) = of(HardCase::Plain, 48);
-        assert!(plain.thin_share == 0.0 && !told.contains(&"mesh-thin"), "{plain:?} {told:?}");
-    }
-
-    #[test]
-    fn things_that_touch_are_told() {
-        let (touching, told) = of(HardCase::Touching, 48);
-        assert!(told.contains(&"mesh-touching"), "{touching:?} {told:?}");
-        let (plain, told) = of(HardCase::Plain, 48);
-        assert!(plain.touching_share < touching.touching_share / 2.0, "{plain:?} {touching:?}");
-        assert!(!told.contains(&"mesh-touching"), "{told:?}");
-    }
-}

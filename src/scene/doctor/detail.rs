@@ -111,39 +111,3 @@ fn mean_and_variance(values: [f64; 4]) -> [f64; 2] {
     let mean = values.iter().sum::<f64>() / 4.0;
     [mean, values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / 4.0]
 }
-
-#[cfg(test)]
-mod tests {
-    use crate::image::Image;
-    use crate::scene::doctor::check;
-    use crate::scene::hard::{HardCase, HardSettings, build};
-    use crate::scene::{Photo, Scene};
-    use glam::Vec3;
-
-    fn told(scene: &Scene) -> (f64, bool) {
-        let report = check(scene);
-        (report.surface.fine_share, report.findings.iter().any(|finding| finding.code == "detail-too-fine"))
-    }
-
-    #[test]
-    fn chequers_of_a_pixel_are_told_and_larger_or_fainter_ones_are_not() {
-        let mut scene =
-            build(HardCase::Plain, &HardSettings { views: 3, held_out: 1, ..Default::default() }).unwrap().scene;
-        let mut with = |cell: usize, contrast: f32| {
-            for view in &mut scene.views {
-                view.photo = Photo::Linear32(Image::from_fn(48, 48, |row, column| {
-                    let sign = if (row / cell + column / cell).is_multiple_of(2) { 1.0 } else { -1.0 };
-                    Vec3::splat(0.5 * (1.0 + contrast * sign))
-                }));
-            }
-            told(&scene)
-        };
-        assert_eq!(with(1, 0.5), (1.0, true));
-        assert_eq!(with(1, 0.05), (0.0, false));
-        assert_eq!(with(2, 0.5), (0.0, false), "blocks of 2 x 2 pixels are even");
-        assert_eq!(with(3, 0.0), (0.0, false));
-        assert_eq!(with(1, 0.5), (1.0, true));
-        scene.views.iter_mut().for_each(|view| view.held_out = true);
-        assert_eq!(told(&scene), (0.0, false), "held-out photos are not asked");
-    }
-}

@@ -100,8 +100,6 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::doctor;
-    use crate::scene::hard::{HardCase, HardSettings, build};
 
     /// The wall of a prism of so many sides, of two triangles each; with `cut`, no two sides share vertices.
     fn prism(sides: u32, cut: bool) -> Mesh {
@@ -130,17 +128,5 @@ mod tests {
             assert!(turns_degrees(&prism(4, cut)).iter().all(|turn| *turn == 0.0), "a box has edges of its own");
         }
         assert!(turns_degrees(&Mesh::default()).is_empty());
-    }
-
-    #[test]
-    fn a_decimated_object_is_told_and_the_whole_one_is_not() {
-        let settings = HardSettings { size: 48, views: 6, held_out: 1, ..Default::default() };
-        for (case, is_told) in [(HardCase::Plain, false), (HardCase::Decimated, true), (HardCase::NoisyNormals, false)]
-        {
-            let hard = build(case, &settings).unwrap();
-            let report = doctor::check(&hard.spoil(&hard.scene).unwrap());
-            let told = report.findings.iter().any(|finding| finding.code == "mesh-coarse");
-            assert_eq!(told, is_told, "{}: {:?}", case.name(), report.surface);
-        }
     }
 }

@@ -1,4 +1,4 @@
-//! What scenes made in code are made of; [`demo`](super::demo) and [`study`](super::study) put it together.
+//! What scenes made in code are made of; [`demo`](super::demo) puts it together.
 //!
 //! Read [`shapes`] first: closed surfaces cut into charts. [`layout`] lays the charts side by side in one texture,
 //! [`bake`] evaluates a [`finish`], made of [`procedural`] patterns, over it. [`orbit`] places the cameras,

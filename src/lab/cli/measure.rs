@@ -1,0 +1,87 @@
+//! `patina-lab audit` and `patina-lab bench`.
+
+use super::arguments::{AuditOptions, BenchOptions, BenchStudioOptions};
+use crate::error::{Error, ErrorKind, Result};
+use crate::lab::audit::{AuditSettings, built_in, gradients};
+use crate::lab::scale;
+use std::sync::atomic::AtomicBool;
+
+/// Audits gradients on the built-in audit scene; an audit beyond its limits is an error.
+pub fn audit_gradients(options: &AuditOptions, json: bool) -> Result<()> {
+    let settings = AuditSettings {
+        parameters: options.parameters,
+        consistency_parameters: options.consistency_parameters,
+        seed: options.seed,
+        ..Default::default()
+    };
+    let built = built_in(&settings)?;
+    let stop = AtomicBool::new(false);
+    let report = gradients(&built.scene, &built.surface, &built.parameters, &built.weights, &settings, &stop)?;
+    if json {
+        println!("{}", serde_json::json!({"event": "audit", "report": report}));
+    } else {
+        println!("{}", report.to_markdown());
+    }
+    if report.passes() {
+        return Ok(());
+    }
+    Err(Error::new(ErrorKind::Numerical, "a derivative is not that of its function; the worst rows are above")
+        .remedy("a defect of this program: report it with the table"))
+}
+
+/// Measures growth and writes the table as Markdown, CSV and SVG.
+pub fn bench_scale(options: &BenchOptions, json: bool) -> Result<()> {
+    std::fs::create_dir_all(&options.output).map_err(|source| Error::writing(&options.output, source))?;
+    let own = [&options.triangles, &options.views, &options.maps];
+    let cases = match own.iter().all(|list| list.is_empty()) {
+        true => scale::cases(options.quick),
+        false => scale::cases_along(&options.triangles, &options.views, &options.maps),
+    };
+    let extent = if options.whole { scale::Extent::WholeFit } else { scale::Extent::OneStep };
+    let table = scale::run(&cases, &options.methods, extent, &options.output, &super::contest::teller("scale", json))?;
+    table.write(&options.output, "scale")?;
+    if !json {
+        println!("{}", table.to_markdown());
+    }
+    super::contest::teller("scale", json)(&format!("table: {}", options.output.join("scale.md").display()));
+    Ok(())
+}
+
+/// Measures the window and writes the figures as Markdown, CSV and JSON.
+#[cfg(feature = "studio")]
+pub fn bench_studio(options: &BenchStudioOptions, json: bool) -> Result<()> {
+    use super::arguments::BenchPart;
+    use crate::lab::window as bench;
+    let asked = |part: BenchPart| options.parts.is_empty() || options.parts.contains(&part);
+    let report = bench::run(bench::BenchOptions {
+        seconds: if options.quick { options.seconds.min(3.0) } else { options.seconds },
+        pairs: if options.quick { options.pairs.min(1) } else { options.pairs },
+        cycles: if options.quick { options.cycles.min(3) } else { options.cycles },
+        scene: options.scene.clone(),
+        is_small: options.quick,
+        output: options.output.clone(),
+        frames: asked(BenchPart::Frames),
+        answers: asked(BenchPart::Answers),
+        slowdown: asked(BenchPart::Slowdown),
+        memory: asked(BenchPart::Memory),
+        equality: asked(BenchPart::Equality),
+        tell: std::sync::Arc::new(move |text| {
+            if !json {
+                eprintln!("{text}");
+            }
+        }),
+    })?;
+    if json {
+        println!("{}", serde_json::json!({"event": "bench", "report": report}));
+    } else {
+        println!("{}", report.to_markdown());
+    }
+    Ok(())
+}
+
+/// Says why the window cannot be measured.
+#[cfg(not(feature = "studio"))]
+pub fn bench_studio(_: &BenchStudioOptions, _: bool) -> Result<()> {
+    Err(Error::new(ErrorKind::Unsupported, "this program was built without its window")
+        .remedy("build it with the feature `studio`; `patina-lab bench scale` needs none"))
+}

@@ -1,0 +1,198 @@
+//! The solver as a method of a fit: same door, same folder, same promises.
+
+#![allow(clippy::unwrap_used)]
+
+use super::common::*;
+use patina::export::RunFolder;
+use patina::fit::settings::{BackgroundEvidence, Start};
+use patina::fit::{FitSettings, Fitter, Method, StepOutcome, checkpoint};
+use patina::job::{Event, JobOptions, RunSettings};
+use patina::render::Surface;
+use patina::scene::{Background, Scene};
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
+
+static GO: AtomicBool = AtomicBool::new(false);
+
+/// The steps of [`base`]: light and maps on the only level, twice.
+const STAGES: [&str; 7] = ["wide light", "wide light", "narrow light", "narrow light", "maps", "narrow light", "maps"];
+
+/// Seven views, the last held out; photographed once for all tests.
+fn scene() -> (Arc<Scene>, Arc<Surface>) {
+    static SCENE: OnceLock<(Arc<Scene>, Arc<Surface>)> = OnceLock::new();
+    SCENE.get_or_init(|| last_held_out(7)).clone()
+}
+
+fn base() -> FitSettings {
+    FitSettings { method: Method::Solver, solver_rounds: 4, solver_grid: 32, map_size: 32, ..quick() }
+}
+
+fn new_fitter(settings: &FitSettings) -> Fitter {
+    let (scene, surface) = scene();
+    Fitter::new(scene, surface, settings.clone(), None).unwrap()
+}
+
+/// A fit that is saved after these numbers of steps and taken up ends as `whole` did.
+fn assert_taken_up_alike(settings: &FitSettings, steps: &[usize], whole: &Fitter) {
+    let (scene, surface) = scene();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("checkpoint");
+    for &step in steps {
+        let mut fitter = new_fitter(settings);
+        (0..step).for_each(|_| drop(fitter.step(&GO).unwrap()));
+        checkpoint::write(&path, fitter.state()).unwrap();
+        let state = checkpoint::read(&path).unwrap();
+        let mut resumed = Fitter::resume(scene.clone(), surface.clone(), settings.clone(), state).unwrap();
+        run(&mut resumed).unwrap();
+        assert!(without_seconds(resumed.state()) == without_seconds(whole.state()), "after step {step}");
+    }
+}
+
+#[test]
+fn it_explains_the_photos_and_views_it_never_saw() {
+    let mut fitter = new_fitter(&base());
+    run(&mut fitter).unwrap();
+    let state = fitter.state();
+    let stages: Vec<&str> = state.losses.iter().map(|row| row.stage.as_str()).collect();
+    assert_eq!(stages, STAGES);
+    let held_out: Vec<f64> = state.losses.iter().map(|row| row.held_out_rmse.unwrap()).collect();
+    println!("held out {held_out:?}");
+    let last = held_out[STAGES.len() - 1];
+    assert!(last < 0.5 * held_out[0] || last < 0.02, "{held_out:?}");
+    // A sixth of the photos' mean.
+    assert!(last < 0.06, "{held_out:?}");
+    let figures = &fitter.figures().view_rmse;
+    assert!(figures.iter().all(|rmse| rmse.is_some_and(|rmse| rmse < 0.1)), "{figures:?}");
+    assert!(state.non_finite.is_empty());
+}
+
+#[test]
+fn a_fit_that_is_taken_up_goes_on_bit_for_bit_whatever_the_threads() {
+    let (scene, surface) = scene();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("checkpoint");
+    for settings in [base(), FitSettings { exposure: true, background: BackgroundEvidence::Ignore, ..base() }] {
+        let mut whole = new_fitter(&settings);
+        run(&mut whole).unwrap();
+        let whole = without_seconds(whole.state());
+        for step in [0, 1, 4, 5, 6, 7] {
+            let mut fitter = new_fitter(&settings);
+            (0..step).for_each(|_| drop(fitter.step(&GO).unwrap()));
+            // A step that is stopped leaves no trace.
+            assert_eq!(
+                fitter.step(&AtomicBool::new(true)).unwrap(),
+                match step {
+                    7 => StepOutcome::Finished,
+                    _ => StepOutcome::Interrupted,
+                }
+            );
+            checkpoint::write(&path, fitter.state()).unwrap();
+            let state = checkpoint::read(&path).unwrap();
+            let mut resumed = Fitter::resume(scene.clone(), surface.clone(), settings.clone(), state).unwrap();
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(1 + step % 3).build().unwrap();
+            pool.install(|| run(&mut resumed)).unwrap();
+            assert!(without_seconds(resumed.state()) == whole, "after step {step}");
+        }
+    }
+}
+
+#[test]
+fn polishing_moves_everything_keeps_what_is_known_and_goes_on_bit_for_bit() {
+    let settings = FitSettings { solver_polish: 3, ..base() };
+    let mut whole = new_fitter(&settings);
+    run(&mut whole).unwrap();
+    let stages: Vec<&str> = whole.state().losses.iter().skip(6).map(|row| row.stage.as_str()).collect();
+    assert_eq!(stages, ["maps", "polish", "polish", "polish"]);
+    let mut before = new_fitter(&settings);
+    (0..STAGES.len()).for_each(|_| drop(before.step(&GO).unwrap()));
+    assert!(whole.state().variances == before.state().variances && whole.deviations().is_some());
+    assert!(whole.state().light != before.state().light);
+    for number in 0..7 {
+        let moved = |fitter: &Fitter| fitter.state().texels.iter().map(|texel| texel[number]).collect::<Vec<f32>>();
+        assert_ne!(moved(&whole), moved(&before), "{number}");
+    }
+    assert_taken_up_alike(&settings, &[4, 7, 9], &whole);
+    // More steps may be asked for once it has ended.
+    let mut plain = new_fitter(&base());
+    run(&mut plain).unwrap();
+    plain.change(settings).unwrap();
+    run(&mut plain).unwrap();
+    assert_eq!(plain.state().losses.len(), 10);
+}
+
+#[test]
+fn levels_bring_maps_at_half_size_first_and_go_on_bit_for_bit() {
+    let settings = FitSettings { map_size: 256, solver_levels: 3, solver_rounds: 2, ..base() };
+    let mut whole = new_fitter(&settings);
+    let mut sizes = Vec::new();
+    while let StepOutcome::Stepped(row) = whole.step(&GO).unwrap() {
+        sizes.push((row.stage, whole.state().map_size, whole.deviations().is_some()));
+    }
+    let expected = [
+        ("wide light 1/2", 128, false),
+        ("narrow light 1/2", 128, false),
+        ("maps 1/2", 128, true),
+        ("narrow light 1/2", 128, true),
+        ("maps 1/2", 128, true),
+        ("narrow light", 256, true),
+        ("narrow light", 256, true),
+        ("maps", 256, true),
+    ];
+    assert_eq!(sizes, expected.map(|(name, size, known)| (name.to_string(), size, known)));
+    assert_taken_up_alike(&settings, &[3, 4, 6], &whole);
+}
+
+#[test]
+fn the_job_shows_each_step_and_leaves_a_whole_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run");
+    let job = job(new_fitter(&base()), &path, JobOptions::default());
+    let mut progress = 0;
+    let data = loop {
+        match job.events.recv().unwrap() {
+            Event::Progress(row) => {
+                progress += 1;
+                assert_eq!(row.steps_total, STAGES.len());
+            }
+            Event::Finished(data) => break data,
+            Event::Failed(error) => panic!("{error}"),
+            _ => {}
+        }
+    };
+    assert_eq!(progress, STAGES.len());
+    let (_, snapshot) = job.snapshot.newest().unwrap();
+    assert_eq!((snapshot.step, snapshot.stage.as_str()), (STAGES.len(), "maps"));
+    assert!(data.aggregates.iter().any(|aggregate| aggregate.name == "held-out views"));
+    assert_eq!(data.loss_history.len(), STAGES.len());
+    let folder = RunFolder::open(&path).unwrap();
+    assert!(folder.has_result() && folder.report_html_path().is_file());
+    assert!(folder.read_result().is_ok());
+    for name in ["diffuse_deviation.exr", "specular_deviation.exr", "roughness_deviation.exr"] {
+        assert!(folder.file(name).is_file(), "{name}");
+    }
+    // One view is held out, which has no standard error: training views judge, withheld from that alone.
+    let choices = data.choices.as_ref().unwrap();
+    assert!(choices.are_withheld && choices.views == 2 && choices.lines.len() == 5, "{choices:?}");
+    assert_eq!(choices.lines.iter().filter_map(|line| line.share).sum::<f64>().round(), 1.0);
+    let codes = folder.read_choices().unwrap().unwrap();
+    assert!(codes.pixels().iter().all(|code| [0.0, 1.0, 2.0, 3.0].contains(code)));
+    let told: patina::insight::ReportData = folder.read_report_json().unwrap();
+    assert_eq!(told.choices.as_ref(), Some(choices));
+    assert_eq!(folder.read_loss().unwrap().len(), STAGES.len());
+    assert_eq!(folder.read_settings::<RunSettings>().unwrap().fit, base());
+}
+
+#[test]
+fn hard_starts_and_scenes_leave_nothing_that_is_not_finite() {
+    let black_cloth = Trial { cameras: around(5, 35.0), background: Background::Black, ..Default::default() };
+    for settings in [
+        FitSettings { start: Start::Paper, ..base() },
+        FitSettings { bounces: 1, exposure: true, ..base() },
+        FitSettings { fixed_light: true, ..base() },
+        FitSettings { map_size: 16, solver_grid: 64, environment_height: 2, ..base() },
+    ] {
+        fit(black_cloth.photographed(), black_cloth.surface(), settings.clone()).unwrap();
+        // Black photos: nothing to find, and nothing to fall over.
+        fit(black_cloth.black(), black_cloth.surface(), settings).unwrap();
+    }
+}

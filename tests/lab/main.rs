@@ -1,0 +1,5 @@
+//! The lab as a program.
+
+#![allow(clippy::unwrap_used)]
+
+mod contest;

@@ -1,0 +1,23 @@
+//! Whether there is anything to draw with.
+
+use crate::core_tests::beside::is_required;
+use eframe::wgpu;
+use std::future::Future;
+use std::pin::pin;
+use std::task::{Context, Poll, Waker};
+
+/// Whether there is anything to draw with, a software adapter included; says so when there is not.
+pub fn has_adapter() -> bool {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+    let mut search = pin!(instance.enumerate_adapters(wgpu::Backends::all()));
+    let found = loop {
+        if let Poll::Ready(adapters) = search.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
+            break !adapters.is_empty();
+        }
+    };
+    if !found {
+        assert!(!is_required("adapter"), "no graphics adapter, and PATINA_REQUIRE asks for one");
+        println!("skipped: no graphics adapter");
+    }
+    found
+}
