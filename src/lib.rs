@@ -4,27 +4,27 @@
 //! roughness map and an HDR environment with a differentiable path tracer on the CPU.
 //!
 //! # The map
-//! Dependencies point one way; `tests/layers.rs` fails when a lower layer imports a higher one.
+//! Dependencies point one way; `tests/program/layers.rs` fails when a lower layer imports a higher one.
 //!
 //! | folder | what it holds |
 //! |---|---|
-//! | [`error`], [`files`] | errors with kind, place and remedy; files that are written whole or not at all |
-//! | [`math`] | random numbers, frames, the sphere, sampling tables, statistics, numbers with derivatives |
-//! | [`image`] | linear images, image files, metrics |
-//! | [`trace`] | rays and the bounding volume hierarchy |
-//! | [`light`] | the environment |
-//! | [`material`] | texture maps and the reflection lobe |
-//! | [`measured`] | measured reflectance: tables, models that stand for them, figures between the two |
-//! | [`neural`] | the invertible neural model of reflectance: flow, training, fit, sampler |
-//! | [`scene`] | mesh, cameras, photographs, their readers and the pre-flight check |
-//! | [`atlas`] | from any mesh to a texture atlas |
-//! | [`render`] | where light is added up: the path tracer and its reverse pass |
-//! | [`fit`] | where a texel is changed: losses, consistency, Adam, schedule, checkpoint |
-//! | [`insight`] | coverage, comparison, report |
-//! | [`export`] | the run folder and the files in it |
-//! | [`object`] | light and measured reflectance from one photo |
-//! | [`job`] | the only door between a fit and whoever watches it |
-//! | [`cli`] | the command line; it holds no algorithm |
+//! | `error`, `files` | errors with kind, place and remedy; files that are written whole or not at all |
+//! | `math` | random numbers, frames, the sphere, sampling tables, statistics, numbers with derivatives |
+//! | `image` | linear images, image files, metrics |
+//! | `trace` | rays and the bounding volume hierarchy |
+//! | `light` | the environment |
+//! | `material` | texture maps and the reflection lobe |
+//! | `measured` | measured reflectance: tables, models that stand for them, figures between the two |
+//! | `neural` | the invertible neural model of reflectance: flow, training, fit, sampler |
+//! | `scene` | mesh, cameras, photographs, their readers and the pre-flight check |
+//! | `atlas` | from any mesh to a texture atlas |
+//! | `render` | where light is added up: the path tracer and its reverse pass |
+//! | `fit` | where a texel is changed: losses, consistency, Adam, schedule, checkpoint |
+//! | `insight` | coverage, comparison, report |
+//! | `export` | the run folder and the files in it |
+//! | `object` | light and measured reflectance from one photo |
+//! | `job` | the only door between a fit and whoever watches it |
+//! | `cli` | the command line; it holds no algorithm |
 //! | `studio` | the window, behind the feature of that name; it holds no algorithm either |
 //! | `lab` | experiments on all of it, behind the feature of that name, with the program `patina-lab` |
 //!
@@ -42,54 +42,75 @@
 //! * **Random numbers** are a pure function of (seed, step, view, pixel, sample, dimension), sums are reduced in a
 //!   fixed order: same seed, same bits, whatever the thread count. Processors with other vectors round otherwise.
 //!
-//! # A fit in twenty lines
+//! # From a folder to a picture under another light
 //! ```
-//! use patina::fit::{FitSettings, Fitter, StepOutcome};
-//! use patina::{render::Surface, scene::demo};
-//! use std::sync::{Arc, atomic::AtomicBool};
+//! use patina::{Event, ReadSettings, RunFolder, RunSettings};
+//! use std::{path::Path, sync::atomic::AtomicBool};
 //!
 //! # fn main() -> patina::Result<()> {
-//! // A scene made in code, photographed by the path tracer: small, so that this runs in a moment.
-//! let small = demo::DemoSettings { views: 4, held_out: 1, width: 24, height: 18, map_size: 64, seed: 1 };
+//! # let beside = tempfile::tempdir().unwrap();
+//! # let (capture, output) = (&beside.path().join("capture"), &beside.path().join("run"));
+//! # patina::write_demo_folder(&patina::DemoSettings { views: 6, held_out: 1, width: 32, height: 24, map_size: 64, seed: 1 }, capture)?;
+//! # let fit = patina::FitSettings { map_size: 64, solver_rounds: 1, ..Default::default() };
+//! # let (capture, output): (&Path, &Path) = (capture, output);
 //! let stop = AtomicBool::new(false);
-//! let scene = patina::job::demo::scene(&small, &mut Vec::new(), &stop, &|_| {})?;
-//! let surface = Surface::new(scene.mesh.clone())?;
 //!
-//! // Two steps of diffuse and light, two of everything.
-//! let settings = FitSettings { map_size: 64, levels: 1, steps_diffuse: 2, steps_all: 2, ..FitSettings::default() };
-//! let mut fitter = Fitter::new(Arc::new(scene), Arc::new(surface), settings, None)?;
-//! while let StepOutcome::Stepped(row) = fitter.step(&stop)? {
-//!     println!("step {}: mean squared error {:.4}", row.step, row.image_loss);
+//! // Read the folder and check it: findings say what is wrong, where, and what helps.
+//! let opened = patina::open_scene(capture, &ReadSettings::default(), &stop, &|_, _| {})?;
+//! opened.report.findings.iter().for_each(|finding| println!("{finding}"));
+//! let camera = opened.scene.views[0].camera;
+//!
+//! // Fit maps and environment on a worker thread, and watch it.
+//! let settings = RunSettings { scene: capture.into(), fit, ..RunSettings::default() };
+//! let (prepared, fitter, settings) = patina::start_new(opened, settings, &stop, &|_, _| {})?;
+//! let job = patina::start(prepared, fitter, settings, RunFolder::create(output)?)?;
+//! for event in &job.events {
+//!     match event {
+//!         Event::Progress(progress) => println!("{:.0} s left", progress.seconds_left),
+//!         Event::Finished(report) => println!("{} held-out views", report.views.len()),
+//!         Event::Failed(error) => return Err(error),
+//!         _ => {}
+//!     }
 //! }
-//! assert_eq!((fitter.state().step, fitter.maps().diffuse.width()), (4, 64));
+//!
+//! // The run folder holds maps, environment and report. Render it under another environment.
+//! let run = RunFolder::open(output)?;
+//! let evening = patina::Environment::read(&output.join("env.exr"))?.0.rotated_about_up(1.5);
+//! let picture = patina::relight(&run, &camera, &evening, 16, &stop)?;
+//! assert_eq!(picture.width(), camera.width);
 //! # Ok(())
 //! # }
 //! ```
 
 #![warn(missing_docs)]
+// Documentation is built with private items: links to them lead somewhere there.
+#![allow(rustdoc::private_intra_doc_links)]
+// What only the lab or a test asks for is not dead; the build of the tests, lab included, finds what is.
+#![cfg_attr(not(test), allow(dead_code))]
 
-pub mod atlas;
-pub mod cli;
-pub mod error;
-pub mod export;
-pub mod files;
-pub mod fit;
-pub mod image;
-pub mod insight;
-pub mod job;
+mod atlas;
+#[cfg(feature = "cli")]
+mod cli;
+mod error;
+mod export;
+mod files;
+mod fit;
+mod image;
+mod insight;
+mod job;
 #[cfg(any(feature = "lab", all(test, feature = "cli")))]
-pub mod lab;
-pub mod light;
-pub mod material;
-pub mod math;
-pub mod measured;
-pub mod neural;
-pub mod object;
-pub mod render;
-pub mod scene;
+mod lab;
+mod light;
+mod material;
+mod math;
+mod measured;
+mod neural;
+mod object;
+mod render;
+mod scene;
 #[cfg(feature = "studio")]
-pub mod studio;
-pub mod trace;
+mod studio;
+mod trace;
 
 #[cfg(test)]
 extern crate self as patina;
@@ -100,4 +121,26 @@ mod core_tests;
 #[path = "../tests/studio/mod.rs"]
 mod window_tests;
 
+pub use atlas::{Atlas, AtlasSettings, KeepUv, build as build_atlas};
+#[cfg(feature = "cli")]
+pub use cli::run as run_command_line;
 pub use error::{Error, ErrorKind, Finding, Place, Result, Severity};
+pub use export::RunFolder;
+pub use fit::{FitSettings, Fitter, LossRow, Method, Preset, StepOutcome, ViewUse};
+pub use image::{GreyImage, Image, RgbImage};
+pub use job::demo::write_folder as write_demo_folder;
+pub use job::open::{OpenStage, OpenedRun, OpenedScene, open_demo, open_scene, resume, start_new, view_run};
+pub use job::relight::relight;
+pub use job::{Command, Event, JobHandle, JobOptions, Progress, RunSettings, Snapshot, start, start_with};
+#[cfg(feature = "lab")]
+pub use lab::cli::run as run_lab;
+pub use light::Environment;
+pub use material::MaterialMaps;
+pub use measured::{HalfDifference, MeasuredBrdf, ReflectanceModel};
+pub use object::{Estimate, Known, ObjectGeometry, ObjectPhoto, ObjectSettings, ObjectView, StartedModel, estimate};
+pub use render::Surface;
+pub use scene::demo::DemoSettings;
+pub use scene::doctor::{Report as CheckReport, check};
+pub use scene::settings::{BackgroundChoice, ColourEncoding, MaskUse, PixelCentre, Up};
+pub use scene::{Background, Camera, Mesh, Photo, PixelState, ReadSettings, Scene, Truth, View, WorldFromSource};
+pub use scene::{read, read_mesh};

@@ -1,5 +1,5 @@
 //! The program: hands its arguments to the command line of the library.
 
 fn main() -> std::process::ExitCode {
-    patina::cli::run(std::env::args_os())
+    patina::run_command_line(std::env::args_os())
 }

@@ -32,13 +32,13 @@ mod merge;
 mod outline;
 mod pack;
 mod quality;
-mod raster;
+pub mod raster;
 mod shape;
 mod topology;
 
 pub use border::chart_borders;
 pub use quality::AtlasQuality;
-pub use raster::{covered_texels, dilate, nearest_covered, overlaps};
+pub use raster::{covered_texels, dilate, nearest_covered};
 
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::scene::Mesh;

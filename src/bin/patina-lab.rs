@@ -1,5 +1,5 @@
 //! The lab's program: hands its arguments to the command line of the lab.
 
 fn main() -> std::process::ExitCode {
-    patina::lab::cli::run(std::env::args_os())
+    patina::run_lab(std::env::args_os())
 }

@@ -27,8 +27,6 @@ use crate::material::MaterialMaps;
 use crate::scene::Mesh;
 use std::path::{Path, PathBuf};
 
-pub use earlier::EARLIER;
-
 /// What a fit found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunResult {

@@ -44,10 +44,9 @@ pub mod views;
 mod weigh;
 mod work;
 
-pub use figures::LiveFigures;
 pub use fitter::{Fitter, StepOutcome};
 pub use presets::Preset;
 pub use settings::{FitSettings, Method};
-pub use state::{FitState, LossRow};
+pub use state::LossRow;
 pub use suited::Suited;
 pub use views::ViewUse;

@@ -115,7 +115,7 @@ impl Fitter {
     }
 
     /// Standard deviation, relative, of the factor that light and reflectance have in common, see
-    /// [`FitState::light_scale_deviation`](super::FitState), infinite where the photos leave the factor open.
+    /// [`FitState::light_scale_deviation`](super::state::FitState), infinite where the photos leave the factor open.
     pub fn light_scale_deviation(&self) -> Option<f64> {
         self.state.told_light_scale_deviation()
     }

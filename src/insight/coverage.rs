@@ -7,16 +7,7 @@ use crate::scene::{PixelState, Scene};
 use glam::Vec2;
 use rayon::prelude::*;
 
-/// In how many training views each texel of square maps is seen; 0: never.
-///
-/// A view sees the texels that the ray through a pixel's centre reads. Where a pixel covers several texels, its whole
-/// block of texels counts, so that a map finer than the photos is not speckled with unseen texels.
-pub fn times_seen(scene: &Scene, surface: &Surface, map_size: usize) -> GreyImage {
-    let training: Vec<usize> = (0..scene.views.len()).filter(|&view| !scene.views[view].held_out).collect();
-    times_seen_by(scene, surface, &training, map_size)
-}
-
-/// In how many of the given views, by index, each texel of square maps is seen; see [`times_seen`].
+/// In how many of the given views, by index, each texel of square maps is seen.
 pub fn times_seen_by(scene: &Scene, surface: &Surface, training: &[usize], map_size: usize) -> GreyImage {
     let mut counts = vec![0u16; map_size * map_size];
     // A few views at once: each needs a map of bits of its own.

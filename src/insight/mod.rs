@@ -24,5 +24,3 @@ pub mod report;
 pub mod scores;
 pub mod surface_layers;
 pub mod truth;
-
-pub use report::{ReportData, ReportImages, write_report};

@@ -3,13 +3,14 @@
 use super::prepare::{RunSettings, timed};
 use crate::atlas::{AtlasSettings, KeepUv};
 use crate::error::{Error, ErrorKind, Result};
+use crate::export::exchange::{self, ExchangeOptions};
 use crate::fit::{FitSettings, Method};
 use crate::insight::report::data::StageTime;
-use crate::math::random::{SampleStream, StreamKey, normal_number};
 use crate::render::Surface;
 use crate::render::picture::{PictureSettings, render};
 use crate::scene::demo::{self, DemoSettings};
 use crate::scene::{Background, Scene};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::pictures::parameters;
@@ -50,6 +51,16 @@ pub fn scene(
     let mut scene = demo.scene;
     timed(timings, "render photographs", || photograph(&mut scene, PHOTO_SAMPLES, settings.seed, 1.0, stop, progress))?;
     Ok(scene)
+}
+
+/// Writes the demo scene with its photographs, linear, and its truth as an exchange folder: a capture to try things on.
+///
+/// # Errors
+/// `InvalidSetting` for sizes of 0, `Unwritable`.
+pub fn write_folder(settings: &DemoSettings, folder: &Path) -> Result<()> {
+    let scene = scene(settings, &mut Vec::new(), &AtomicBool::new(false), &|_| {})?;
+    let Some(truth) = &scene.truth else { return Ok(()) };
+    exchange::write(&scene, truth, &ExchangeOptions { with_photos: true, ..ExchangeOptions::default() }, folder)
 }
 
 /// Fills the photographs and relit pictures of a scene with a known truth, by the path tracer at full depth. The paths
@@ -101,16 +112,4 @@ pub fn photograph(
     }
     progress(1.0);
     Ok(())
-}
-
-/// Adds sensor noise to a picture: normal, with a standard deviation of `share` of each value plus `floor`.
-pub fn with_noise(picture: &mut crate::image::RgbImage, share: f32, floor: f32, seed: u64) {
-    for (index, pixel) in picture.pixels_mut().iter_mut().enumerate() {
-        for channel in 0..3 {
-            let mut stream = SampleStream::new(StreamKey::new(seed, 0, channel, index as u32), 0);
-            let normal = normal_number(stream.next_pair());
-            let value = pixel[channel as usize];
-            pixel[channel as usize] = (value + normal * (share * value + floor)).max(0.0);
-        }
-    }
 }

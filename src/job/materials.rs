@@ -29,8 +29,6 @@ pub struct Materials {
     model: FlowModel,
     /// One place a material.
     pub map: MaterialMap,
-    /// The map of all codes, of which [`Materials::map`] is the mean over channels.
-    pub embedding: Embedding,
 }
 
 /// What is known of a material or a place between materials.
@@ -53,7 +51,7 @@ impl Materials {
         let trained = Arc::new(neural::shipped()?);
         let embedding = Embedding::of(&trained, NEIGHBOURS);
         let map = MaterialMap::of(&embedding);
-        Ok(Materials { model: FlowModel::new(Arc::clone(&trained), 1), trained, map, embedding })
+        Ok(Materials { model: FlowModel::new(Arc::clone(&trained), 1), trained, map })
     }
 
     /// What the library was learned from.

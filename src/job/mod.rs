@@ -8,7 +8,7 @@
 //! [`open`] opens scenes and runs, begins fits and takes them up; [`prepare`] turns a scene into a surface with an atlas,
 //! [`worker`] is the thread and [`handle`] what a watcher holds of it, `save` keeps the run folder whole while it runs,
 //! [`outcome`] renders, scores and writes the run folder, [`demo`] makes the built-in scene. [`preview`] draws for a window beside a fit. After a fit, [`gallery`] makes what a user shows, [`gauge`] moves its scale, [`entanglement`]
-//! tells how much light is baked into the maps, [`regions`] reads measured materials for parts of a surface.
+//! tells how much light is baked into the maps, [`regions`] reads measured materials for parts of a surface, [`relight`](mod@relight) makes one picture.
 //!
 //! [`object`] is the job of object mode, light and reflectance from photos of one object; [`materials`] its library of
 //! materials to look at.
@@ -29,6 +29,7 @@ pub mod pictures;
 pub mod prepare;
 pub mod preview;
 pub mod regions;
+pub mod relight;
 mod save;
 pub mod shown;
 pub mod slot;
@@ -136,7 +137,7 @@ pub struct Snapshot {
     /// Name of the stage, such as `diffuse 1/4`; that of the last stage at the end.
     pub stage: String,
     /// Root mean squared error of each view in linear radiance, as last known in this session:
-    /// [`LiveFigures::view_rmse`](crate::fit::LiveFigures::view_rmse).
+    /// [`LiveFigures::view_rmse`](crate::fit::figures::LiveFigures::view_rmse).
     pub view_rmse: Vec<Option<f32>>,
     /// Logarithm of each view's gain; 0 when gains are not fitted.
     pub log_gains: Vec<f32>,

@@ -85,11 +85,6 @@ impl StudyTable {
         }
     }
 
-    /// Names of the rows, in the order they were added.
-    pub fn row_names(&self) -> impl Iterator<Item = &str> {
-        self.rows.iter().map(|(name, _)| name.as_str())
-    }
-
     /// The values of a cell, in the order they were added; empty outside the table.
     pub fn values(&self, row: usize, column: usize) -> &[f64] {
         self.rows.get(row).and_then(|(_, cells)| cells.get(column)).map_or(&[], Vec::as_slice)

@@ -23,7 +23,6 @@ pub mod sphere;
 pub mod sphere_error;
 pub mod table;
 
-pub use baseline::Baseline;
 pub use category::Category;
 pub use coordinates::HalfDifference;
 pub use fits::NeuralFits;

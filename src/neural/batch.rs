@@ -29,13 +29,11 @@ const LARGEST_DIFFERENCE: f64 = 2.0;
 /// `log(1 + stored value)` is held below this: a stored value of 10^34 is bright enough.
 pub const LARGEST_EXPONENT: f64 = 80.0;
 
-/// A density to learn in this step: the target, and the row of the code.
+/// A density to learn in this step: the target.
 #[derive(Clone, Copy, Debug)]
 pub struct Task<'a> {
     /// The target.
     pub target: &'a TargetGrid,
-    /// Which code is its own.
-    pub code: usize,
 }
 
 /// Sums over the points of a step.

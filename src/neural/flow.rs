@@ -186,7 +186,7 @@ impl Flow {
     }
 
     /// Carries uniform points to the density: exact sampling. Returns each point and the logarithm of its density.
-    pub fn from_uniform(&self, points: &[[f64; 3]], code: &[f32]) -> Vec<([f64; 3], f64)> {
+    pub fn carry_from_uniform(&self, points: &[[f64; 3]], code: &[f32]) -> Vec<([f64; 3], f64)> {
         points
             .par_chunks(CHUNK)
             .map_init(Tape::default, |tape, chunk| {
@@ -248,7 +248,7 @@ mod tests {
     fn there_and_back_again() {
         for architecture in [Architecture::paper(CODE), Architecture::compact(CODE)] {
             let (flow, code, points) = bent(architecture, 3000);
-            let back = flow.from_uniform(&flow.to_uniform(&points, &code), &code);
+            let back = flow.carry_from_uniform(&flow.to_uniform(&points, &code), &code);
             let log_density = flow.log_density(&points, &code);
             let spread = log_density.iter().fold(0.0f64, |most, value| most.max(value.abs()));
             assert!(spread > 0.3, "the flow is bent: {spread}");
@@ -326,7 +326,7 @@ mod tests {
             code.iter_mut().for_each(|number| *number *= 1e6);
             let log_density = flow.log_density(&points, &code);
             assert!(log_density.iter().all(|value| value.is_finite()));
-            let drawn = flow.from_uniform(&points[..40_000], &code);
+            let drawn = flow.carry_from_uniform(&points[..40_000], &code);
             assert!(drawn.iter().all(|(point, log)| log.is_finite() && point.iter().all(|u| (0.0..1.0).contains(u))));
         }
     }

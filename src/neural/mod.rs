@@ -21,7 +21,7 @@ pub mod adam;
 pub mod architecture;
 pub mod batch;
 pub mod between;
-pub(crate) mod cells;
+pub mod cells;
 pub mod columns;
 pub mod dense;
 pub mod embedding;

@@ -68,11 +68,6 @@ impl FlowModel {
         self.reconstruction
     }
 
-    /// The grid of nodes.
-    pub fn grid(&self) -> GridShape {
-        self.grid
-    }
-
     fn code_length(&self) -> usize {
         self.trained.account.architecture.code
     }

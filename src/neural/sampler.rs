@@ -1,6 +1,6 @@
 //! Importance sampling of the direction of light for a renderer: tables over the half vector.
 //!
-//! What is exact and what is not. A flow draws whole triples of angles exactly ([`super::flow::Flow::from_uniform`]),
+//! What is exact and what is not. A flow draws whole triples of angles exactly ([`super::flow::Flow::carry_from_uniform`]),
 //! with a known density: that of `log(1 + stored value)` over the warped cube. A renderer holds one direction and wants
 //! the other with a density near reflectance times cosine, which is another one. So a table is made once for a
 //! material: for each of some elevations of the held direction, the mass of reflectance times cosine over cells of the

@@ -102,7 +102,7 @@ impl Training {
         let length = self.flow.architecture().code;
         let chosen = self.chosen(library.targets.len() * 3);
         let tasks: Vec<Task> =
-            chosen.iter().map(|&index| Task { target: &library.targets[index / 3][index % 3], code: index }).collect();
+            chosen.iter().map(|&index| Task { target: &library.targets[index / 3][index % 3] }).collect();
         let codes: Vec<f32> =
             chosen.iter().flat_map(|&index| self.codes[index * length..(index + 1) * length].iter().copied()).collect();
         let key = mix(self.settings.seed ^ mix(self.step ^ 0x57e9));
@@ -123,7 +123,7 @@ impl Training {
     /// Figures over all densities on fixed points.
     pub fn figures(&self, library: &Library) -> Figures {
         let tasks: Vec<Task> = (0..library.targets.len() * 3)
-            .map(|index| Task { target: &library.targets[index / 3][index % 3], code: index })
+            .map(|index| Task { target: &library.targets[index / 3][index % 3] })
             .collect();
         let nest = Nest { azimuths: 9, differences: 16, halves: 24 };
         evaluate(&self.flow, &tasks, &self.codes, nest, 0xf19, None).figures

@@ -44,11 +44,6 @@ impl Likelihood {
         self.logs.len()
     }
 
-    /// Whether there is no pixel.
-    pub fn is_empty(&self) -> bool {
-        self.logs.is_empty()
-    }
-
     /// Natural logarithm of picture over measurement; 0 where a bound is kept.
     fn residual(&self, pixel: usize, channel: usize, value: f32) -> f64 {
         let residual = (f64::from(value).max(0.0) + self.epsilon).ln() - self.logs[pixel][channel];

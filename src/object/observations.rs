@@ -158,17 +158,6 @@ impl Observations {
         }
         Ok(())
     }
-
-    /// Some of the pixels, by index.
-    pub fn subset(&self, chosen: &[usize]) -> Self {
-        Observations {
-            pixels: chosen.iter().map(|&index| self.pixels[index]).collect(),
-            measured: chosen.iter().map(|&index| self.measured[index]).collect(),
-            evidence: chosen.iter().map(|&index| self.evidence[index]).collect(),
-            visibility: self.visibility.as_ref().map(|bits| bits.of(chosen)),
-            exposure: self.exposure,
-        }
-    }
 }
 
 #[cfg(test)]

@@ -32,7 +32,6 @@ pub mod sums;
 pub mod surface;
 mod taps;
 
-pub use packet::PathStart;
 pub use path::{PathArena, PathSettings, PathTracer};
 pub use sums::Parameters;
 pub use surface::Surface;

@@ -23,5 +23,5 @@ pub mod picture;
 pub mod stage;
 pub mod theme;
 
-pub use app::{Studio, StudioOptions};
+pub use app::StudioOptions;
 pub use launch::run;

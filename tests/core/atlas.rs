@@ -5,7 +5,8 @@
 use super::beside::data;
 use glam::{Vec2, Vec3};
 use patina::ErrorKind;
-use patina::atlas::{Atlas, AtlasSettings, KeepUv, build, covered_texels, overlaps};
+use patina::atlas::raster::overlaps;
+use patina::atlas::{Atlas, AtlasSettings, KeepUv, build, covered_texels};
 use patina::scene::Mesh;
 use std::collections::HashMap;
 

@@ -5,7 +5,8 @@
 use super::common::*;
 use glam::{Mat3, Vec2, Vec3};
 use patina::fit::settings::{BackgroundEvidence, Consistency, Start, Steps};
-use patina::fit::{FitSettings, FitState, Fitter, StepOutcome};
+use patina::fit::state::FitState;
+use patina::fit::{FitSettings, Fitter, StepOutcome};
 use patina::image::Image;
 use patina::light::Environment;
 use patina::material::Material;

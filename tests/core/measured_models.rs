@@ -5,11 +5,12 @@
 use super::beside::data;
 use glam::DVec3;
 use patina::measured::analytic::OwnLobe;
+use patina::measured::baseline::Baseline;
 use patina::measured::fit_model::ModelFitSettings;
 use patina::measured::fits::neural::WEIGHTS_FILE;
 use patina::measured::metrics::{model_error, table_error};
 use patina::measured::sphere::{displayed_scores, render_table, showing_lamps};
-use patina::measured::{Baseline, HalfDifference, MeasuredBrdf, NeuralFits};
+use patina::measured::{HalfDifference, MeasuredBrdf, NeuralFits};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 fn library() -> Option<NeuralFits> {

@@ -140,6 +140,6 @@ fn a_flow_without_codes_learns_one_channel_and_survives_its_file() {
         .collect();
     let sum: f64 = read.flow.log_density(&points, &[]).iter().map(|log| log.exp()).sum();
     assert!((sum / points.len() as f64 - 1.0).abs() < 1e-2, "{}", sum / points.len() as f64);
-    let drawn = read.flow.from_uniform(&points[..500], &[]);
+    let drawn = read.flow.carry_from_uniform(&points[..500], &[]);
     assert!(drawn.iter().all(|(point, log)| log.is_finite() && point.iter().all(|u| (0.0..1.0).contains(u))));
 }

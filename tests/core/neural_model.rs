@@ -64,7 +64,7 @@ fn samples_of_the_flow_follow_its_density_by_chi_square() {
     let mut random = SequentialRandom::new(5);
     let count = 60_000;
     let uniform: Vec<[f64; 3]> = (0..count).map(|_| [0; 3].map(|_| f64::from(random.next_number()))).collect();
-    let drawn = trained.flow.from_uniform(&uniform, &code);
+    let drawn = trained.flow.carry_from_uniform(&uniform, &code);
     let (side, fine) = (6usize, 5usize);
     let mut counts = vec![0.0f64; side.pow(3)];
     for (point, _) in &drawn {

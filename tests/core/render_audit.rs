@@ -2,7 +2,8 @@
 
 #![allow(clippy::unwrap_used)]
 
-use patina::lab::audit::{AuditReport, AuditSettings, built_in, gradients};
+use patina::lab::audit::report::AuditReport;
+use patina::lab::audit::{AuditSettings, built_in, gradients};
 use std::sync::atomic::AtomicBool;
 
 #[test]

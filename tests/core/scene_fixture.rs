@@ -1,7 +1,6 @@
 //! A small scene with known answers: two balls under a sky, seen from a ring of cameras.
 
 #![allow(dead_code)]
-
 #![allow(clippy::disallowed_methods)]
 
 use glam::{Mat3, Vec2, Vec3};

@@ -176,7 +176,7 @@ fn the_job_shows_each_step_and_leaves_a_whole_run() {
     assert_eq!(choices.lines.iter().filter_map(|line| line.share).sum::<f64>().round(), 1.0);
     let codes = folder.read_choices().unwrap().unwrap();
     assert!(codes.pixels().iter().all(|code| [0.0, 1.0, 2.0, 3.0].contains(code)));
-    let told: patina::insight::ReportData = folder.read_report_json().unwrap();
+    let told: patina::insight::report::ReportData = folder.read_report_json().unwrap();
     assert_eq!(told.choices.as_ref(), Some(choices));
     assert_eq!(folder.read_loss().unwrap().len(), STAGES.len());
     assert_eq!(folder.read_settings::<RunSettings>().unwrap().fit, base());

@@ -11,9 +11,9 @@ use patina::image::histogram::{Histogram, auto_exposure};
 use patina::image::value_scale::{Palette, ValueScale};
 use patina::image::{Image, RgbImage, area};
 use patina::studio::picture::scale_bar::scale_bar;
+use patina::studio::picture::widget::PictureResponse;
 use patina::studio::picture::{
-    self, Compare, Comparison, LineSpace, Lines, Mark, Overlay, PictureResponse, PictureView, Place, Source,
-    ThumbnailCache, Value,
+    self, Compare, Comparison, LineSpace, Lines, Mark, Overlay, PictureView, Place, Source, ThumbnailCache, Value,
 };
 use std::sync::Arc;
 

@@ -4,7 +4,7 @@ mod pictures;
 mod scene;
 
 pub use pictures::{CompareOptions, Layer, RelightOptions, RenderOptions};
-pub use scene::{CheckOptions, DemoOptions, FitOptions, ReadOptions, ResumeOptions, TypedSettings};
+pub use scene::{CheckOptions, DemoOptions, FitOptions, ReadOptions, ResumeOptions};
 
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;

@@ -81,5 +81,5 @@ pub use lobe_tails::LobeTails;
 pub use report::StepReport;
 pub use scene::SolverScene;
 pub use settings::SolverSettings;
-pub use solver::{Solver, SolverStep};
+pub use solver::SolverStep;
 pub use transport_check::TransportError;

@@ -58,14 +58,6 @@ impl ErrorSums {
         }
     }
 
-    /// Adds what others added up.
-    pub fn merge(&mut self, other: &ErrorSums) {
-        for (own, other) in self.sums.iter_mut().zip(&other.sums) {
-            own.0 += other.0;
-            own.1 += other.1;
-        }
-    }
-
     /// Mean over all pixels.
     pub fn mean(&self) -> f64 {
         let (sum, count) = self.sums.iter().fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));

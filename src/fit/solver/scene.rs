@@ -170,14 +170,6 @@ impl SolverScene {
             held_out_pixels,
         }))
     }
-
-    /// Bytes that cache and footprints take.
-    pub fn memory_bytes(&self) -> usize {
-        let footprints = self.footprints.iter().chain(self.held_out.iter().map(|(_, footprints)| footprints));
-        self.transport.memory_bytes()
-            + footprints.map(ViewFootprints::memory_bytes).sum::<usize>()
-            + self.observations.list.len() * size_of::<super::observations::Observation>()
-    }
 }
 
 /// The row over the light that gives the mean light on the observed surface, and the mean that explains the photos.

@@ -62,8 +62,9 @@ fn relative_change(before: &[[f32; 3]], now: &[[f32; 3]]) -> f64 {
 
 #[cfg(all(test, feature = "cli"))]
 mod tests {
+    use super::super::SolverSettings;
     use super::super::diffuse_system::DiffuseSystem;
-    use super::super::{Solver, SolverSettings};
+    use super::super::solver::Solver;
     use super::*;
     use crate::core_tests::hard_scenes::bowl_of_plaster;
     use crate::light::Environment;

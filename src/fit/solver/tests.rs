@@ -1,5 +1,6 @@
 //! The solver as a whole, on a small scene photographed by the path tracer.
 
+use super::solver::Solver;
 use super::*;
 use crate::material::MaterialMaps;
 use crate::material::texels::{PyramidWeights, TexelPyramid, texels_from_maps};

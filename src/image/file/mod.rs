@@ -13,7 +13,7 @@ mod pfm;
 mod raster;
 mod source;
 
-pub use source::{Format, ImageHeader, LARGEST_PIXEL_COUNT, read_header};
+pub use source::{Format, read_header};
 
 use super::{GreyImage, Image, RgbImage, transfer};
 use crate::error::{Error, ErrorKind, Result};
@@ -28,7 +28,7 @@ use std::path::Path;
 /// Linear RGB of an image file: EXR, HDR and PFM as stored, PNG and JPEG decoded from sRGB. Alpha is left out, a grey
 /// file is repeated in all channels. Values are not checked: they may be negative or not finite.
 ///
-/// Errors: missing, unreadable, damaged or cut short (with the byte), more than [`LARGEST_PIXEL_COUNT`] pixels, a kind
+/// Errors: missing, unreadable, damaged or cut short (with the byte), more than [`LARGEST_PIXEL_COUNT`](source::LARGEST_PIXEL_COUNT) pixels, a kind
 /// that is not read.
 pub fn read_rgb(path: &Path) -> Result<RgbImage> {
     let source = Source::open(path)?;

@@ -82,10 +82,6 @@ pub fn sphere_of(
 /// The state of an estimation after a round.
 #[derive(Clone, Debug)]
 pub struct ObjectLook {
-    /// The round, from 1.
-    pub round: usize,
-    /// The first photo, every so-manieth pixel of it.
-    pub photo: Arc<RgbImage>,
     /// Its re-render.
     pub rerender: Arc<RgbImage>,
     /// Logarithm of re-render over photo, of luminance; NaN beside the object.
@@ -127,14 +123,12 @@ impl Painter {
     }
 
     /// The look of a state.
-    pub fn paint(&self, round: usize, light: Environment, table: &NodeTable) -> ObjectLook {
+    pub fn paint(&self, light: Environment, table: &NodeTable) -> ObjectLook {
         let rerender = self.relit(table, &[&light]).swap_remove(0);
         let log_error = log_error_map(&self.geometry, &rerender, &self.photo, self.epsilon);
         let (log_rmse, _) = log_errors(&self.geometry, &rerender, &self.photo, self.epsilon);
         let material = MaterialLook::of(&|at| self.grid.value(table, at), None);
         ObjectLook {
-            round,
-            photo: Arc::clone(&self.photo),
             rerender: Arc::new(rerender),
             log_error: Arc::new(log_error),
             log_rmse,

@@ -17,7 +17,7 @@ mod reached;
 mod reopen;
 mod worker;
 
-pub use look::{LobeSlice, MaterialLook, ObjectLook};
+pub use look::{MaterialLook, ObjectLook};
 pub use parts::ObjectParts;
 pub use reached::estimate_as_far_as_it_goes;
 pub use reopen::{ReopenedObject, reopen};

@@ -81,7 +81,7 @@ fn partial(
     let rounds = reached.round;
     let message = format!("the estimation ended after {rounds} rounds: this is what it had reached");
     let painter = Painter::new(view, NodeGrid::new(settings.nodes), settings.shadows, LOOK_PIXELS);
-    let look = painter.paint(rounds, reached.light.environment(), &reached.table);
+    let look = painter.paint(reached.light.environment(), &reached.table);
     Estimate {
         parameters: reached.parameters,
         table: reached.table,

@@ -154,7 +154,7 @@ impl Worker {
             let painter = painter.get_or_insert_with(|| {
                 Painter::new(view, NodeGrid::new(settings.nodes), settings.shadows, LOOK_PIXELS)
             });
-            self.looks.put(painter.paint(reached.round, reached.light.environment(), &reached.table));
+            self.looks.put(painter.paint(reached.light.environment(), &reached.table));
             self.teller.wake();
         }
     }

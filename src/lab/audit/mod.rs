@@ -24,7 +24,6 @@ pub mod report;
 
 pub use built_in::built_in;
 pub use gradients::gradients;
-pub use report::{AuditReport, AuditRow, GroupReport};
 
 /// How derivatives are audited.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]

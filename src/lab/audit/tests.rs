@@ -1,3 +1,4 @@
+use super::report::AuditReport;
 use super::*;
 use crate::math::real::Real;
 use crate::render::Parameters;

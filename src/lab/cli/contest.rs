@@ -247,7 +247,7 @@ pub(super) fn teller(event: &'static str, json: bool) -> impl Fn(&str) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::contest::read_arguments;
+    use crate::lab::contest::race::read_arguments;
     use crate::scene::ReadSettings;
     use crate::scene::settings::{BackgroundChoice, ColourEncoding, MaskUse, PixelCentre, Up};
     use clap::Parser;

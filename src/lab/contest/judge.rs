@@ -44,8 +44,6 @@ pub const COLUMNS: [(&str, &str); 18] = [
 ];
 /// Column of the error of training views.
 pub const IMAGE: usize = 0;
-/// Column of the error of held-out views.
-pub const HELD_OUT: usize = 2;
 /// Columns that are put side by side in summaries: image, held out, diffuse aligned, specular, roughness, light aligned,
 /// relit aligned.
 pub const COMPARED: [usize; 7] = [0, 2, 5, 6, 8, 11, 16];

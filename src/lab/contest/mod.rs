@@ -21,4 +21,4 @@ pub mod snapshot;
 pub mod tables;
 
 pub use contestant::Contestant;
-pub use race::{ContestOptions, read_arguments, run};
+pub use race::{ContestOptions, run};

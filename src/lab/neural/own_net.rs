@@ -299,7 +299,7 @@ mod tests {
         let uniform: Vec<[f64; 3]> = (0..500).map(|_| [0; 3].map(|_| f64::from(random.next_number()))).collect();
         for code in own.codes.chunks_exact(own.account.architecture.code) {
             let drawn: Vec<[f64; 3]> =
-                own.flow.from_uniform(&uniform, code).into_iter().map(|(point, _)| point).collect();
+                own.flow.carry_from_uniform(&uniform, code).into_iter().map(|(point, _)| point).collect();
             let back = own.flow.to_uniform(&drawn, code);
             let near = |(a, b): (&[f64; 3], &[f64; 3])| (0..3).all(|axis| (a[axis] - b[axis]).abs() < 1e-5);
             assert!(back.iter().zip(&uniform).all(near));

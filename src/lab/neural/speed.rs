@@ -37,7 +37,7 @@ pub fn measure(flow: &Flow, batch: usize, repeats: usize) -> Speed {
         batch as f64 / least.max(1e-9)
     };
     let evaluations_per_second = best(&mut || drop(flow.log_density(&points, &code)));
-    let samples_per_second = best(&mut || drop(flow.from_uniform(&points, &code)));
+    let samples_per_second = best(&mut || drop(flow.carry_from_uniform(&points, &code)));
     let gradients_per_second = best(&mut || drop(gradient(flow, &points, &code)));
     let in_columns_per_second = if flow.architecture().is_triangular() {
         let nest = Nest { azimuths: batch / 64, differences: 1, halves: 64 };

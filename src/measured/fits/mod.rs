@@ -9,7 +9,7 @@ pub mod neural;
 pub mod published;
 
 pub use neural::{NeuralFit, NeuralFits};
-pub use published::{PublishedFit, PublishedFits};
+pub use published::PublishedFits;
 
 /// What data every table that is made of the neural fits names.
 pub const DATA_STATEMENT: &str = "Data: MERL via neural fits (Sztrajman et al. 2021), not MERL itself.";

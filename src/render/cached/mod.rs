@@ -39,7 +39,7 @@ pub mod visibility;
 mod tests;
 
 pub use footprint::{FootprintSettings, ShadingPoint, ViewFootprints};
-pub use light_basis::{LightBasis, LightPlanes};
+pub use light_basis::LightPlanes;
 pub use points::VisibilityGrid;
 pub use seen_light::SeenLight;
 pub use transport::{CachedSettings, CachedTransport, PointLight};

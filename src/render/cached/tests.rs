@@ -1,5 +1,6 @@
 //! The cache as a whole: against the path tracer, its transposes, its bits.
 
+use super::light_basis::LightBasis;
 use super::*;
 use crate::material::texels::{PyramidWeights, TexelPyramid, texels_from_maps};
 use crate::math::random::SequentialRandom;

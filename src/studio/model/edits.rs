@@ -105,11 +105,6 @@ impl History {
         self.0.add_undo(edits);
     }
 
-    /// Counts what was changed so far as one step.
-    pub fn mark(&mut self, edits: &Edits) {
-        self.0.add_undo(edits);
-    }
-
     /// Whether something can be taken back.
     pub fn can_undo(&self, edits: &Edits) -> bool {
         self.0.has_undo(edits)

@@ -40,11 +40,6 @@ impl ThemeChoice {
         let place = Self::NAMED.iter().position(|(theme, _)| *theme == self).unwrap_or(0);
         Self::NAMED[(place + 1) % Self::NAMED.len()].0
     }
-
-    /// Its name.
-    pub fn name(self) -> &'static str {
-        Self::NAMED.iter().find(|(theme, _)| *theme == self).map_or("", |(_, name)| name)
-    }
 }
 
 /// A scene or run that was opened before.

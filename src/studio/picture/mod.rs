@@ -21,9 +21,8 @@ pub mod thumbnails;
 pub mod view;
 pub mod widget;
 
-pub use marks::POINTS_FOR_NUMBERS;
 pub use overlay::{Compare, Comparison, LineSpace, Lines, Mark, Overlay};
 pub use source::{Place, Source, Value, describe};
 pub use thumbnails::ThumbnailCache;
-pub use view::{Frame, PictureView, PixelRect};
-pub use widget::{PictureResponse, show};
+pub use view::PictureView;
+pub use widget::show;

@@ -27,16 +27,6 @@ impl ThumbnailCache {
         }
     }
 
-    /// Whether there is a thumbnail of this name.
-    pub fn contains(&self, name: &str) -> bool {
-        self.entries.contains_key(name)
-    }
-
-    /// Forgets all thumbnails.
-    pub fn clear(&mut self) {
-        self.entries.clear();
-    }
-
     /// The texture of a thumbnail; `None` when there is none of this name, or it has no pixels. It is coloured anew
     /// only when the display changed.
     pub fn texture(&mut self, context: &Context, name: &str, display: &DisplaySettings) -> Option<&TextureHandle> {

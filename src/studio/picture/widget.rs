@@ -20,8 +20,6 @@ const HANDLE_REACH: f32 = 8.0;
 /// What happened to a picture and what is under the pointer.
 #[derive(Clone, Debug)]
 pub struct PictureResponse {
-    /// The widget's own response: for menus, tooltips and focus.
-    pub response: Response,
     /// Where the picture lies.
     pub frame: Frame,
     /// The place under the pointer.
@@ -32,8 +30,6 @@ pub struct PictureResponse {
     pub other_value: Option<Value>,
     /// The place that was clicked.
     pub clicked: Option<Place>,
-    /// The place that was double-clicked; the click before was reported as one.
-    pub double_clicked: Option<Place>,
     /// A drag with the primary button that is left to the caller: where it began and where it is, maybe outside of the
     /// picture.
     pub drag: Option<(Place, Place)>,
@@ -273,7 +269,7 @@ fn answer(
         };
         (place(from), place(to))
     });
-    let (clicked, double_clicked) = (under(response.clicked()), under(response.double_clicked()));
+    let clicked = under(response.clicked());
     response.widget_info(|| {
         let mut info = WidgetInfo::labeled(Role::Image, true, label);
         info.current_text_value = Some(match hovered {
@@ -282,17 +278,5 @@ fn answer(
         });
         info
     });
-    PictureResponse {
-        frame,
-        hovered,
-        value,
-        other_value,
-        clicked,
-        double_clicked,
-        drag,
-        wipe,
-        repainted,
-        on_screen,
-        response,
-    }
+    PictureResponse { frame, hovered, value, other_value, clicked, drag, wipe, repainted, on_screen }
 }

@@ -123,8 +123,6 @@ pub struct StageQuantity {
 pub struct StageCamera {
     /// Its lens and pose.
     pub camera: Camera,
-    /// Name of its view.
-    pub name: String,
     /// How wrong the fit is there, on the colour scale from 0 to 1; grey when unknown.
     pub error_0_1: Option<f32>,
     /// It judges the fit and takes no part in it: dashed.
@@ -139,16 +137,8 @@ pub struct StageCamera {
 
 impl StageCamera {
     /// A camera of which nothing else is known.
-    pub fn new(camera: Camera, name: impl Into<String>) -> Self {
-        StageCamera {
-            camera,
-            name: name.into(),
-            error_0_1: None,
-            held_out: false,
-            excluded: false,
-            selected: false,
-            thumbnail: None,
-        }
+    pub fn new(camera: Camera) -> Self {
+        StageCamera { camera, error_0_1: None, held_out: false, excluded: false, selected: false, thumbnail: None }
     }
 }
 

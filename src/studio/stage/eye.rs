@@ -127,7 +127,7 @@ impl Eye {
     }
 
     /// An orbit that continues from here: itself, or [`OrbitEye::from_camera`].
-    pub fn to_orbit(&self, bounds: (Vec3, Vec3)) -> OrbitEye {
+    pub fn in_orbit(&self, bounds: (Vec3, Vec3)) -> OrbitEye {
         match self {
             Eye::Orbit(orbit) => *orbit,
             Eye::Photo(camera) => OrbitEye::from_camera(camera, bounds),

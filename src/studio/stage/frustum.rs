@@ -200,7 +200,7 @@ mod tests {
             .map(|index| {
                 let (sin, cos) = (index as f32 * 0.785).sin_cos();
                 let place = Vec3::new(3.0 * sin, 1.0, 3.0 * cos);
-                StageCamera::new(Camera::looking_at(place, Vec3::ZERO, 64, 48, 0.8), format!("{index}"))
+                StageCamera::new(Camera::looking_at(place, Vec3::ZERO, 64, 48, 0.8))
             })
             .collect()
     }

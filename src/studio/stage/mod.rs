@@ -41,7 +41,6 @@ mod uniforms;
 pub use content::{
     Backdrop, Layer, PhotoMode, StageCamera, StageContent, StageFrame, StageLight, StageLook, StageQuantity,
 };
-pub use eye::{Eye, OrbitEye};
 pub use frustum::{frustum_depth, pick_camera};
 pub use navigate::navigate;
 pub use renderer::StageStatus;

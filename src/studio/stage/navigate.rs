@@ -33,7 +33,7 @@ pub fn navigate(response: &egui::Response, eye: &mut Eye, bounds: Option<(Vec3, 
     if !dragged && (wheel == 1.0 || !wheel.is_finite()) {
         return false;
     }
-    let mut orbit = eye.to_orbit(bounds.unwrap_or((Vec3::NEG_ONE, Vec3::ONE)));
+    let mut orbit = eye.in_orbit(bounds.unwrap_or((Vec3::NEG_ONE, Vec3::ONE)));
     if dragged && primary && !command {
         orbit.orbit(drag * RADIANS_PER_HEIGHT);
     } else if dragged {

@@ -7,7 +7,8 @@
 use glam::Vec3;
 use patina::Result;
 use patina::export::RunFolder;
-use patina::fit::{FitSettings, FitState, Fitter, StepOutcome};
+use patina::fit::state::FitState;
+use patina::fit::{FitSettings, Fitter, StepOutcome};
 use patina::image::Image;
 use patina::job::prepare::Prepared;
 use patina::job::{JobHandle, JobOptions, RunSettings, start_with};

@@ -3,7 +3,8 @@
 use super::support::*;
 use crate::core_tests::common::*;
 use patina::fit::settings::{BackgroundEvidence, Consistency, Start, Steps};
-use patina::fit::{FitSettings, FitState, Fitter, ViewUse, checkpoint};
+use patina::fit::state::FitState;
+use patina::fit::{FitSettings, Fitter, ViewUse, checkpoint};
 use patina::render::first_hits::PixelFilter;
 use patina::scene::{Photo, Scene};
 use patina::{ErrorKind, Place};

@@ -2,8 +2,9 @@
 
 use crate::core_tests::common::*;
 use patina::export::RunFolder;
-use patina::fit::{FitSettings, FitState, Fitter, checkpoint};
-use patina::insight::ReportData;
+use patina::fit::state::FitState;
+use patina::fit::{FitSettings, Fitter, checkpoint};
+use patina::insight::report::ReportData;
 use patina::job::{Event, JobHandle, JobOptions, RunSettings};
 use patina::render::Surface;
 use patina::scene::Scene;

@@ -7,7 +7,9 @@ use patina::image::{Image, RgbImage};
 use patina::light::Environment;
 use patina::material::MaterialMaps;
 use patina::scene::Mesh;
-use patina::studio::stage::{Eye, OrbitEye, Stage, StageContent, StageFrame, StageLight};
+use patina::studio::stage::eye::Eye;
+use patina::studio::stage::eye::OrbitEye;
+use patina::studio::stage::{Stage, StageContent, StageFrame, StageLight};
 use std::sync::Arc;
 
 /// A window with nothing but a stage.

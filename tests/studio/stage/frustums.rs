@@ -7,9 +7,9 @@ use glam::{Vec2, Vec3};
 use patina::image::Image;
 use patina::image::display::{DisplaySettings, scale_colour};
 use patina::scene::Camera;
-use patina::studio::stage::{
-    Backdrop, Eye, OrbitEye, StageCamera, StageContent, StageFrame, StageLook, frustum_depth, pick_camera,
-};
+use patina::studio::stage::eye::Eye;
+use patina::studio::stage::eye::OrbitEye;
+use patina::studio::stage::{Backdrop, StageCamera, StageContent, StageFrame, StageLook, frustum_depth, pick_camera};
 use std::sync::Arc;
 
 const SIZE: Vec2 = Vec2::new(320.0, 240.0);
@@ -19,7 +19,7 @@ fn two_cameras() -> Vec<StageCamera> {
     [-1.0, 1.0]
         .map(|x| {
             let place = Vec3::new(x, 0.0, 0.0);
-            StageCamera::new(Camera::looking_at(place, place + Vec3::NEG_Z, 40, 30, 0.9), format!("{x}"))
+            StageCamera::new(Camera::looking_at(place, place + Vec3::NEG_Z, 40, 30, 0.9))
         })
         .to_vec()
 }

@@ -10,9 +10,10 @@ use patina::light::sky::{SkySettings, sun_and_sky};
 use patina::render::Surface;
 use patina::render::picture::{PictureSettings, render};
 use patina::scene::demo::{DemoSettings, build};
+use patina::studio::stage::eye::Eye;
+use patina::studio::stage::eye::OrbitEye;
 use patina::studio::stage::{
-    Backdrop, Eye, Layer, OrbitEye, PhotoMode, StageCamera, StageContent, StageFrame, StageLight, StageQuantity,
-    frustum_depth,
+    Backdrop, Layer, PhotoMode, StageCamera, StageContent, StageFrame, StageLight, StageQuantity, frustum_depth,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -82,8 +83,7 @@ fn pictures_of_the_demo_scene() {
     let photo = |camera: &patina::scene::Camera| {
         Arc::new(render(&surface, camera, &parameters, 0, &settings(16), &stop).radiance)
     };
-    let mut cameras: Vec<StageCamera> =
-        demo.scene.views.iter().map(|view| StageCamera::new(view.camera, view.name.clone())).collect();
+    let mut cameras: Vec<StageCamera> = demo.scene.views.iter().map(|view| StageCamera::new(view.camera)).collect();
     for (index, camera) in cameras.iter_mut().enumerate() {
         camera.error_0_1 = (index % 7 != 6).then_some(index as f32 / 27.0);
         camera.held_out = index >= 24;

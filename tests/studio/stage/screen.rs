@@ -8,7 +8,9 @@ use patina::image::Image;
 use patina::image::display::{DisplaySettings, ToneCurve};
 use patina::light::Environment;
 use patina::scene::Camera;
-use patina::studio::stage::{Backdrop, Eye, OrbitEye, PhotoMode, StageFrame};
+use patina::studio::stage::eye::Eye;
+use patina::studio::stage::eye::OrbitEye;
+use patina::studio::stage::{Backdrop, PhotoMode, StageFrame};
 use std::sync::Arc;
 
 const SIZE: Vec2 = Vec2::new(120.0, 80.0);

@@ -6,7 +6,9 @@ use glam::{Vec2, Vec3};
 use patina::image::Image;
 use patina::light::sky::{SkySettings, sun_and_sky};
 use patina::material::MaterialMaps;
-use patina::studio::stage::{Backdrop, Eye, Layer, OrbitEye, StageContent, StageFrame, StageLight};
+use patina::studio::stage::eye::Eye;
+use patina::studio::stage::eye::OrbitEye;
+use patina::studio::stage::{Backdrop, Layer, StageContent, StageFrame, StageLight};
 use std::sync::Arc;
 use std::time::Instant;
 

@@ -8,7 +8,9 @@ use patina::image::Image;
 use patina::image::display::{DisplaySettings, ToneCurve, scale_colour};
 use patina::light::Environment;
 use patina::light::sky::{SkySettings, sun_and_sky};
-use patina::studio::stage::{Backdrop, Eye, Layer, OrbitEye, StageLight, StageQuantity};
+use patina::studio::stage::eye::Eye;
+use patina::studio::stage::eye::OrbitEye;
+use patina::studio::stage::{Backdrop, Layer, StageLight, StageQuantity};
 use std::f32::consts::PI;
 use std::sync::Arc;
 

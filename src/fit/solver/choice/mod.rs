@@ -37,7 +37,7 @@ pub mod student;
 #[cfg(test)]
 mod tests;
 
-pub use choices::{ChoiceLine, Choices};
+pub use choices::Choices;
 
 /// Number of [`Alternative`]s.
 pub const ALTERNATIVES: usize = 5;

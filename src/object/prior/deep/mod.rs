@@ -46,11 +46,6 @@ impl DeepPrior {
         Ok(DeepPrior { net, input, weights, adam, offset: [0.0; 3] })
     }
 
-    /// Number of weights.
-    pub fn weight_count(&self) -> usize {
-        self.weights.len()
-    }
-
     /// The natural logarithm of the light, channel by channel.
     pub fn log_light(&self) -> [Vec<f32>; 3] {
         self.logs_of(self.net.forward(&self.weights, &self.input).0)

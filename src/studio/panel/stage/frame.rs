@@ -162,7 +162,7 @@ impl FrameCache {
             excluded: key.excluded.contains(&view.name),
             selected: index == project.chosen_view,
             thumbnail: project.thumbnails.get(index).filter(|_| key.thumbnails).cloned(),
-            ..StageCamera::new(view.camera, view.name.clone())
+            ..StageCamera::new(view.camera)
         };
         let cameras = Arc::new(scene.views.iter().enumerate().map(camera).collect());
         self.cameras = Some((key, Arc::clone(&cameras)));

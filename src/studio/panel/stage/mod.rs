@@ -144,7 +144,7 @@ fn interact(ui: &mut Ui, model: &mut Model, memory: &mut StageMemory, frame: &St
     let cursor = surface_under(model, &frame.eye, place, size);
     if response.double_clicked() {
         if let Some(cursor) = cursor {
-            model.eye = frame.eye.to_orbit(bounds_of(model));
+            model.eye = frame.eye.in_orbit(bounds_of(model));
             model.eye.target = cursor.position;
             model.switches.looking_through = false;
         }
@@ -178,11 +178,11 @@ fn move_eye(model: &mut Model, response: &Response) {
     let bounds = bounds_of(model);
     let mut eye = model.eye_in_force();
     if stage::navigate(response, &mut eye, Some(bounds)) {
-        model.eye = eye.to_orbit(bounds);
+        model.eye = eye.in_orbit(bounds);
         if model.switches.looking_through {
             // The photo no longer lies on what is seen.
             model.look_through(false);
-            model.eye = eye.to_orbit(bounds);
+            model.eye = eye.in_orbit(bounds);
         }
     }
 }
