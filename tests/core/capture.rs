@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use glam::Vec3;
-use patina::fit::{FitSettings, Fitter, Method};
+use patina::fit::{FitSettings, Fitter};
 use patina::insight::capture::{Capture, check};
 use patina::job::demo::photograph;
 use patina::lab::scenes::hard::{HardCase, HardScene, HardSettings, build};
@@ -117,38 +117,4 @@ fn the_same_bits_whatever_the_number_of_threads() {
     assert_eq!(with(1), with(3));
     let stopped = check(&fitter, &AtomicBool::new(true));
     assert_eq!(stopped, Capture::default());
-}
-
-#[test]
-#[ignore = "slow: fits seven scenes"]
-fn fits_to_spoiled_captures_tell_what_is_wrong() {
-    for (case, expected) in [
-        (HardCase::Plain, ""),
-        (HardCase::OneSided, "one-sided"),
-        (HardCase::Masks, "mask-doubtful"),
-        (HardCase::OnePixel, "camera-turned"),
-        (HardCase::TwoPixels, "camera-turned"),
-        (HardCase::Exposure, "exposure-varies"),
-        (HardCase::Missing, "mesh-missing-part"),
-    ] {
-        let hard = photographed(case, &HardSettings::default(), 128);
-        let given = Arc::new(hard.spoil(&hard.scene).unwrap());
-        let surface = Arc::new(Surface::new(given.mesh.clone()).unwrap());
-        // No gains are fitted: the exposures are for the check to find.
-        let settings = FitSettings {
-            method: Method::Solver,
-            map_size: 64,
-            environment_height: 16,
-            bounces: 3,
-            held_out_interval: 0,
-            ..Default::default()
-        };
-        let mut fitter = Fitter::new(given, surface, settings, None).unwrap();
-        assert!(fitter.finish(&GO).unwrap());
-        let told = codes(&check(&fitter, &GO));
-        match expected {
-            "" => assert!(told.is_empty(), "{}: {told:?}", case.name()),
-            code => assert!(told.contains(&code), "{}: {told:?}", case.name()),
-        }
-    }
 }

@@ -9,7 +9,6 @@ use patina::lab::scenes::study::{self, StudyKind, StudySettings};
 use patina::scene::demo::{DemoScene, DemoSettings, build};
 use patina::scene::{Background, Mesh, PixelState, ReadSettings};
 use patina::trace::Bvh;
-use std::path::{Path, PathBuf};
 
 fn small() -> DemoSettings {
     DemoSettings { width: 48, height: 36, map_size: 256, ..DemoSettings::default() }
@@ -246,45 +245,12 @@ fn a_folder_that_is_written_is_read_as_the_same_scene() {
     }
 }
 
-/// A mesh with texture coordinates from an OBJ file.
-fn read_obj(path: &Path) -> Mesh {
-    let (models, _) = tobj::load_obj(path, &tobj::LoadOptions { single_index: true, ..Default::default() }).unwrap();
-    let mut mesh = Mesh::default();
-    for model in models {
-        let first = mesh.positions.len() as u32;
-        mesh.positions.extend(model.mesh.positions.chunks(3).map(Vec3::from_slice));
-        mesh.normals.extend(model.mesh.normals.chunks(3).map(Vec3::from_slice));
-        mesh.uvs.extend(model.mesh.texcoords.chunks(2).map(Vec2::from_slice));
-        mesh.triangles.extend(model.mesh.indices.chunks(3).map(|t| [first + t[0], first + t[1], first + t[2]]));
-    }
-    mesh
-}
-
-/// Writes the demo and the study scenes as exchange folders for tests/mitsuba:
-/// `PATINA_REFERENCE_OUT=folder cargo test --test demo_scene write_reference -- --ignored`. The cow and the teddy are
-/// written when `PATINA_REFERENCE_OUT/cow.obj` and `teddy.obj` are there, with texture coordinates (unwrap.py).
 #[test]
-#[ignore = "slow: writes folders for the Mitsuba scripts"]
-fn write_reference_folders() {
-    // Without a folder the writing itself is still tried, in one that goes away.
-    let temporary = tempfile::tempdir().unwrap();
-    let out = std::env::var_os("PATINA_REFERENCE_OUT").map_or_else(|| temporary.path().into(), PathBuf::from);
-    let demo = build(&DemoSettings::default()).unwrap();
-    let options = ExchangeOptions { covered: Some(&demo.covered), ..ExchangeOptions::default() };
-    exchange::write(&demo.scene, demo.scene.truth.as_ref().unwrap(), &options, &out.join("demo")).unwrap();
-    let settings = StudySettings::default();
-    for kind in StudyKind::ALL {
-        let file = out.join(format!("{}.obj", kind.name()));
-        let mesh = match kind.mesh_in_code(settings.map_size).unwrap() {
-            Some(mesh) => mesh,
-            None if file.exists() => read_obj(&file),
-            None => {
-                println!("skipped: {} not present", file.display());
-                continue;
-            }
-        };
-        let scene = study::build(kind, mesh, &settings).unwrap();
-        let options = ExchangeOptions { lobe_strength: kind.lobe_strength(), ..ExchangeOptions::default() };
-        exchange::write(&scene, scene.truth.as_ref().unwrap(), &options, &out.join(kind.name())).unwrap();
+fn the_reference_scenes_are_written_and_read_again() {
+    let folder = tempfile::tempdir().unwrap();
+    patina::lab::scenes::write_references(folder.path(), &|_| {}).unwrap();
+    for name in ["demo", "vase"] {
+        let mesh = folder.path().join(name).join("mesh.obj");
+        assert!(patina::scene::read_mesh(&mesh).unwrap().0.triangles.len() > 1000, "{name}");
     }
 }

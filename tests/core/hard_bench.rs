@@ -43,29 +43,3 @@ fn some_hard_cases_end_with_sound_rows() {
     assert!(near.iter().all(|error| error.is_finite()));
     assert!(table.rows.iter().find(|row| row.case == "plain").unwrap().near_and_far.is_none());
 }
-
-#[test]
-#[ignore = "slow"]
-fn every_hard_case_ends_with_a_sound_row() {
-    let table = table(&HardCase::ALL, true);
-    println!("{}", table.to_markdown());
-    assert_sound(&table, HardCase::ALL.len());
-}
-
-/// The first case differs from the second in nothing but the shape of its lobes.
-#[test]
-#[ignore = "slow"]
-fn lobes_with_tails_are_told_by_name_and_those_of_the_model_are_not() {
-    let folder = tempfile::tempdir().unwrap();
-    let options = HardOptions {
-        methods: vec![Contestant::Solver],
-        cases: vec![HardCase::Ggx, HardCase::Plain],
-        quick: false,
-        // With four of seeds 1 to 8 they are told.
-        seed: 2,
-        output: folder.path().into(),
-    };
-    let table = run(&options, &AtomicBool::new(false), &|text| println!("{text}")).unwrap();
-    let told: Vec<bool> = table.rows.iter().map(|row| row.told.iter().any(|name| name == "lobes-with-tails")).collect();
-    assert_eq!(told, [true, false], "{:?}", table.rows);
-}

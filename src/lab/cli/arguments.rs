@@ -30,9 +30,33 @@ pub enum Task {
     /// Fit scenes with a known truth many times over and write tables and plots.
     #[command(subcommand)]
     Study(StudyTask),
+    /// Ask what takes too long to be asked on every change; fails where something falls short.
+    Nightly(NightlyOptions),
+    /// Write the demo and the study scenes as exchange folders for the Mitsuba scripts.
+    References(ReferencesOptions),
     /// Train the neural model of reflectance, hold models against measured tables.
     #[command(subcommand)]
     Measured(super::measured::MeasuredTask),
+}
+
+/// Options of `patina-lab nightly`.
+#[derive(Debug, Args)]
+pub struct NightlyOptions {
+    /// Only these checks.
+    #[arg(long, value_delimiter = ',')]
+    pub checks: Vec<String>,
+    /// Folder of what the checks write.
+    #[arg(short, long, default_value = "patina-nightly")]
+    pub output: PathBuf,
+}
+
+/// Options of `patina-lab references`.
+#[derive(Debug, Args)]
+pub struct ReferencesOptions {
+    /// Folder of the scenes; the cow and the teddy are written when `cow.obj` and `teddy.obj` lie there, with texture
+    /// coordinates (`tests/mitsuba/unwrap.py`).
+    #[arg(short, long)]
+    pub output: PathBuf,
 }
 
 /// What to audit.

@@ -1,9 +1,11 @@
 //! `patina-lab audit` and `patina-lab bench`.
 
-use super::arguments::{AuditOptions, BenchOptions, BenchStudioOptions};
+use super::arguments::{AuditOptions, BenchOptions, BenchStudioOptions, NightlyOptions};
+use crate::cli::fit::stop_on_interrupt;
 use crate::error::{Error, ErrorKind, Result};
 use crate::lab::audit::{AuditSettings, built_in, gradients};
 use crate::lab::scale;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// Audits gradients on the built-in audit scene; an audit beyond its limits is an error.
@@ -27,6 +29,13 @@ pub fn audit_gradients(options: &AuditOptions, json: bool) -> Result<()> {
     }
     Err(Error::new(ErrorKind::Numerical, "a derivative is not that of its function; the worst rows are above")
         .remedy("a defect of this program: report it with the table"))
+}
+
+/// Runs the checks of a night; one that falls short is an error.
+pub fn nightly(options: &NightlyOptions, json: bool) -> Result<()> {
+    let stop = Arc::new(AtomicBool::new(false));
+    stop_on_interrupt(Arc::clone(&stop));
+    crate::lab::nightly::run(&options.checks, &options.output, &stop, &super::contest::teller("nightly", json))
 }
 
 /// Measures growth and writes the table as Markdown, CSV and SVG.

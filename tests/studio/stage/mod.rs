@@ -8,5 +8,4 @@ mod common;
 mod frustums;
 mod pictures;
 mod screen;
-mod speed;
 mod surface;

@@ -1,5 +1,0 @@
-//! The lab as a program.
-
-#![allow(clippy::unwrap_used)]
-
-mod contest;
