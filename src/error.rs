@@ -5,6 +5,7 @@
 
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// The result of everything that can fail on user data.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -41,6 +42,7 @@ pub enum ErrorKind {
 
 /// Where it went wrong.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub enum Place {
     /// Nowhere in particular.
     #[default]
@@ -103,12 +105,20 @@ struct Inner {
     message: String,
     place: Place,
     remedy: String,
+    source: Option<Arc<dyn std::error::Error + Send + Sync>>,
 }
 
 impl Error {
     /// An error of this kind; `message` is one sentence without a full stop.
     pub fn new(kind: ErrorKind, message: impl Into<String>) -> Self {
-        Error(Box::new(Inner { kind, message: message.into(), place: Place::Nowhere, remedy: String::new() }))
+        let (place, remedy) = (Place::Nowhere, String::new());
+        Error(Box::new(Inner { kind, message: message.into(), place, remedy, source: None }))
+    }
+
+    /// The same error with what caused it, for a program that asks: [`std::error::Error::source`]. The message says it, too.
+    pub fn caused_by(mut self, source: impl std::error::Error + Send + Sync + 'static) -> Self {
+        self.0.source = Some(Arc::new(source));
+        self
     }
 
     /// The same error at a place. A place that is already known is kept: the innermost one is the most exact.
@@ -127,6 +137,12 @@ impl Error {
         self
     }
 
+    /// The same error with another remedy, for who knows better what helps than where it arose.
+    pub fn with_remedy(mut self, remedy: impl Into<String>) -> Self {
+        self.0.remedy = remedy.into();
+        self
+    }
+
     /// An input or output error of the operating system on reading `path`.
     pub fn reading(path: &Path, source: std::io::Error) -> Self {
         let kind = match source.kind() {
@@ -134,11 +150,13 @@ impl Error {
             std::io::ErrorKind::UnexpectedEof | std::io::ErrorKind::InvalidData => ErrorKind::Malformed,
             _ => ErrorKind::Unreadable,
         };
-        Error::new(kind, format!("cannot read the file: {source}")).at(Place::File(path.into())).remedy(match kind {
+        let remedy = match kind {
             ErrorKind::Missing => "check the path, or name the file in scene.toml",
             ErrorKind::Malformed => "the file is cut short or damaged: copy it again",
             _ => "check that the file may be read",
-        })
+        };
+        let message = format!("cannot read the file: {source}");
+        Error::new(kind, message).at(Place::File(path.into())).remedy(remedy).caused_by(source)
     }
 
     /// An input or output error of the operating system on writing `path`.
@@ -146,6 +164,7 @@ impl Error {
         Error::new(ErrorKind::Unwritable, format!("cannot write the file: {source}"))
             .at(Place::File(path.into()))
             .remedy("check free space and permission; what was saved before is untouched")
+            .caused_by(source)
     }
 
     /// The kind, to branch on.
@@ -182,7 +201,11 @@ impl fmt::Display for Error {
     }
 }
 
-impl std::error::Error for Error {}
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        self.0.source.as_deref().map(|source| source as _)
+    }
+}
 
 /// How much a finding matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
@@ -278,5 +301,17 @@ mod tests {
             .at(Place::View("0".into()))
             .remedy("other");
         assert_eq!(error.to_string(), "mesh.obj, line 7: index 0 is not a vertex (count vertices from 1)");
+        assert_eq!(error.with_remedy("other").remedy_text(), "other");
+    }
+
+    #[test]
+    fn what_the_operating_system_said_is_kept_as_the_source() {
+        use std::error::Error as _;
+        let path = tempfile::tempdir().unwrap().path().join("none");
+        let missing = std::fs::read(&path).unwrap_err();
+        let error = Error::reading(&path, missing).clone();
+        let source = error.source().and_then(|source| source.downcast_ref::<std::io::Error>());
+        assert_eq!(source.map(std::io::Error::kind), Some(std::io::ErrorKind::NotFound));
+        assert!(Error::new(ErrorKind::Numerical, "no step").source().is_none());
     }
 }

@@ -3,9 +3,9 @@
 use super::arguments::{DemoOptions, FitOptions, ResumeOptions};
 use crate::error::{Error, ErrorKind, Result};
 use crate::export::RunFolder;
-use crate::fit::{FitSettings, Method, Suited};
+use crate::fit::{FitSettings, Method};
 use crate::insight::report::data::ReportData;
-use crate::job::open::{self, OpenStage, OpenedScene, Tell};
+use crate::job::open::{self, OpenStage, Tell};
 use crate::job::prepare::RunSettings;
 use crate::job::{self, Event, JobHandle, demo};
 use crate::scene::demo::DemoSettings;
@@ -21,18 +21,18 @@ pub fn demo(options: &DemoOptions, json: bool) -> Result<()> {
     stop_on_interrupt(Arc::clone(&stop));
     let mut settings = demo::settings();
     settings.fit.seed = options.seed;
+    let mut chosen = Vec::new();
     if let Some(path) = &options.settings {
-        let (changed, chosen) = settings.fit.changed_by_file(path)?;
-        settings.fit = changed;
-        if Method::means_adam(&chosen) && !chosen.iter().any(|name| name == "method") {
-            settings.fit.method = Method::Paper;
-        }
+        // Settings of Adam's choose him here, too.
+        settings.fit.method = Method::Automatic;
+        (settings.fit, chosen) = settings.fit.changed_by_file(path)?;
     }
     settings.fit.method = options.method.unwrap_or(settings.fit.method);
     // By the seed of the fit the scene is made anew when the run is taken up or relit.
     let demo_settings = DemoSettings { seed: settings.fit.seed, ..DemoSettings::default() };
     let (prepared, fitter, settings) = with_bar(json, |tell| {
         let opened = open::open_demo(&demo_settings, &stop, tell)?;
+        opened.resolve(&mut settings.fit, &chosen);
         open::start_new(opened, settings, &stop, tell)
     })?;
     let job = job::start(prepared, fitter, settings, folder.clone())?;
@@ -41,7 +41,7 @@ pub fn demo(options: &DemoOptions, json: bool) -> Result<()> {
 
 /// Fits a scene.
 pub fn fit(options: &FitOptions, json: bool) -> Result<()> {
-    let mut settings = run_settings(options)?;
+    let AskedSettings { mut settings, chosen } = run_settings(options)?;
     settings.fit.validate()?;
     let folder = RunFolder::create(&options.output)?;
     if !json {
@@ -52,7 +52,7 @@ pub fn fit(options: &FitOptions, json: bool) -> Result<()> {
     let mut told = Vec::new();
     let (prepared, fitter, settings) = with_bar(json, |tell| {
         let opened = open::open_scene(&settings.scene, &settings.read, &stop, tell)?;
-        told = suit(options, &opened, &mut settings.fit);
+        told = opened.resolve(&mut settings.fit, &chosen);
         open::start_new(opened, settings, &stop, tell)
     })?;
     if !json {
@@ -62,19 +62,34 @@ pub fn fit(options: &FitOptions, json: bool) -> Result<()> {
     watch(job, &folder, &stop, json)
 }
 
+/// Settings that are asked for, before they are resolved for a scene.
+#[derive(Clone, Debug)]
+pub struct AskedSettings {
+    /// The settings.
+    pub settings: RunSettings,
+    /// Names of the settings of the fit that were typed or stand in a settings file.
+    pub chosen: Vec<String>,
+}
+
 /// The settings that options ask for: a preset or a settings file, and what was typed over it.
 ///
 /// # Errors
 /// A settings file that cannot be read.
-pub fn run_settings(options: &FitOptions) -> Result<RunSettings> {
+pub fn run_settings(options: &FitOptions) -> Result<AskedSettings> {
+    let mut chosen = options.fit.typed.clone();
     let mut settings = match &options.settings {
         Some(path) => {
             let text = std::fs::read_to_string(path).map_err(|source| Error::reading(path, source))?;
-            crate::files::settings_of_toml::<RunSettings>(&text, path).map_err(|error| {
-                let remedy =
-                    "take the settings.toml of a run folder as a pattern: settings of the fit stand under [fit]";
-                Error::new(error.kind(), error.message()).at(error.place().clone()).remedy(remedy)
-            })?
+            let settings = crate::files::settings_of_toml::<RunSettings>(&text, path).map_err(|error| {
+                error.with_remedy(
+                    "take the settings.toml of a run folder as a pattern: settings of the fit stand under [fit]",
+                )
+            })?;
+            let table: toml::Table = crate::files::settings_of_toml(&text, path)?;
+            if let Some(fit) = table.get("fit").and_then(toml::Value::as_table) {
+                chosen.extend(fit.keys().cloned());
+            }
+            settings
         }
         None => RunSettings { fit: FitSettings::preset(options.preset.unwrap_or_default()), ..Default::default() },
     };
@@ -86,23 +101,7 @@ pub fn run_settings(options: &FitOptions) -> Result<RunSettings> {
     if let Some(uv) = options.uv {
         settings.atlas.keep_uv = uv;
     }
-    Ok(settings)
-}
-
-/// Sets what suits the scene and was not asked for, and returns what to say of that ([`Suited::told`]). A settings file
-/// asks for all: it says what differs from the defaults.
-pub fn suit(options: &FitOptions, opened: &OpenedScene, settings: &mut FitSettings) -> Vec<String> {
-    if options.settings.is_some() {
-        return Vec::new();
-    }
-    let suited = Suited::to(&opened.scene, &opened.report);
-    let asked = settings.clone();
-    suited.apply(settings, &options.fit.typed);
-    if settings.method == Method::Paper {
-        // What the solver would do is no setting of such a run.
-        settings.polish_as(&asked);
-    }
-    suited.told(&asked, settings)
+    Ok(AskedSettings { settings, chosen })
 }
 
 fn absolute(path: &Path) -> PathBuf {

@@ -5,17 +5,13 @@
 
 use crate::material::lobe::MIN_WIDTH;
 use crate::material::texels::Texel;
+use crate::math::adam::{Decay, LARGEST_GRADIENT};
 use rayon::prelude::*;
 
-/// Decay of the first moment.
-const BETA_ONE: f32 = 0.9;
-/// Decay of the second moment.
-const BETA_TWO: f32 = 0.99;
+/// The second moment forgets sooner than in the paper: a fit is a few hundred steps.
+const DECAY: Decay = Decay { first: 0.9, second: 0.99 };
 /// Added to the root of the second moment, relative to nothing: gradients of a mean over 10^6 pixels are about 1e-8.
 const EPSILON: f32 = 1e-16;
-/// A gradient counts as not finite from here on: its square would be infinite, and an infinite second moment would hold
-/// its number still for ever.
-const LARGEST_GRADIENT: f32 = 1e18;
 
 /// Moments of a group of numbers; the last entry of each group counts its updates.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -104,7 +100,8 @@ impl Moments {
             if relative.iter().all(|value| value.abs() < LARGEST_GRADIENT) {
                 let corrections = count_update(&mut self.first[index]);
                 for channel in 0..3 {
-                    accumulate(relative[channel], &mut self.first[index][channel], &mut self.second[index][channel]);
+                    let (first, second) = (&mut self.first[index], &mut self.second[index]);
+                    DECAY.accumulate(relative[channel], &mut first[channel], &mut second[channel]);
                 }
                 touched[index] = Some(corrections);
             } else {
@@ -151,13 +148,7 @@ fn mean_sizes(gradient: &[Texel<f32>]) -> [f32; 7] {
 /// Counts an update of a group and returns the corrections of both moments.
 fn count_update(first: &mut Texel<f32>) -> (f32, f32) {
     first[7] += 1.0;
-    (1.0 / (1.0 - BETA_ONE.powf(first[7])), 1.0 / (1.0 - BETA_TWO.powf(first[7])))
-}
-
-#[inline(always)]
-fn accumulate(gradient: f32, first: &mut f32, second: &mut f32) {
-    *first = BETA_ONE * *first + (1.0 - BETA_ONE) * gradient;
-    *second = BETA_TWO * *second + (1.0 - BETA_TWO) * gradient * gradient;
+    (1.0 / (1.0 - DECAY.first.powf(first[7])), 1.0 / (1.0 - DECAY.second.powf(first[7])))
 }
 
 /// Takes a gradient into both moments and returns the direction of the step. `common` is the share of the second moment
@@ -169,7 +160,7 @@ fn update(
     corrections: (f32, f32),
     (share, common): (f32, f32),
 ) -> f32 {
-    accumulate(gradient, first, second);
+    DECAY.accumulate(gradient, first, second);
     let squared = (1.0 - share) * (*second * corrections.1) + common;
     *first * corrections.0 / (squared.sqrt() + EPSILON)
 }

@@ -7,7 +7,7 @@ use super::evidence;
 use super::fitter::Fitter;
 use super::held_out::held_out_targets;
 use super::schedule::revised;
-use super::settings::FitSettings;
+use super::settings::{FitSettings, Method};
 use super::state::FitState;
 use super::views::{ViewUse, training_views, uses_of};
 use crate::error::{Error, ErrorKind, Place, Result};
@@ -43,7 +43,10 @@ impl Fitter {
     /// # Errors
     /// `InvalidSetting` naming the setting when it is out of its range, cannot change while a fit runs, asks for fewer
     /// steps than are done, or leaves no view to fit to. The fit then goes on as it was.
-    pub fn change(&mut self, settings: FitSettings) -> Result<()> {
+    pub fn change(&mut self, mut settings: FitSettings) -> Result<()> {
+        if settings.method == Method::Automatic {
+            settings.method = self.settings.method;
+        }
         settings.validate()?;
         let changed: Vec<String> = self.settings.differences(&settings).into_iter().map(|(name, _, _)| name).collect();
         if let Some(name) = changed.iter().find(|name| FIXED.contains(&name.as_str())) {

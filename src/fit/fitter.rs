@@ -11,11 +11,12 @@ use super::figures::LiveFigures;
 use super::gauge::GaugeRule;
 use super::held_out::held_out_targets;
 use super::schedule::{Stage, stages};
-use super::settings::{FitSettings, Start};
+use super::settings::{FitSettings, Method, Start};
 use super::solver::light_evidence::LightKnown;
 use super::solver::{Choices, LobeTails, SolverScene};
 use super::start;
 use super::state::{FitState, LossRow};
+use super::suited::Suited;
 use super::targets::{Target, targets};
 use super::views::{ViewUse, training_views, unknown_names, uses_of};
 use super::work::StageWork;
@@ -64,7 +65,9 @@ pub struct Fitter {
 }
 
 impl Fitter {
-    /// A new fit of a scene. `surface` holds the mesh with the atlas; `known_light` starts from a given environment.
+    /// A new fit of a scene. `surface` holds the mesh with the atlas; `known_light` starts from a given environment. Where
+    /// the method is [`Method::Automatic`], what suits the scene is taken, but for the size of the maps: [`Fitter::settings`]
+    /// says what.
     ///
     /// # Errors
     /// A setting out of range; a scene of which nothing can be evidence, or whose photos and cameras do not go together.
@@ -74,6 +77,13 @@ impl Fitter {
         settings: FitSettings,
         known_light: Option<&Environment>,
     ) -> Result<Self> {
+        let mut settings = settings;
+        if settings.method == Method::Automatic {
+            // The atlas of the surface was made for maps of this size.
+            let map_size = settings.map_size;
+            settings = Suited::to_unchecked(&scene).resolve(&settings, &settings.chosen());
+            settings.map_size = map_size;
+        }
         let mut fitter = Fitter::prepare(scene, surface, settings)?;
         fitter.state.plan = stages(&fitter.settings);
         let first_size = fitter.state.plan.first().map_or(fitter.settings.map_size, |stage| stage.map_size);
@@ -100,9 +110,14 @@ impl Fitter {
     pub fn resume(
         scene: Arc<Scene>,
         surface: Arc<Surface>,
-        settings: FitSettings,
+        mut settings: FitSettings,
         mut state: FitState,
     ) -> Result<Self> {
+        // A run that recorded no method is what its plan says.
+        if settings.method == Method::Automatic {
+            let is_of_solver = state.plan.iter().any(|stage| stage.kind.is_of_solver());
+            settings.method = if is_of_solver { Method::Solver } else { Method::Adam };
+        }
         let mut fitter = Fitter::prepare(scene, surface, settings)?;
         let views = fitter.scene.views.len();
         let light = 2 * fitter.settings.environment_height * fitter.settings.environment_height;
@@ -197,7 +212,7 @@ impl Fitter {
         &self.surface
     }
 
-    /// The settings.
+    /// The settings, resolved for the scene.
     pub fn settings(&self) -> &FitSettings {
         &self.settings
     }

@@ -86,8 +86,8 @@ mod tests {
     #[test]
     fn the_rule_that_is_named_is_that_of_the_method() {
         let open = |method| GaugeRule::of(Background::Black, BackgroundEvidence::Use, false, method);
-        assert_eq!((open(Method::Solver), open(Method::Paper)), (GaugeRule::StartAndHighlights, GaugeRule::Start));
-        for method in [Method::Solver, Method::Paper] {
+        assert_eq!((open(Method::Solver), open(Method::Adam)), (GaugeRule::StartAndHighlights, GaugeRule::Start));
+        for method in [Method::Solver, Method::Adam] {
             let seen = |evidence| GaugeRule::of(Background::Environment, evidence, false, method);
             assert_eq!(seen(BackgroundEvidence::Use), GaugeRule::Background);
             assert_eq!(seen(BackgroundEvidence::Ignore), open(method));

@@ -88,7 +88,7 @@ impl FitSettings {
         let unknowns = columns * rows;
         if !self.fixed_light && unknowns > MOST_UNKNOWNS_OF_LIGHT {
             let message = format!("{unknowns} unknowns of the light are more than the solver can hold");
-            return too_large("environment-height", message, "give an even number up to 64, or --method paper");
+            return too_large("environment-height", message, "give an even number up to 64, or --method adam");
         }
         let grid = self.solver_grid.min(self.map_size);
         let bytes = grid * grid * 2 * height * height;
@@ -134,6 +134,6 @@ mod tests {
         assert!(of(128, 256, true, solver).is_ok(), "a known light has no unknowns");
         assert!(of(1024, 256, true, solver).unwrap_err().contains("GiB"));
         assert!(of(64, 4096, false, solver).unwrap_err().contains("--solver-grid"));
-        assert!(of(1024, 4096, false, Method::Paper).is_ok());
+        assert!(of(1024, 4096, false, Method::Adam).is_ok());
     }
 }

@@ -1,14 +1,22 @@
-//! Which of the two ways to find maps and light: Adam by paths, or the solver.
+//! Which of the two ways to find maps and light: Adam along gradients of the path tracer, or the solver.
 
 use serde::{Deserialize, Serialize};
 
 /// How maps and light are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Method {
-    /// As in the paper: many small steps of Adam along gradients of the path tracer.
+    /// What suits the scene: the solver, unless there are no photos or a setting was chosen that means something to Adam
+    /// alone. Resolved once, before a fit begins, by [`Suited`](super::Suited); no run records it.
     #[default]
-    Paper,
+    #[serde(rename = "auto")]
+    #[value(name = "auto")]
+    Automatic,
+    /// As in the paper (Joy and Poullis 2023): many small steps of Adam along gradients of the path tracer.
+    #[serde(alias = "paper")]
+    #[value(alias = "paper")]
+    Adam,
     /// A few large steps without noise: rays are traced once, then texels are solved in closed form and the light by
     /// Gauss-Newton with the texels eliminated. Settings of Adam's steps do not matter to it.
     Solver,
@@ -51,5 +59,20 @@ mod tests {
     #[test]
     fn what_is_adams_alone_are_settings() {
         assert!(OF_ADAM.iter().all(|name| FitSettings::default().get(name).is_ok()));
+    }
+
+    #[test]
+    fn files_of_earlier_versions_name_adam_by_the_paper() {
+        for (text, method) in [
+            ("", Method::Automatic),
+            ("method = \"auto\"", Method::Automatic),
+            ("method = \"paper\"", Method::Adam),
+            ("method = \"adam\"", Method::Adam),
+            ("method = \"solver\"", Method::Solver),
+        ] {
+            assert_eq!(FitSettings::from_toml(text).unwrap().method, method, "{text}");
+        }
+        assert!(FitSettings::from_toml("method = \"fast\"").is_err());
+        assert_eq!(FitSettings { method: Method::Adam, ..Default::default() }.to_toml().trim(), "method = \"adam\"");
     }
 }

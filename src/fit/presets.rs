@@ -29,6 +29,20 @@ impl Preset {
 }
 
 impl FitSettings {
+    /// Names of what these settings have that no preset has: what somebody chose who filled in the structure.
+    pub fn chosen(&self) -> Vec<String> {
+        let mut names: Vec<String> = Preset::ALL
+            .into_iter()
+            .map(|preset| self.differences(&FitSettings::preset(preset)))
+            .min_by_key(Vec::len)
+            .unwrap_or_default()
+            .into_iter()
+            .map(|(name, _, _)| name)
+            .collect();
+        names.retain(|name| name != "method");
+        names
+    }
+
     /// The settings of a preset.
     pub fn preset(preset: Preset) -> Self {
         let balanced = FitSettings::default();

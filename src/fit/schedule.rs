@@ -120,8 +120,9 @@ struct Position {
 /// All positions of a fit, in order. The first step goes from coarse to fine with maps that grow along; the second works
 /// on maps of full size, on halved photographs first.
 fn positions(settings: &FitSettings, share: SolverShare) -> Vec<Position> {
-    if settings.method == Method::Solver {
-        return positions_of_solver(settings, share);
+    match settings.method {
+        Method::Solver | Method::Automatic => return positions_of_solver(settings, share),
+        Method::Adam => {}
     }
     let mut positions = Vec::new();
     let mut add = |kind: StageKind, total: usize, places: usize, maps_grow: bool| {

@@ -64,7 +64,7 @@ pub struct FitSettings {
     /// Seed of all random numbers.
     #[arg(long, default_value_t = FitSettings::default().seed)]
     pub seed: u64,
-    /// How maps and light are found. When it is not named, a scene is given to the solver, unless a setting is that says
+    /// How maps and light are found. With `auto` a scene is given to the solver, unless a setting is chosen that means
     /// something to Adam alone.
     #[arg(long, value_enum, default_value_t)]
     pub method: Method,
@@ -178,7 +178,7 @@ impl Default for FitSettings {
     fn default() -> Self {
         FitSettings {
             seed: 1,
-            method: Method::Paper,
+            method: Method::Automatic,
             map_size: 2048,
             environment_height: 32,
             steps: Steps::TwoStep,
@@ -217,7 +217,7 @@ impl Default for FitSettings {
 impl FitSettings {
     /// Whether some stage frees the specular lobe; without one, pictures are drawn without it too.
     pub fn has_lobe(&self) -> bool {
-        self.method == Method::Solver || self.steps == Steps::OneStep || self.steps_all > 0
+        self.method != Method::Adam || self.steps == Steps::OneStep || self.steps_all > 0
     }
 
     /// Takes over whether others polish the solver's maps, and what goes with it.

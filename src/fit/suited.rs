@@ -3,9 +3,12 @@
 use super::method::Method;
 use super::settings::FitSettings;
 use crate::scene::Scene;
-use crate::scene::doctor::{Report, exposure};
+use crate::scene::doctor::{self, Report, exposure};
 
-/// The settings that a scene decides.
+/// The settings that a scene decides. Everything that begins a fit, the command line, the window and [`Fitter::new`],
+/// asks it for the settings as they are run, and records those.
+///
+/// [`Fitter::new`]: super::Fitter::new
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Suited {
     /// The method that came nearer to the truth with such photos, and sooner.
@@ -40,19 +43,37 @@ impl Suited {
     pub fn to(scene: &Scene, report: &Report) -> Self {
         let is_photographed = scene.views.iter().any(|view| !view.photo.is_linear());
         Suited {
-            method: if scene.views.is_empty() { Method::Paper } else { Method::Solver },
+            method: if scene.views.is_empty() { Method::Adam } else { Method::Solver },
             solver_polish: if is_photographed { POLISH_OF_PHOTOGRAPHS } else { 0 },
             exposure: is_photographed && exposure::differ(&report.views),
             map_size: report.texels_resolved.map(map_size_for),
         }
     }
 
-    /// Sets what suits the scene, but for what is among the `chosen` settings, by their names. A setting that means
-    /// something to Adam alone chooses him. Maps only become smaller: a size that was set is what one is ready to wait for.
-    pub fn apply(&self, settings: &mut FitSettings, chosen: &[String]) {
+    /// What suits a scene that nobody checked before.
+    pub fn to_unchecked(scene: &Scene) -> Self {
+        // The check is asked only where something hangs on it: exposures of photographs.
+        let is_photographed = scene.views.iter().any(|view| !view.photo.is_linear());
+        Suited::to(scene, &if is_photographed { doctor::check(scene) } else { Report::default() })
+    }
+
+    /// Settings as they are run, of settings as they are asked for: the one place where [`Method::Automatic`] is resolved.
+    /// What is among the `chosen` settings, by their names, stays as it is. A setting that means something to Adam alone
+    /// chooses him. Maps only become smaller: a size that was set is what one is ready to wait for.
+    pub fn resolve(&self, asked: &FitSettings, chosen: &[String]) -> FitSettings {
+        let mut settings = asked.clone();
+        self.apply(&mut settings, chosen);
+        if settings.method == Method::Adam {
+            // What the solver would do is no setting of such a run.
+            settings.polish_as(asked);
+        }
+        settings
+    }
+
+    fn apply(&self, settings: &mut FitSettings, chosen: &[String]) {
         let is_free = |name: &str| !chosen.iter().any(|own| own == name);
-        if is_free("method") {
-            settings.method = if Method::means_adam(chosen) { Method::Paper } else { self.method };
+        if settings.method == Method::Automatic {
+            settings.method = if Method::means_adam(chosen) { Method::Adam } else { self.method };
         }
         if is_free("solver-polish") {
             settings.solver_polish =
@@ -74,17 +95,17 @@ impl Suited {
         }
     }
 
-    /// What was taken for the scene that nobody asked for, a sentence each, and how to have it otherwise; `asked` are the
-    /// settings before [`Suited::apply`], `settings` those after it.
+    /// What was taken for the scene that nobody asked for, a sentence each, and how to have it otherwise; `settings` are
+    /// what [`Suited::resolve`] made of `asked`.
     pub fn told(&self, asked: &FitSettings, settings: &FitSettings) -> Vec<String> {
         let mut told = Vec::new();
-        if settings.method != asked.method {
+        if asked.method == Method::Automatic && settings.method == Method::Solver {
             let why = match (self.solver_polish, settings.solver_polish) {
                 (0, _) => ", since all photos hold linear radiance",
                 (_, 0) => "",
                 _ => ", its maps polished by whole paths",
             };
-            told.push(format!("The method is the solver{why}; --method paper takes Adam"));
+            told.push(format!("The method is the solver{why}; --method adam takes Adam"));
         }
         if settings.exposure != asked.exposure {
             told.push(
@@ -131,9 +152,7 @@ mod tests {
     }
 
     fn applied(suited: &Suited, from: FitSettings, chosen: &[&str]) -> FitSettings {
-        let mut settings = from;
-        suited.apply(&mut settings, &names(chosen));
-        settings
+        suited.resolve(&from, &names(chosen))
     }
 
     #[test]
@@ -145,13 +164,15 @@ mod tests {
         };
         assert_eq!(suits(&scene, &[]), (Method::Solver, 0));
         assert_eq!(suits(&scene, &["map-size"]), (Method::Solver, 0));
-        assert_eq!(suits(&scene, &["consistency"]).0, Method::Paper);
-        assert_eq!(suits(&scene, &["method", "bounces"]).0, FitSettings::default().method);
+        assert_eq!(suits(&scene, &["consistency"]).0, Method::Adam);
+        let own = FitSettings { method: Method::Adam, ..FitSettings::default() };
+        let kept = applied(&Suited::to(&scene, &Report::default()), own.clone(), &["bounces"]);
+        assert_eq!(kept, own, "a method that was chosen stays, and Adam is not given what is the solver's");
         scene.views[1].photo = Photo::Srgb8(Image::filled(8, 6, [200; 3]));
         assert_eq!(suits(&scene, &[]), (Method::Solver, POLISH_OF_PHOTOGRAPHS));
-        assert_eq!(suits(&scene, &["samples"]).0, Method::Paper);
+        assert_eq!(suits(&scene, &["samples"]).0, Method::Adam);
         scene.views.clear();
-        assert_eq!(suits(&scene, &[]).0, Method::Paper);
+        assert_eq!(suits(&scene, &[]).0, Method::Adam);
     }
 
     #[test]
@@ -181,8 +202,9 @@ mod tests {
         assert_eq!(all.len(), 3, "{all:?}");
         assert!(all[0].contains("solver") && all[1].contains("gain") && all[2].contains("512 x 512"), "{all:?}");
         assert!(all[0].contains("polished") && !told(&usual, &["solver-polish"])[0].contains("polished"));
-        assert_eq!(told(&usual, &["method", "exposure", "map-size"]), Vec::<String>::new());
-        let as_it_is = FitSettings { method: Method::Solver, exposure: true, map_size: 256, ..usual };
+        let solver = FitSettings { method: Method::Solver, ..usual.clone() };
+        assert_eq!(told(&solver, &["exposure", "map-size"]), Vec::<String>::new());
+        let as_it_is = FitSettings { exposure: true, map_size: 256, ..solver };
         assert_eq!(told(&as_it_is, &[]), Vec::<String>::new());
     }
 
@@ -214,7 +236,7 @@ mod tests {
         // Charts cover six tenths of a map.
         let sizes = [0.0, 100.0, 78_000.0, 79_000.0, 157_000.0, 630_000.0, 5e6, 5.1e6, 1e30].map(map_size_for);
         assert_eq!(sizes, [256, 256, 256, 512, 512, 1024, 2048, 4096, 8192]);
-        let suited = |size| Suited { method: Method::Paper, solver_polish: 0, exposure: false, map_size: size };
+        let suited = |size| Suited { method: Method::Adam, solver_polish: 0, exposure: false, map_size: size };
         let usual = FitSettings::default;
         assert_eq!(applied(&suited(Some(512)), usual(), &[]).map_size, 512);
         assert_eq!(applied(&suited(Some(512)), usual(), &["map-size"]).map_size, 2048);

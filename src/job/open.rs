@@ -9,7 +9,7 @@ use super::prepare::{Prepared, RunSettings, prepare_with, timed};
 pub use super::view::{OpenedRun, view_run};
 use crate::error::{Error, ErrorKind, Place, Result, Severity};
 use crate::export::RunFolder;
-use crate::fit::{Fitter, checkpoint};
+use crate::fit::{FitSettings, Fitter, Method, Suited, checkpoint};
 use crate::insight::report::data::StageTime;
 use crate::light::Environment;
 use crate::render::Surface;
@@ -104,6 +104,16 @@ pub struct OpenedScene {
 }
 
 impl OpenedScene {
+    /// Sets what suits the scene and is not among the `chosen` settings, by their names; returns what to say of that, a
+    /// sentence each.
+    pub fn resolve(&self, settings: &mut FitSettings, chosen: &[String]) -> Vec<String> {
+        let suited = Suited::to(&self.scene, &self.report);
+        let resolved = suited.resolve(settings, chosen);
+        let told = suited.told(settings, &resolved);
+        *settings = resolved;
+        told
+    }
+
     /// Refuses a scene with a fatal finding: nothing starts a long fit on a scene that cannot work.
     ///
     /// # Errors
@@ -154,17 +164,22 @@ pub fn open_scene_of(settings: &RunSettings, stop: &AtomicBool, tell: Tell) -> R
     }
 }
 
-/// Prepares a new fit of a scene: atlas, tracer, start values. [`super::start`] then runs it.
+/// Prepares a new fit of a scene: atlas, tracer, start values. [`super::start`] then runs it. The settings that come back
+/// are those that are run: what was left to the scene is resolved, by [`OpenedScene::resolve`] if nobody did so before.
 ///
 /// # Errors
 /// A fatal finding, a setting out of range, a known light that cannot be read; `Stopped` when the flag is raised.
 pub fn start_new(
     opened: OpenedScene,
-    settings: RunSettings,
+    mut settings: RunSettings,
     stop: &AtomicBool,
     tell: Tell,
 ) -> Result<(Prepared, Fitter, RunSettings)> {
     opened.refuse_fatal()?;
+    if settings.fit.method == Method::Automatic {
+        let chosen = settings.fit.chosen();
+        opened.resolve(&mut settings.fit, &chosen);
+    }
     settings.fit.validate()?;
     let OpenedScene { scene, report, timings } = opened;
     let prepared = prepare_with(Arc::new(scene), report.findings, &settings, timings, stop, tell)?;
@@ -192,6 +207,7 @@ pub fn begin(
     let (scene, surface) = (Arc::clone(&prepared.scene), Arc::clone(&prepared.surface));
     let fitter =
         told(OpenStage::Start, stop, tell, || Fitter::new(scene, surface, settings.fit.clone(), known_light.as_ref()))?;
+    let settings = RunSettings { fit: fitter.settings().clone(), ..settings };
     Ok((prepared, fitter, settings))
 }
 
@@ -221,6 +237,7 @@ pub fn resume(
         Fitter::resume(Arc::clone(&scene), Arc::clone(&surface), settings.fit.clone(), state)
     })?;
     let prepared = Prepared { scene, surface, quality: None, findings: report.findings, timings };
+    settings.fit = fitter.settings().clone();
     Ok((prepared, fitter, settings))
 }
 

@@ -91,7 +91,8 @@ mod tests {
 
     #[test]
     fn steps_of_the_optimiser_go_on_at_the_pace_of_the_last() {
-        let settings = FitSettings { steps_diffuse: 4, steps_all: 20, levels: 1, ..FitSettings::default() };
+        let settings =
+            FitSettings { method: Method::Adam, steps_diffuse: 4, steps_all: 20, levels: 1, ..FitSettings::default() };
         let plan = stages(&settings);
         let whole = history(&plan, |stage, _| if stage.kind == StageKind::Diffuse { 9.0 } else { 0.5 });
         let (per_second, left) = pace(&plan, &whole[..14]);

@@ -247,10 +247,11 @@ impl Worker {
     /// Takes other settings; returns them when they were taken.
     fn change(&mut self, settings: FitSettings) -> Option<FitSettings> {
         let findings_before = self.fitter.setting_findings();
-        if let Err(error) = self.fitter.change(settings.clone()) {
+        if let Err(error) = self.fitter.change(settings) {
             self.teller.send(Event::Refused(error));
             return None;
         }
+        let settings = self.fitter.settings().clone();
         self.settings.fit = settings.clone();
         for finding in self.fitter.setting_findings() {
             if !findings_before.contains(&finding) {

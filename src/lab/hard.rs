@@ -7,7 +7,7 @@
 use super::contest::Contestant;
 use super::contest::judge::{COLUMNS, Judge};
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
-use crate::fit::{FitSettings, Fitter};
+use crate::fit::{FitSettings, Fitter, Method};
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::insight::capture;
 use crate::insight::intervals::{IntervalCoverage, WRONG, interval_coverage};
@@ -116,6 +116,7 @@ pub fn run(options: &HardOptions, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Res
 fn fit_settings(hard: &HardScene, options: &HardOptions) -> FitSettings {
     let truth = hard.scene.truth.as_ref();
     let own = FitSettings {
+        method: Method::Adam,
         seed: options.seed,
         map_size: truth.map_or(64, |truth| truth.maps.diffuse.width()),
         environment_height: truth.map_or(16, |truth| truth.environment.height()),

@@ -7,7 +7,7 @@ use super::contest::Contestant;
 use crate::atlas::{self, AtlasSettings};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::fit::settings::Steps;
-use crate::fit::{FitSettings, Fitter, StepOutcome};
+use crate::fit::{FitSettings, Fitter, Method, StepOutcome};
 use crate::image::Image;
 use crate::insight::memory::peak_bytes;
 use crate::insight::report::data::StageTime;
@@ -133,9 +133,10 @@ pub fn scene(case: ScaleCase) -> Scene {
 /// One step at full size, or what a fit does by default.
 fn settings(case: ScaleCase, extent: Extent) -> FitSettings {
     if extent == Extent::WholeFit {
-        return FitSettings { map_size: case.map_size, ..Default::default() };
+        return FitSettings { method: Method::Adam, map_size: case.map_size, ..Default::default() };
     }
     FitSettings {
+        method: Method::Adam,
         map_size: case.map_size,
         steps: Steps::OneStep,
         steps_diffuse: 0,

@@ -6,6 +6,7 @@
 //! angles and floors for inner loops, `vector` arithmetic of several numbers at a time.
 //! What is not here: linear algebra (that is glam's and faer's).
 
+pub mod adam;
 pub mod arc;
 pub mod clusters;
 pub mod distribution;

@@ -1,9 +1,9 @@
 //! Adam (Kingma and Ba 2015) on a slice of weights.
 
-/// Decay of the first moment.
-const BETA_ONE: f32 = 0.9;
-/// Decay of the second moment.
-const BETA_TWO: f32 = 0.999;
+use crate::math::adam::{Decay, LARGEST_GRADIENT};
+
+/// The paper's.
+const DECAY: Decay = Decay { first: 0.9, second: 0.999 };
 /// Added to the root of the second moment.
 const EPSILON: f32 = 1e-10;
 
@@ -29,11 +29,10 @@ impl Adam {
     pub fn step(&mut self, weights: &mut [f32], gradient: &[f32], rate: f32) {
         self.steps += 1;
         let count = self.steps.min(1_000_000) as i32;
-        let (one, two) = (1.0 - BETA_ONE.powi(count), 1.0 - BETA_TWO.powi(count));
+        let (one, two) = (1.0 - DECAY.first.powi(count), 1.0 - DECAY.second.powi(count));
         for index in 0..weights.len() {
-            let own = if gradient[index].abs() < 1e18 { gradient[index] } else { 0.0 };
-            self.first[index] = BETA_ONE * self.first[index] + (1.0 - BETA_ONE) * own;
-            self.second[index] = BETA_TWO * self.second[index] + (1.0 - BETA_TWO) * own * own;
+            let own = if gradient[index].abs() < LARGEST_GRADIENT { gradient[index] } else { 0.0 };
+            DECAY.accumulate(own, &mut self.first[index], &mut self.second[index]);
             weights[index] -= rate * (self.first[index] / one) / ((self.second[index] / two).sqrt() + EPSILON);
         }
     }

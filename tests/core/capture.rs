@@ -31,6 +31,7 @@ fn small() -> HardSettings {
 fn of_truth(hard: &HardScene, given: &Scene) -> Fitter {
     let truth = hard.scene.truth.as_ref().unwrap();
     let settings = FitSettings {
+        method: Method::Adam,
         map_size: truth.maps.diffuse.width(),
         environment_height: truth.environment.height(),
         bounces: truth.max_bounces,

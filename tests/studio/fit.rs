@@ -2,7 +2,7 @@
 
 use super::support::{Key, Modifiers, TestStudio};
 use eframe::egui::OutputCommand;
-use patina::fit::{FitSettings, Preset};
+use patina::fit::{FitSettings, Method, Preset};
 use patina::studio::layout::Panel;
 use patina::studio::model::FitStatus;
 
@@ -167,10 +167,13 @@ fn a_preset_sets_the_form_and_undo_brings_the_own_settings_back() {
     assert!(studio.says("Differs from the usual"));
     studio.click("Quick");
     // The photos are small, and so are the maps that suit them.
-    assert_eq!(studio.model().edits.fit, FitSettings { map_size: 256, ..FitSettings::preset(Preset::Quick) });
+    assert_eq!(
+        studio.model().edits.fit,
+        FitSettings { method: Method::Adam, map_size: 256, ..FitSettings::preset(Preset::Quick) }
+    );
     studio.click("Balanced");
-    assert!(studio.says("Differs from the usual: method paper"), "the method is no matter of presets");
-    assert!(!studio.says("method paper,"), "all else of the balanced preset is the usual");
+    assert!(studio.says("Differs from the usual: method adam"), "the method is no matter of presets");
+    assert!(!studio.says("method adam,"), "all else of the balanced preset is the usual");
     studio.frames(4);
     studio.press(Modifiers::COMMAND, Key::Z);
     studio.press(Modifiers::COMMAND, Key::Z);

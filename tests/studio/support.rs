@@ -134,7 +134,7 @@ impl TestStudio {
         let model = self.model();
         let fit = &mut model.edits.fit;
         // Many short steps, to be held and stopped between.
-        fit.method = Method::Paper;
+        fit.method = Method::Adam;
         (fit.map_size, fit.levels, fit.steps_diffuse, fit.steps_all) = (64, 2, 6, 6);
         (fit.samples, fit.pixels_per_step, fit.views_per_step, fit.environment_height) = (2, 0, 2, 8);
         let edits = model.edits.clone();

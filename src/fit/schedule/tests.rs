@@ -2,7 +2,14 @@ use super::*;
 
 #[test]
 fn two_steps_go_from_coarse_to_fine_and_keep_every_step() {
-    let settings = FitSettings { steps_diffuse: 10, steps_all: 7, levels: 3, map_size: 64, ..Default::default() };
+    let settings = FitSettings {
+        method: Method::Adam,
+        steps_diffuse: 10,
+        steps_all: 7,
+        levels: 3,
+        map_size: 64,
+        ..Default::default()
+    };
     let stages = stages(&settings);
     assert_eq!(stages.iter().map(|stage| stage.steps).sum::<usize>(), 17);
     assert_eq!(stages.iter().map(|stage| stage.map_size).collect::<Vec<_>>(), [16, 32, 64, 64, 64]);
@@ -23,7 +30,15 @@ fn walk(plan: &[Stage]) -> Vec<(usize, usize)> {
 fn the_same_settings_keep_the_plan_wherever_it_is() {
     for (steps_diffuse, steps_all, levels) in [(10, 7, 3), (0, 11, 4), (2, 0, 3), (1, 1, 2), (10, 3, 4)] {
         for steps in [Steps::TwoStep, Steps::OneStep] {
-            let settings = FitSettings { steps, steps_diffuse, steps_all, levels, map_size: 64, ..Default::default() };
+            let settings = FitSettings {
+                method: Method::Adam,
+                steps,
+                steps_diffuse,
+                steps_all,
+                levels,
+                map_size: 64,
+                ..Default::default()
+            };
             let plan = stages(&settings);
             for (stage, step) in walk(&plan) {
                 assert_eq!(revised(&settings, &plan, stage, step).unwrap(), plan, "{settings:?} at {stage}, {step}");
@@ -35,6 +50,7 @@ fn the_same_settings_keep_the_plan_wherever_it_is() {
 #[test]
 fn other_numbers_of_steps_keep_what_is_done_and_reach_the_finest_level() {
     let of = |steps_diffuse, steps_all| FitSettings {
+        method: Method::Adam,
         steps_diffuse,
         steps_all,
         levels: 3,

@@ -14,7 +14,7 @@ pub use case::Case;
 
 use crate::atlas::{AtlasSettings, KeepUv};
 use crate::error::{Error, ErrorKind, Place, Result};
-use crate::fit::{FitSettings, Fitter};
+use crate::fit::{FitSettings, Fitter, Method};
 use crate::job::demo::photograph;
 use crate::job::prepare::{Prepared, RunSettings, prepare, read_scene};
 use crate::lab::scenes::study::{StudyKind, StudySettings, build};
@@ -69,6 +69,7 @@ impl StudyOptions {
             FitSettings::default()
         };
         FitSettings {
+            method: Method::Adam,
             map_size,
             pixels_per_step: 0,
             held_out_interval: 0,

@@ -74,7 +74,7 @@ impl BenchScene {
         }
         person.ask(|studio, _| {
             // Adam's steps are short and many: what the window takes from a fit is measured on them.
-            studio.model.edits.fit.method = Method::Paper;
+            studio.model.edits.fit.method = Method::Adam;
             studio.layout.activate(Panel::Stage);
         })
     }
@@ -85,6 +85,7 @@ pub fn settings_of(case: ScaleCase) -> RunSettings {
     RunSettings {
         atlas: AtlasSettings { keep_uv: KeepUv::Rebuild, ..Default::default() },
         fit: FitSettings {
+            method: Method::Adam,
             map_size: case.map_size,
             steps: Steps::OneStep,
             steps_diffuse: 0,

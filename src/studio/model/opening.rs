@@ -96,7 +96,7 @@ impl Model {
                 PathKind::Scene => {
                     let opened = open::open_scene(&path, &settings.read, &context.stop, &tell)?;
                     let suited = Suited::to(&opened.scene, &opened.report);
-                    suited.apply(&mut settings.fit, &[]);
+                    settings.fit = suited.resolve(&settings.fit, &[]);
                     context.tell("small pictures", 0.0);
                     let read = SceneRead::new(Some(path), settings, opened);
                     Ok(Done::SceneRead(Box::new(SceneRead { suited: Some(suited), ..read })))

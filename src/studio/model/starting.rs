@@ -96,8 +96,8 @@ impl Model {
             let (prepared, mut fitter, mut settings) = open::resume(&folder, None, &context.stop, &tell)?;
             if settings.fit != wanted {
                 // What was changed while the fit stood still takes effect, as far as it can.
-                fitter.change(wanted.clone())?;
-                settings.fit = wanted;
+                fitter.change(wanted)?;
+                settings.fit = fitter.settings().clone();
             }
             let started = Started::new(prepared, fitter, settings, folder, options)?;
             Ok(Done::FitStarted(Box::new(Started { goes_on: true, ..started })))

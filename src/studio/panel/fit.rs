@@ -46,7 +46,7 @@ fn facts(ui: &mut Ui, model: &Model) {
     let held_out = project.scene.as_ref().map_or(0, |scene| scene.views.iter().filter(|view| view.held_out).count());
     let triangles = number::whole(project.mesh.triangles.len() as u64);
     ui.label(RichText::new(format!("{triangles} triangles, {views} photos, {held_out} held out to judge")).weak());
-    if model.edits.fit.method != Method::Paper {
+    if model.edits.fit.method != Method::Adam {
         // The figure is Adam's: the solver keeps other things.
         return;
     }
@@ -116,7 +116,7 @@ fn presets(ui: &mut Ui, model: &mut Model) {
     let for_scene = |preset| {
         let mut settings = FitSettings::preset(preset);
         match model.project.as_ref().and_then(|project| project.suited.as_ref()) {
-            Some(suited) => suited.apply(&mut settings, &[]),
+            Some(suited) => settings = suited.resolve(&settings, &[]),
             None => settings.polish_as(&own),
         }
         settings

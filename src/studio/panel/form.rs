@@ -36,8 +36,8 @@ pub fn show(ui: &mut Ui, settings: &mut FitSettings, live: bool, memory: &mut Fo
     }
     let described = std::mem::take(&mut memory.described);
     let of_method: &[&str] = match settings.method {
-        Method::Solver => &FIRST_OF_SOLVER,
-        Method::Paper => &FIRST_OF_ADAM,
+        Method::Solver | Method::Automatic => &FIRST_OF_SOLVER,
+        Method::Adam => &FIRST_OF_ADAM,
     };
     let is_first = |setting: &SettingDescription| FIRST.iter().chain(of_method).any(|name| *name == setting.name);
     grid(ui, "first settings", described.iter().filter(|setting| is_first(setting)), settings, live, memory);

@@ -8,7 +8,7 @@ use glam::Vec3;
 use patina::Result;
 use patina::export::RunFolder;
 use patina::fit::state::FitState;
-use patina::fit::{FitSettings, Fitter, StepOutcome};
+use patina::fit::{FitSettings, Fitter, Method, StepOutcome};
 use patina::image::Image;
 use patina::job::prepare::Prepared;
 use patina::job::{JobHandle, JobOptions, RunSettings, start_with};
@@ -162,6 +162,7 @@ impl Trial {
 /// Settings of a fit of twelve steps: four stages, maps of 8 and 16 texels, every pixel in every step.
 pub fn quick() -> FitSettings {
     FitSettings {
+        method: Method::Adam,
         map_size: 16,
         environment_height: 4,
         steps_diffuse: 6,

@@ -3,9 +3,10 @@
 use clap::Parser;
 use patina::Place;
 use patina::cli::arguments::{Arguments, Task};
-use patina::cli::fit::{run_settings, suit};
+use patina::cli::fit::run_settings;
 use patina::fit::{FitSettings, Method, Preset};
 use patina::image::Image;
+use patina::job::RunSettings;
 use patina::job::open::OpenedScene;
 use patina::scene::settings::{ColourEncoding, MaskUse, Up};
 use patina::scene::{Photo, ReadSettings, Scene};
@@ -15,7 +16,7 @@ fn what_is_typed_wins_over_a_preset_and_over_a_file() {
     let of = |more: &[&str]| {
         let words = ["patina", "fit", "scene", "-o", "run"].iter().chain(more);
         let Some(Task::Fit(options)) = Arguments::try_parse_from(words).unwrap().task else { unreachable!() };
-        run_settings(&options).unwrap()
+        run_settings(&options).unwrap().settings
     };
     assert_eq!(of(&[]).fit, FitSettings::default());
     assert_eq!(of(&["--preset", "careful"]).fit, FitSettings::preset(Preset::Careful));
@@ -45,7 +46,7 @@ fn how_a_scene_is_read_can_be_typed() {
     let of = |more: &[&str]| {
         let words = ["patina", "fit", "scene", "-o", "run"].iter().chain(more);
         let Some(Task::Fit(options)) = Arguments::try_parse_from(words).unwrap().task else { unreachable!() };
-        run_settings(&options).unwrap().read
+        run_settings(&options).unwrap().settings.read
     };
     assert_eq!(of(&[]), ReadSettings::default());
     assert_eq!(of(&["--up", "-Z"]).up, Up::NegZ, "as the remedies of the reader name it");
@@ -70,7 +71,7 @@ fn a_settings_file_of_another_form_is_refused_with_its_line() {
         assert_eq!(error.place(), &Place::Line(file.clone(), line), "{error}");
         assert!(error.remedy_text().contains("[fit]"), "{error}");
     }
-    assert_eq!(of("[fit]\nmap-size = 512\n").unwrap().fit.map_size, 512);
+    assert_eq!(of("[fit]\nmap-size = 512\n").unwrap().settings.fit.map_size, 512);
 }
 
 #[test]
@@ -81,13 +82,13 @@ fn photos_are_given_to_the_solver_unless_something_else_was_asked_for() {
     bytes.views[0].photo = Photo::Srgb8(Image::filled(size.0, size.1, [90; 3]));
     let of = |scene: &Scene, more: &[&str]| suited(scene, None, more).method;
     assert_eq!(of(&linear, &[]), Method::Solver);
-    assert_eq!(of(&linear, &["--light-smoothness", "0.1"]), Method::Paper, "the solver has a wish of its own");
+    assert_eq!(of(&linear, &["--light-smoothness", "0.1"]), Method::Adam, "the solver has a wish of its own");
     assert_eq!(of(&linear, &["--map-size", "64", "--preset", "careful"]), Method::Solver);
-    assert_eq!(of(&linear, &["--method", "paper"]), Method::Paper);
-    assert_eq!(of(&linear, &["--consistency", "exact"]), Method::Paper, "the solver knows no consistency");
+    assert_eq!(of(&linear, &["--method", "paper"]), Method::Adam);
+    assert_eq!(of(&linear, &["--consistency", "exact"]), Method::Adam, "the solver knows no consistency");
     assert_eq!(of(&bytes, &[]), Method::Solver);
-    assert_eq!(of(&bytes, &["--method", "paper"]), Method::Paper);
-    assert_eq!(of(&bytes, &["--samples", "8"]), Method::Paper, "paths a pixel are Adam's");
+    assert_eq!(of(&bytes, &["--method", "paper"]), Method::Adam);
+    assert_eq!(of(&bytes, &["--samples", "8"]), Method::Adam, "paths a pixel are Adam's");
     let polish = |scene: &Scene, more: &[&str]| {
         let settings = suited(scene, None, &[&["--method", "solver"], more].concat());
         (settings.solver_polish, settings.solver_levels, settings.solver_grid)
@@ -100,8 +101,18 @@ fn photos_are_given_to_the_solver_unless_something_else_was_asked_for() {
 
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("settings.toml");
-    patina::files::write_bytes(&file, b"[fit]\nseed = 2\n").unwrap();
-    assert_eq!(of(&linear, &["--settings", file.to_str().unwrap()]), Method::Paper, "the file is of Adam");
+    let of_file = |scene: &Scene, text: &str, more: &[&str]| {
+        patina::files::write_bytes(&file, text.as_bytes()).unwrap();
+        suited(scene, None, &[&["--settings", file.to_str().unwrap()], more].concat())
+    };
+    assert_eq!(of_file(&linear, "[fit]\nseed = 2\n", &[]).method, Method::Solver, "a file without a method");
+    assert_eq!(of_file(&linear, "[fit]\nsamples = 8\n", &[]).method, Method::Adam, "its setting is Adam's");
+    assert_eq!(of_file(&linear, "[fit]\nmethod = \"paper\"\n", &[]).method, Method::Adam, "an older file");
+    assert_eq!(of_file(&linear, "[fit]\nmethod = \"solver\"\nsamples = 8\n", &[]).method, Method::Solver);
+    assert_eq!(of_file(&linear, "[fit]\nseed = 2\n", &["--method", "adam"]).method, Method::Adam);
+    // The settings of a run hold everything: what was run is run again, whatever would suit.
+    let run = RunSettings { fit: FitSettings { method: Method::Adam, ..FitSettings::default() }, ..Default::default() };
+    assert_eq!(of_file(&bytes, &toml::to_string(&run).unwrap(), &[]), run.fit);
 }
 
 #[test]
@@ -122,7 +133,7 @@ fn suited(scene: &Scene, texels_resolved: Option<f64>, more: &[&str]) -> FitSett
     let Some(Task::Fit(options)) = Arguments::try_parse_from(words).unwrap().task else { unreachable!() };
     let mut opened = OpenedScene { scene: scene.clone(), report: Default::default(), timings: Vec::new() };
     opened.report.texels_resolved = texels_resolved;
-    let mut settings = run_settings(&options).unwrap().fit;
-    suit(&options, &opened, &mut settings);
-    settings
+    let mut asked = run_settings(&options).unwrap();
+    opened.resolve(&mut asked.settings.fit, &asked.chosen);
+    asked.settings.fit
 }
