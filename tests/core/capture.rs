@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use glam::Vec3;
-use patina::fit::{FitSettings, Fitter};
+use patina::fit::{FitSettings, Fitter, Method};
 use patina::insight::capture::{Capture, check};
 use patina::job::demo::photograph;
 use patina::lab::scenes::hard::{HardCase, HardScene, HardSettings, build};
