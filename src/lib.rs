@@ -86,7 +86,7 @@
 // Documentation is built with private items: links to them lead somewhere there.
 #![allow(rustdoc::private_intra_doc_links)]
 // What only the lab or a test asks for is not dead; the build of the tests, lab included, finds what is.
-#![cfg_attr(not(test), allow(dead_code))]
+#![cfg_attr(not(test), allow(dead_code, unused_imports))]
 
 mod atlas;
 #[cfg(feature = "cli")]
