@@ -211,7 +211,7 @@ fn stray_bytes_of_a_jpeg_are_skipped_and_told() {
 /// EXR bytes of parts: name, place of the data window, channels with one value each.
 fn exr_of(
     display: ((i32, i32), (usize, usize)),
-    chromaticities: Option<openexr::meta::attribute::Chromaticities>,
+    chromaticities: Option<exr::meta::attribute::Chromaticities>,
     parts: &[(&str, (i32, i32), (usize, usize), &[(&str, f32)])],
 ) -> Vec<u8> {
     let layers: Vec<_> = parts
@@ -276,7 +276,7 @@ fn parts_and_layers_are_chosen_told_and_named() {
 #[test]
 fn chromaticities_of_exr_are_honoured() {
     let xy = openexr::Vec2;
-    let aces = openexr::meta::attribute::Chromaticities {
+    let aces = exr::meta::attribute::Chromaticities {
         red: xy(0.713, 0.293),
         green: xy(0.165, 0.830),
         blue: xy(0.128, 0.044),

@@ -113,6 +113,9 @@ impl Progress {
 /// Decoders fill what is missing. The file is decoded with different bytes after its end: what depends on them was missing.
 /// `decode` gives the pixels of a file, or nothing.
 pub fn is_whole_without_end<T: PartialEq>(bytes: &[u8], mut decode: impl FnMut(&[u8]) -> Option<T>) -> bool {
+    // A lone 0xFF would make a marker of the first byte after it.
+    let end = bytes.iter().rposition(|&byte| byte != 0xff).map_or(0, |place| place + 1);
+    let bytes = &bytes[..end];
     let with = |filler: &[u8]| {
         let mut longer = Vec::with_capacity(bytes.len() + filler.len() + 2);
         longer.extend_from_slice(bytes);

@@ -8,8 +8,9 @@ use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::{GreyImage, Image, RgbImage};
 use glam::Vec3;
 
-/// From this share of full scale on a channel is clipped: cameras and JPEG move a saturated value by a step.
-const CLIPPED_SHARE: f32 = 254.0 / 255.0;
+/// From here on a channel of 8 bits is clipped, and one of 16 bits at the same share of full scale: cameras and JPEG move a
+/// saturated value by a step.
+const CLIPPED_BYTE: u8 = 254;
 
 /// Samples in row-major order, the channels of a pixel side by side.
 pub enum Samples {
@@ -91,6 +92,17 @@ impl Stored {
         }
     }
 
+    /// Whether some channel of a pixel's colour is at full scale; floats have none.
+    fn is_clipped(&self, pixel: usize) -> bool {
+        let colours = if self.channels < 3 { 1 } else { 3 };
+        let range = pixel * self.channels..pixel * self.channels + colours;
+        match &self.samples {
+            Samples::Bytes(values) => values[range].iter().any(|&value| value >= CLIPPED_BYTE),
+            Samples::Words(values) => values[range].iter().any(|&value| value >= u16::from(CLIPPED_BYTE) * 257),
+            Samples::Floats(_) => false,
+        }
+    }
+
     /// One value a pixel as stored; colour gives its luminance.
     pub fn grey(&self) -> GreyImage {
         let pixels = (0..self.pixel_count()).map(|pixel| super::grey_of_rgb(self.shares(pixel))).collect();
@@ -125,8 +137,8 @@ impl Stored {
         let told = interpretation(&self, source, encoding, is_float, &mut findings)?;
         let alpha = self.alpha();
         let clipped = (!is_float).then(|| {
-            let clipped = |pixel| self.shares(pixel).max_element() >= CLIPPED_SHARE;
-            Image::from_pixels(self.width, self.height, (0..self.pixel_count()).map(clipped).collect())
+            let clipped = (0..self.pixel_count()).map(|pixel| self.is_clipped(pixel)).collect();
+            Image::from_pixels(self.width, self.height, clipped)
         });
         let is_eight_bit = matches!(self.samples, Samples::Bytes(_));
         let premultiplied = alpha.as_ref().filter(|_| self.is_premultiplied);
@@ -152,7 +164,7 @@ impl Stored {
                 profile::through_tables(transform.as_ref(), &shares).unwrap_or(shares)
             }
             Interpretation::Space(space) => {
-                let tables = Tables::new(&space, &self.samples);
+                let tables = Tables::new(&space, &self.samples, self.pixel_count());
                 let matrix = space.rec709_from_rgb;
                 shares
                     .enumerate()
@@ -174,15 +186,23 @@ impl Stored {
 struct Tables([Vec<f32>; 3]);
 
 impl Tables {
-    /// `None` for floats.
-    fn new(space: &ColourSpace, samples: &Samples) -> Option<Self> {
+    /// `None` for floats, and where a table would have more entries than there are pixels.
+    fn new(space: &ColourSpace, samples: &Samples, pixels: usize) -> Option<Self> {
         let last = match samples {
             Samples::Bytes(_) => u8::MAX.into(),
             Samples::Words(_) => u16::MAX,
             Samples::Floats(_) => return None,
         };
-        let table = |curve: &Curve| (0..=last).map(|value| curve.linear(f32::from(value) / f32::from(last))).collect();
-        Some(Tables(space.curves.each_ref().map(table)))
+        if pixels < usize::from(last) {
+            return None;
+        }
+        let table = |curve: &Curve| -> Vec<f32> {
+            (0..=last).map(|value| curve.linear(f32::from(value) / f32::from(last))).collect()
+        };
+        let [red, green, blue] = &space.curves;
+        let first = table(red);
+        let other = |curve: &Curve| if curve == red { first.clone() } else { table(curve) };
+        Some(Tables([first.clone(), other(green), other(blue)]))
     }
 
     fn linear(&self, stored: &Stored, pixel: usize) -> Vec3 {

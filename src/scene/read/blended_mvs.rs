@@ -12,6 +12,7 @@ use super::camera_file;
 use super::mask_names::{self, Masks, PHOTO_EXTENSIONS};
 use super::source::{SourceScene, SourceView};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::image::file;
 use crate::scene::Background;
 use crate::scene::settings::{ColourEncoding, PixelCentre, Up};
 use std::collections::BTreeMap;
@@ -132,6 +133,12 @@ pub fn photos_of(images: &Path) -> Result<(BTreeMap<String, PathBuf>, BTreeMap<S
         if let Some(mask) = photos.remove(&stem) {
             twins.entry(photo).or_insert(mask);
         }
+    }
+    if photos.is_empty()
+        && let Some(other) = files_of(images, &mask_names::EXTENSIONS_NOT_READ)?.first()
+    {
+        // Its error names the kind and the way out.
+        file::read_header(other)?;
     }
     if photos.is_empty() {
         return Err(Error::new(ErrorKind::Missing, "the folder holds no photos")

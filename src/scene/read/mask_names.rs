@@ -10,6 +10,9 @@ use std::path::{Path, PathBuf};
 
 /// Extensions of photos and masks that are read.
 pub const PHOTO_EXTENSIONS: [&str; 8] = ["jpg", "jpeg", "png", "tif", "tiff", "exr", "hdr", "pfm"];
+/// Extensions of raw files and of phones' photos, which are not read.
+pub const EXTENSIONS_NOT_READ: [&str; 14] =
+    ["dng", "nef", "cr2", "cr3", "arw", "raf", "orf", "rw2", "pef", "srw", "heic", "heif", "avif", "webp"];
 /// Names of folders of masks, in any case.
 const FOLDER_NAMES: [&str; 2] = ["masks", "mask"];
 /// What is added to a photo's name.
