@@ -13,6 +13,7 @@ use super::held_out::held_out_targets;
 use super::schedule::{Stage, stages};
 use super::settings::{FitSettings, Method, Start};
 use super::solver::light_evidence::LightKnown;
+use super::solver::scene::foretold_gains;
 use super::solver::{Choices, LobeTails, SolverScene};
 use super::start;
 use super::state::{FitState, LossRow};
@@ -89,6 +90,11 @@ impl Fitter {
         let first_size = fitter.state.plan.first().map_or(fitter.settings.map_size, |stage| stage.map_size);
         let state = &mut fitter.state;
         state.log_gains = vec![0.0; fitter.scene.views.len()];
+        if fitter.settings.exposure {
+            let stops = fitter.training.iter().map(|&view| fitter.scene.views[view].exposure_prior_stops);
+            let foretold = foretold_gains(stops);
+            fitter.training.iter().zip(foretold).for_each(|(&view, gain)| state.log_gains[view] = gain);
+        }
         state.gain_moments = Moments::zeros(fitter.scene.views.len());
         state.map_size = first_size;
         let values = match fitter.settings.start {

@@ -146,6 +146,7 @@ mod tests {
                 photo: Photo::Linear32(Image::filled(1, 1, photo)),
                 states: Image::filled(1, 1, state),
                 held_out: false,
+                exposure_prior_stops: None,
             }],
             world_from_source: Default::default(),
             background: Background::Environment,

@@ -2,8 +2,8 @@
 
 use super::method::Method;
 use super::settings::FitSettings;
-use crate::scene::Scene;
 use crate::scene::doctor::{self, Report, exposure};
+use crate::scene::{Scene, View};
 
 /// The settings that a scene decides. Everything that begins a fit, the command line, the window and [`Fitter::new`],
 /// asks it for the settings as they are run, and records those.
@@ -41,7 +41,9 @@ impl Suited {
     /// have pixels to tell them apart cost time and show the photos' noise. Where there are no photos there is nothing to
     /// solve.
     pub fn to(scene: &Scene, report: &Report) -> Self {
-        let is_photographed = scene.views.iter().any(|view| !view.photo.is_linear());
+        // Photographs developed to 16 bits are linear too, but cameras write down how they exposed.
+        let by_camera = |view: &View| !view.photo.is_linear() || view.exposure_prior_stops.is_some();
+        let is_photographed = scene.views.iter().any(by_camera);
         Suited {
             method: if scene.views.is_empty() { Method::Adam } else { Method::Solver },
             solver_polish: if is_photographed { POLISH_OF_PHOTOGRAPHS } else { 0 },

@@ -226,6 +226,7 @@ fn scene_of(mesh: Mesh, views: usize) -> Scene {
             photo: Photo::Srgb8(Image::filled(width, height, [120, 110, 100])),
             states: Image::filled(width, height, PixelState::Surface),
             held_out: false,
+            exposure_prior_stops: None,
         }
     };
     Scene {

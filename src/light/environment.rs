@@ -45,7 +45,7 @@ impl Environment {
         let image = file::read_rgb(path)?;
         let here = || Place::File(path.into());
         let (environment, mut findings) = Self::from_image(image).map_err(|error| error.at(here()))?;
-        if !header.format.is_linear() {
+        if !header.is_linear {
             findings.push(
                 Finding::new(
                     Severity::Warning,

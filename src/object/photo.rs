@@ -81,7 +81,7 @@ impl ObjectPhoto {
     /// Those of [`file::read_rgb`] and of [`ObjectPhoto::new`].
     pub fn read(path: &Path) -> Result<(Self, Vec<Finding>)> {
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let linear = file::read_header(path)?.format.is_linear();
+        let linear = file::read_header(path)?.is_linear;
         let radiance = file::read_rgb(path)?;
         if linear {
             return ObjectPhoto::new(&name, radiance, f32::INFINITY, 0.0);

@@ -233,6 +233,7 @@ pub(crate) fn views_of(orbit: &Orbit, views: usize, held_out: usize, seed: u64) 
             photo: Photo::Linear32(Image::filled(camera.width, camera.height, Vec3::ZERO)),
             states: Image::filled(camera.width, camera.height, PixelState::Surface),
             held_out: index >= views,
+            exposure_prior_stops: None,
         })
         .collect())
 }

@@ -39,6 +39,8 @@ pub struct View {
     pub states: Image<PixelState>,
     /// Kept out of the fit, to judge it.
     pub held_out: bool,
+    /// By how many stops the photo is exposed more than the mean of all, as EXIF says; `None` where it does not.
+    pub exposure_prior_stops: Option<f32>,
 }
 
 /// A scene in Patina's world: +y up, right-handed.

@@ -10,7 +10,8 @@ use half::f16;
 pub enum Photo {
     /// sRGB-encoded bytes.
     Srgb8(Image<[u8; 3]>),
-    /// Linear radiance in half precision, each the mean of several pixels of sRGB-encoded bytes.
+    /// Linear radiance in half precision, each the mean of several pixels of sRGB-encoded bytes, or made of bytes of another
+    /// colour space.
     MeanOfSrgb8(Image<[f16; 3]>),
     /// Linear radiance in half precision, finite.
     Linear16(Image<[f16; 3]>),

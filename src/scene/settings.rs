@@ -21,8 +21,12 @@ pub struct ReadSettings {
     pub masks: MaskUse,
     /// What background pixels show; `auto` goes by the kind of the scene.
     pub background: BackgroundChoice,
-    /// How the numbers of the photos are encoded; `auto` goes by the file: 8 bits are sRGB, floats are linear.
+    /// How the numbers of the photos are encoded; `auto` goes by the file: its profile, else integers are
+    /// sRGB and floats are linear.
     pub encoding: ColourEncoding,
+    /// The layer of OpenEXR photos by its name, or the last part of it; none takes the layer of radiance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub layer: Option<String>,
     /// Photos are averaged over squares of this many pixels, in linear radiance; 1 keeps them.
     pub shrink: usize,
 }
@@ -37,6 +41,7 @@ impl Default for ReadSettings {
             masks: MaskUse::Use,
             background: BackgroundChoice::Auto,
             encoding: ColourEncoding::Auto,
+            layer: None,
             shrink: 1,
         }
     }
@@ -197,12 +202,12 @@ pub enum BackgroundChoice {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum ColourEncoding {
-    /// By the file: 8-bit files are sRGB, float files are linear.
+    /// By the file: its profile or gamma; without one integers are sRGB, floats are linear.
     #[default]
     Auto,
-    /// sRGB (IEC 61966-2-1).
+    /// sRGB (IEC 61966-2-1), with the primaries of the file.
     Srgb,
-    /// Linear radiance, 8-bit files too.
+    /// Linear radiance, integers too, with the primaries of the file.
     Linear,
 }
 
@@ -212,7 +217,13 @@ mod tests {
 
     #[test]
     fn settings_survive_a_file_and_unknown_keys_are_refused() {
-        let settings = ReadSettings { up: Up::NegZ, pixel_centre: PixelCentre::Half, shrink: 2, ..Default::default() };
+        let settings = ReadSettings {
+            up: Up::NegZ,
+            pixel_centre: PixelCentre::Half,
+            shrink: 2,
+            layer: Some("Combined".into()),
+            ..Default::default()
+        };
         let text = toml::to_string(&settings).unwrap();
         assert_eq!(toml::from_str::<ReadSettings>(&text).unwrap(), settings);
         assert!(toml::from_str::<ReadSettings>("shrinkage = 2").is_err());

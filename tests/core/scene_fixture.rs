@@ -121,6 +121,7 @@ fn render() -> Scene {
             photo: Photo::Srgb8(bytes_of(&picture)),
             states: mask.map(|object| if *object { PixelState::Surface } else { PixelState::Background }),
             held_out: false,
+            exposure_prior_stops: None,
         }
     };
     let views = ring(8).into_iter().enumerate().map(view_of).collect();

@@ -50,6 +50,10 @@ pub struct ReadOptions {
     /// How the numbers of the photographs are encoded: auto, srgb or linear.
     #[arg(long)]
     pub encoding: Option<ColourEncoding>,
+    /// Which layer of OpenEXR photographs is read, such as ViewLayer.Combined or Combined; the layer of radiance when not
+    /// given.
+    #[arg(long, value_name = "NAME")]
+    pub layer: Option<String>,
 }
 
 impl ReadOptions {
@@ -83,6 +87,9 @@ impl ReadOptions {
         }
         if let Some(encoding) = self.encoding {
             settings.encoding = encoding;
+        }
+        if let Some(layer) = &self.layer {
+            settings.layer = Some(layer.clone());
         }
         settings
     }

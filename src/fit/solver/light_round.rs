@@ -51,7 +51,10 @@ impl SolverScene {
             let held = self.held_light(estimate, &done, number);
             Some(self.solve_light(&equations, &surface, &shape, held, estimate, stop)?)
         };
-        let gains = self.settings.exposure.then(|| gains_after(&round, &done, self.settings.independence));
+        let gains = self
+            .settings
+            .exposure
+            .then(|| gains_after(&round, &done, &self.foretold_gains, self.settings.independence));
         let mut errors = ErrorSums::new(self.views.len());
         for (_, work) in &done {
             errors.add_block(&round, work);

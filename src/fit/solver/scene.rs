@@ -48,6 +48,8 @@ pub struct SolverScene {
     pub settings: SolverSettings,
     /// Indices in the scene of the views that are fitted to.
     pub views: Vec<usize>,
+    /// Logarithm of each view's gain that its exposure foretells, with mean zero; 0 where nothing is known of it.
+    pub foretold_gains: Vec<f32>,
     /// Their cameras, of the size they are fitted at.
     pub cameras: Vec<Camera>,
     /// The cache.
@@ -159,6 +161,7 @@ impl SolverScene {
             map_blocks: blocks(MAP_BLOCK),
             settings,
             views: targets.iter().map(|target| target.view).collect(),
+            foretold_gains: foretold_gains(targets.iter().map(|target| scene.views[target.view].exposure_prior_stops)),
             cameras: targets.iter().map(|target| target.camera).collect(),
             transport,
             footprints,
@@ -170,6 +173,14 @@ impl SolverScene {
             held_out_pixels,
         }))
     }
+}
+
+/// Logarithms of gains by exposures in stops, less their mean: a common gain belongs to the light.
+pub fn foretold_gains(stops: impl Iterator<Item = Option<f32>>) -> Vec<f32> {
+    let stops: Vec<Option<f32>> = stops.collect();
+    let known: Vec<f32> = stops.iter().flatten().copied().collect();
+    let mean = known.iter().sum::<f32>() / known.len().max(1) as f32;
+    stops.iter().map(|stops| stops.map_or(0.0, |stops| (stops - mean) * std::f32::consts::LN_2)).collect()
 }
 
 /// The row over the light that gives the mean light on the observed surface, and the mean that explains the photos.

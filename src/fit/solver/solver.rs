@@ -81,7 +81,10 @@ impl Solver {
         let Some(scene) = made else { return Err(Error::new(ErrorKind::Stopped, "stopped")) };
         let (width, height) = settings.light_size;
         let light = light.map_or_else(|| scene.constant_light(), |light| light.resampled(width, height));
-        let estimate = Estimate::start(settings.map_size, &light, views.len());
+        let mut estimate = Estimate::start(settings.map_size, &light, views.len());
+        if scene.settings.exposure {
+            estimate.log_gains.clone_from(&scene.foretold_gains);
+        }
         Ok(Solver { scene, estimate })
     }
 

@@ -1,22 +1,37 @@
-//! Image files: PNG, JPEG, OpenEXR, Radiance HDR, PFM.
+//! Image files: PNG, JPEG, TIFF, OpenEXR, Radiance HDR, PFM.
 //!
 //! The format is told by the content, not by the name. What a file claims is checked before memory is taken for it,
-//! and a decoder that panics on a damaged file becomes an error. Values leave here linear; sRGB is decoded and encoded
-//! at this border only. Files are written whole or not at all, through [`crate::files`].
+//! and a decoder that panics on a damaged file becomes an error. Values leave here in linear Rec. 709: curves, profiles and
+//! primaries are applied at this border only ([`ColourSpace`](colour::ColourSpace)). Files are written whole or not at all,
+//! through [`crate::files`].
 //!
-//! What is not done here: colour profiles (RGB is taken for Rec. 709), EXIF orientation (pixels are as stored), and any
-//! judgement of values: a NaN in a file is a NaN in the image, and its reader decides.
+//! [`read_photo`] is the whole of it: pixels, opacity, orientation, exposure, and what was done to them as findings.
+//! [`read_rgb`] and [`read_grey`] are for maps, masks and lights.
+//!
+//! What is not done here: turning pictures by their EXIF orientation (the camera decides: `scene::read`), and any
+//! judgement of values: a NaN in a file is a NaN in the image, and its reader decides. Raw files of cameras are refused.
 
+mod colour;
+mod exif;
+mod exr_layers;
 mod guard;
+mod hdr;
+mod jpeg;
 mod openexr;
 mod pfm;
+mod photo;
+mod png;
+mod profile;
 mod raster;
 mod source;
+mod stored;
+mod tiff;
 
+pub use photo::{Encoding, PhotoFile, PhotoOptions, PhotoPixels, swaps_sides, turned};
 pub use source::{Format, read_header};
 
 use super::{GreyImage, Image, RgbImage, transfer};
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::{Error, ErrorKind, Place, Result};
 use crate::files::{write_atomically, write_bytes};
 use ::image::ExtendedColorType;
 use ::image::codecs::{hdr::HdrEncoder, jpeg::JpegEncoder, png::PngEncoder};
@@ -25,35 +40,92 @@ use glam::Vec3;
 use source::Source;
 use std::path::Path;
 
-/// Linear RGB of an image file: EXR, HDR and PFM as stored, PNG and JPEG decoded from sRGB. Alpha is left out, a grey
-/// file is repeated in all channels. Values are not checked: they may be negative or not finite.
+/// A photo with all that its file says of it. Values are not checked: they may be negative or not finite.
 ///
-/// Errors: missing, unreadable, damaged or cut short (with the byte), more than [`LARGEST_PIXEL_COUNT`](source::LARGEST_PIXEL_COUNT) pixels, a kind
-/// that is not read.
-pub fn read_rgb(path: &Path) -> Result<RgbImage> {
-    let source = Source::open(path)?;
-    match source.header.format {
-        Format::Png | Format::Jpeg | Format::Hdr => raster::read_rgb(&source),
-        Format::Exr => openexr::read_rgb(&source),
-        Format::Pfm => pfm::read_rgb(&source),
-    }
+/// # Errors
+/// Missing, unreadable, damaged or cut short (with the byte), more than [`LARGEST_PIXEL_COUNT`](source::LARGEST_PIXEL_COUNT) pixels, a kind that is not
+/// read, inks for colours; for OpenEXR a layer that is not there, or layers whose names do not say which is radiance.
+pub fn read_photo(path: &Path, options: &PhotoOptions) -> Result<PhotoFile> {
+    photo_of(&Source::open(path)?, options)
 }
 
-/// One value a pixel: the lone channel of an EXR or PFM, of any name, as stored; the grey value of a PNG or JPEG over
+/// A photo of bytes that are at hand; `path` is what errors name. Errors as [`read_photo`].
+pub fn read_photo_from(path: &Path, bytes: Vec<u8>, options: &PhotoOptions) -> Result<PhotoFile> {
+    photo_of(&Source::of_bytes(path, bytes)?, options)
+}
+
+fn photo_of(source: &Source, options: &PhotoOptions) -> Result<PhotoFile> {
+    let with_exif = |photo: PhotoFile, exif: exif::Exif| PhotoFile {
+        orientation: exif.orientation.unwrap_or(1),
+        exposure_stops: exif.exposure_stops(),
+        ..photo
+    };
+    let floats = |image: RgbImage, findings| {
+        let decode = |pixel: &Vec3| pixel.map(transfer::linear_from_srgb);
+        let image = if options.encoding == Encoding::Srgb { image.map(decode) } else { image };
+        PhotoFile { pixels: PhotoPixels::Linear(image), findings, ..PhotoFile::default() }
+    };
+    Ok(match source.header.format {
+        Format::Png | Format::Jpeg => {
+            let (stored, exif) = raster::read(source)?;
+            with_exif(stored.into_photo(source, options.encoding)?, exif)
+        }
+        Format::Tiff => with_exif(tiff::read(source)?.into_photo(source, options.encoding)?, exif::read(&source.bytes)),
+        Format::Exr => {
+            let photo = openexr::read_photo(source, options.layer)?;
+            if options.encoding != Encoding::Srgb {
+                return Ok(photo);
+            }
+            let PhotoFile { pixels, findings, .. } = &photo;
+            let PhotoPixels::Linear(image) = pixels else { return Ok(photo) };
+            PhotoFile { pixels: floats(image.clone(), Vec::new()).pixels, findings: findings.clone(), ..photo }
+        }
+        Format::Hdr => {
+            let (image, findings) = hdr::read_rgb(source)?;
+            floats(image, findings)
+        }
+        Format::Pfm => floats(pfm::read_rgb(source)?, Vec::new()),
+    })
+}
+
+/// Linear RGB of an image file, as [`read_photo`] reads it by default: floats as stored, integers decoded by their profile
+/// or from sRGB. Alpha is left out, a grey file is repeated in all channels. Errors as [`read_photo`].
+pub fn read_rgb(path: &Path) -> Result<RgbImage> {
+    Ok(read_photo(path, &PhotoOptions::default())?.into_linear())
+}
+
+/// One value a pixel: the lone channel of an EXR or PFM, of any name, as stored; the grey value of a PNG, JPEG or TIFF over
 /// its largest value, in [0, 1], without decoding from sRGB. Colour gives its luminance. Errors as [`read_rgb`].
 pub fn read_grey(path: &Path) -> Result<GreyImage> {
-    let source = Source::open(path)?;
+    grey_of(&Source::open(path)?)
+}
+
+/// One value a pixel of bytes that are at hand; `path` is what errors name. As [`read_grey`].
+pub fn read_grey_from(path: &Path, bytes: Vec<u8>) -> Result<GreyImage> {
+    grey_of(&Source::of_bytes(path, bytes)?)
+}
+
+fn grey_of(source: &Source) -> Result<GreyImage> {
     match source.header.format {
-        Format::Png | Format::Jpeg | Format::Hdr => raster::read_grey(&source),
-        Format::Exr => openexr::read_grey(&source),
-        Format::Pfm => pfm::read_grey(&source),
+        Format::Png | Format::Jpeg => Ok(raster::read(source)?.0.grey()),
+        Format::Tiff => Ok(tiff::read(source)?.grey()),
+        Format::Hdr => Ok(hdr::read_rgb(source)?.0.map(|&rgb| grey_of_rgb(rgb))),
+        Format::Exr => openexr::read_grey(source),
+        Format::Pfm => pfm::read_grey(source),
     }
 }
 
-/// The bytes of a PNG or JPEG, sRGB-encoded as stored; 16 bits are rounded to 8. Errors as [`read_rgb`], and
-/// `Unsupported` for a linear format.
+/// The bytes of a PNG, JPEG or TIFF, sRGB-encoded as stored; 16 bits are rounded to 8. Errors as [`read_rgb`], and
+/// `Unsupported` for a file of floats.
 pub fn read_srgb8(path: &Path) -> Result<Image<[u8; 3]>> {
-    raster::read_srgb8(&Source::open(path)?)
+    let source = Source::open(path)?;
+    match source.header.format {
+        Format::Png | Format::Jpeg => Ok(raster::read(&source)?.0.bytes()),
+        Format::Tiff if !source.header.is_linear => Ok(tiff::read(&source)?.bytes()),
+        _ => Err(Error::new(ErrorKind::Unsupported, "the file holds linear values, not sRGB bytes")
+            .at(Place::File(source.path.clone()))
+            .remedy("give a PNG or JPEG, or read it as a linear image")),
+    }
 }
 
 /// (width, height) in pixels, without decoding. Errors as [`read_rgb`].

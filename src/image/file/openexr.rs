@@ -1,17 +1,20 @@
 //! OpenEXR: any flat layer with half, float or integer channels is read; scanline ZIP with floats is written.
 //!
-//! A file may hold many layers and channels. For colour, channels named `R G B` are taken first, then `*.R *.G *.B` of
-//! one group (a group called `Combined` before others, else the first in the file), then a lone luminance. For grey, `Y`,
-//! then a lone channel of any name, then the luminance of the colour. Alpha is left out; colour is as stored.
-//! The image is the data window: a display window around or inside it is ignored.
+//! Which layer is the picture is decided by [`super::exr_layers`]. The image is the display window: pixels of the data window
+//! outside it are cut, pixels that the file does not hold are not seen. Primaries other than those of Rec. 709 are converted.
+//! For grey, `Y` is taken first, then a lone channel of any name, then the luminance of the colour. Levels of detail and deep
+//! pixels are left out; luminance with chroma is refused.
 
+use super::colour::{Primaries, is_identity};
+use super::exr_layers::{self, Layer, Part, Placed};
 use super::guard::guarded;
+use super::photo::{PhotoFile, PhotoPixels};
 use super::source::{Source, implausible, malformed, too_large};
-use crate::error::{Error, ErrorKind, Place, Result};
+use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::{GreyImage, Image, RgbImage};
 use exr::prelude as openexr;
 use exr::prelude::{ReadChannels, ReadLayers, WritableImage};
-use glam::Vec3;
+use glam::{DMat3, DVec2, Vec3};
 use std::io::{BufRead, Cursor, Seek, Write};
 use std::path::Path;
 
@@ -38,7 +41,8 @@ pub fn size(reader: &mut (impl BufRead + Seek), path: &Path, length: u64) -> Res
         let ratio = match header.compression {
             openexr::Compression::Uncompressed => 1,
             openexr::Compression::ZIP1 | openexr::Compression::ZIP16 | openexr::Compression::RLE => BEST_DEFLATE_RATIO,
-            _ => u64::MAX,
+            // Huffman codes with runs, and cosine transforms under deflate.
+            _ => 4 * BEST_DEFLATE_RATIO,
         };
         if bytes / ratio > length {
             return Err(implausible(
@@ -51,59 +55,33 @@ pub fn size(reader: &mut (impl BufRead + Seek), path: &Path, length: u64) -> Res
     if decoded > LARGEST_DECODED {
         return Err(too_large(path, format!("all layers together claim {decoded} bytes")));
     }
-    // The layer that holds the picture tells the size; a file without one has no size to speak of.
-    let names: Vec<Vec<String>> = headers
-        .iter()
-        .map(|header| match header.deep {
-            true => Vec::new(),
-            false => header.channels.list.iter().map(|channel| channel.name.to_string()).collect(),
-        })
-        .collect();
-    let layer = choose_rgb(&names).map(|choice| choice.layer).or_else(|| choose_grey(&names)).unwrap_or(0);
     if headers.iter().all(|header| header.deep) {
         return Err(unsupported(path, "deep pixels are not read".into()));
     }
-    let size = headers[layer.min(headers.len() - 1)].layer_size;
-    Ok((size.width(), size.height()))
-}
-
-/// Where the colour is: a layer and three of its channels.
-struct RgbChoice {
-    layer: usize,
-    channels: [usize; 3],
-}
-
-/// The channels of colour among `names[layer][channel]`.
-fn choose_rgb(names: &[Vec<String>]) -> Option<RgbChoice> {
-    let group = |layer: usize, prefix: &str| {
-        let find = |letter: &str| names[layer].iter().position(|name| *name == format!("{prefix}{letter}"));
-        Some(RgbChoice { layer, channels: [find("R")?, find("G")?, find("B")?] })
+    // The display window is one for all parts.
+    let Some(header) = headers.iter().find(|header| !header.deep) else {
+        return Err(malformed(path, byte, "the file holds no picture").remedy("export it again"));
     };
-    if let Some(choice) = (0..names.len()).find_map(|layer| group(layer, "")) {
-        return Some(choice);
+    let window = header.shared_attributes.display_window.size;
+    let (width, height) = (window.width(), window.height());
+    if (width as u64).saturating_mul(height as u64) > super::source::LARGEST_PIXEL_COUNT {
+        return Err(too_large(path, format!("the file claims {width} x {height} pixels")));
     }
-    let prefixes = || {
-        names.iter().enumerate().flat_map(|(layer, channels)| {
-            channels.iter().filter_map(move |name| name.strip_suffix('R').map(|prefix| (layer, prefix)))
-        })
-    };
-    let combined = prefixes().filter(|(_, prefix)| prefix.ends_with("Combined."));
-    combined.chain(prefixes()).find_map(|(layer, prefix)| group(layer, prefix))
+    let largest = headers.iter().filter(|header| !header.deep).max_by_key(|header| header.layer_size.area());
+    if let Some(header) = largest {
+        let stored = (header.layer_size.width(), header.layer_size.height());
+        Placed { size: (width, height), offset: (0, 0), stored }.check(path)?;
+    }
+    Ok((width, height))
 }
 
-/// The layer with a lone channel, or with a luminance `Y`.
-fn choose_grey(names: &[Vec<String>]) -> Option<usize> {
-    let lone = || names.iter().position(|channels| channels.len() == 1);
-    names.iter().position(|channels| channels.iter().any(|name| name == "Y")).or_else(lone)
-}
-
-/// All flat layers of a file: names and values of each channel.
-struct Layers {
-    names: Vec<Vec<String>>,
+/// All flat parts of a file: their names and the values of each channel.
+struct File {
+    parts: Vec<Part>,
     image: openexr::FlatImage,
 }
 
-fn read_layers(source: &Source) -> Result<Layers> {
+fn read_file(source: &Source) -> Result<File> {
     let mut cursor = Cursor::new(source.bytes.as_slice());
     let outcome = guarded(&source.path, || {
         // On this thread only: a decoder that panics must do so where it is caught.
@@ -117,52 +95,112 @@ fn read_layers(source: &Source) -> Result<Layers> {
             .from_buffered(&mut cursor))
     })?;
     let image = outcome.map_err(|error| explain(error, &source.path, cursor.position()))?;
-    let names = image
-        .layer_data
-        .iter()
-        .map(|layer| layer.channel_data.list.iter().map(|channel| channel.name.to_string()).collect());
-    Ok(Layers { names: names.collect(), image })
+    let part = |layer: &openexr::Layer<openexr::AnyChannels<openexr::FlatSamples>>| Part {
+        name: layer.attributes.layer_name.as_ref().map(|name| name.to_string()).unwrap_or_default(),
+        channels: layer.channel_data.list.iter().map(|channel| channel.name.to_string()).collect(),
+    };
+    Ok(File { parts: image.layer_data.iter().map(part).collect(), image })
 }
 
-impl Layers {
-    fn channel<'a>(&'a self, source: &Source, layer: usize, channel: usize) -> Result<&'a openexr::FlatSamples> {
-        let layer = &self.image.layer_data[layer];
-        let channel = &layer.channel_data.list[channel];
-        if channel.sampling != openexr::Vec2(1, 1) || channel.sample_data.len() != layer.size.area() {
+impl File {
+    fn channel<'a>(&'a self, source: &Source, part: usize, channel: usize) -> Result<&'a openexr::FlatSamples> {
+        let part = &self.image.layer_data[part];
+        let channel = &part.channel_data.list[channel];
+        if channel.sampling != openexr::Vec2(1, 1) || channel.sample_data.len() != part.size.area() {
             return Err(unsupported(&source.path, format!("channel {} is stored at a lower resolution", channel.name)));
         }
         Ok(&channel.sample_data)
     }
 
-    /// The colour of the file, or nothing when it has none.
-    fn rgb(&self, source: &Source) -> Result<Option<RgbImage>> {
-        let Some(choice) = choose_rgb(&self.names) else { return Ok(None) };
-        let [red, green, blue] = choice.channels;
-        let red = self.channel(source, choice.layer, red)?;
-        let green = self.channel(source, choice.layer, green)?;
-        let blue = self.channel(source, choice.layer, blue)?;
-        let size = self.image.layer_data[choice.layer].size;
-        let value = |index| Vec3::new(value_at(red, index), value_at(green, index), value_at(blue, index));
-        Ok(Some(Image::from_pixels(size.width(), size.height(), (0..size.area()).map(value).collect())))
+    /// Where the pixels of a part lie in the picture.
+    fn placed(&self, source: &Source, part: usize) -> Result<Placed> {
+        let window = self.image.attributes.display_window;
+        let part = &self.image.layer_data[part];
+        let position = part.attributes.layer_position;
+        let offset = |part: i32, window: i32| i64::from(part) - i64::from(window);
+        let placed = Placed {
+            size: (source.header.width, source.header.height),
+            offset: (offset(position.x(), window.position.x()), offset(position.y(), window.position.y())),
+            stored: (part.size.width(), part.size.height()),
+        };
+        placed.check(&source.path)?;
+        Ok(placed)
+    }
+
+    /// The picture of a layer in its primaries, and whether its opacity and its windows say that pixels are missing.
+    fn photo(&self, source: &Source, layer: &Layer) -> Result<PhotoFile> {
+        let [red, green, blue] = layer.channels;
+        let red = self.channel(source, layer.part, red)?;
+        let green = self.channel(source, layer.part, green)?;
+        let blue = self.channel(source, layer.part, blue)?;
+        let alpha = layer.alpha.map(|alpha| self.channel(source, layer.part, alpha)).transpose()?;
+        let placed = self.placed(source, layer.part)?;
+        let mut findings: Vec<Finding> = placed.told().into_iter().collect();
+        let matrix = self.rec709_from_stored();
+        if matrix.is_some() {
+            let message = "colours are converted from the primaries of the file to Rec. 709";
+            findings.push(Finding::new(Severity::Note, "colour-converted", message));
+        }
+        let matrix = matrix.map(|matrix| matrix.as_mat3());
+        let value = |index| {
+            let stored = Vec3::new(value_at(red, index), value_at(green, index), value_at(blue, index));
+            matrix.map_or(stored, |matrix| matrix * stored)
+        };
+        Ok(PhotoFile {
+            pixels: PhotoPixels::Linear(spread(&placed, Vec3::ZERO, value)),
+            alpha: alpha.map(|alpha| spread(&placed, 0.0, |index| value_at(alpha, index))),
+            is_inside: (!placed.is_whole()).then(|| spread(&placed, false, |_| true)),
+            findings,
+            ..PhotoFile::default()
+        })
+    }
+
+    /// The matrix to linear Rec. 709, where the file declares other primaries.
+    fn rec709_from_stored(&self) -> Option<DMat3> {
+        let declared = self.image.attributes.chromaticities?;
+        let xy = |place: openexr::Vec2<f32>| DVec2::new(f64::from(place.0), f64::from(place.1));
+        let primaries = Primaries {
+            red: xy(declared.red),
+            green: xy(declared.green),
+            blue: xy(declared.blue),
+            white: xy(declared.white),
+        };
+        primaries.rec709_from_rgb().filter(|matrix| !is_identity(matrix))
     }
 
     /// A lone channel or a luminance, or nothing when the file has none.
     fn grey(&self, source: &Source) -> Result<Option<GreyImage>> {
-        let Some(layer) = choose_grey(&self.names) else { return Ok(None) };
-        let channel = self.names[layer].iter().position(|name| name == "Y").unwrap_or(0);
-        let samples = self.channel(source, layer, channel)?;
-        if self.names[layer].iter().any(|name| name == "RY" || name == "BY") {
+        let names = |part: usize| self.parts[part].channels.iter();
+        let lone = || (0..self.parts.len()).find(|&part| names(part).count() == 1);
+        let luminance = (0..self.parts.len()).find(|&part| names(part).any(|name| name == "Y"));
+        let Some(part) = luminance.or_else(lone) else { return Ok(None) };
+        let channel = names(part).position(|name| name == "Y").unwrap_or(0);
+        let samples = self.channel(source, part, channel)?;
+        if names(part).any(|name| name == "RY" || name == "BY") {
             return Err(unsupported(&source.path, "luminance with chroma is not read".into()));
         }
-        let size = self.image.layer_data[layer].size;
-        let pixels = (0..size.area()).map(|index| value_at(samples, index)).collect();
-        Ok(Some(Image::from_pixels(size.width(), size.height(), pixels)))
+        let placed = self.placed(source, part)?;
+        Ok(Some(spread(&placed, 0.0, |index| value_at(samples, index))))
     }
 
     fn nothing_fits(&self, source: &Source, wanted: &str) -> Error {
-        let names: Vec<&str> = self.names.iter().flatten().take(12).map(String::as_str).collect();
+        let names: Vec<&str> = self.parts.iter().flat_map(|part| &part.channels).take(12).map(String::as_str).collect();
         unsupported(&source.path, format!("the file holds no {wanted}; its channels are {}", names.join(", ")))
     }
+}
+
+/// The picture of a data window; `outside` where nothing is stored.
+fn spread<T: Clone>(placed: &Placed, outside: T, value: impl Fn(usize) -> T) -> Image<T> {
+    if placed.is_whole() {
+        return Image::from_pixels(
+            placed.size.0,
+            placed.size.1,
+            (0..placed.size.0 * placed.size.1).map(value).collect(),
+        );
+    }
+    Image::from_fn(placed.size.0, placed.size.1, |row, column| {
+        placed.stored_index(row, column).map_or_else(|| outside.clone(), &value)
+    })
 }
 
 fn value_at(samples: &openexr::FlatSamples, index: usize) -> f32 {
@@ -173,27 +211,34 @@ fn value_at(samples: &openexr::FlatSamples, index: usize) -> f32 {
     }
 }
 
-/// Colour as stored; a luminance is repeated.
-pub fn read_rgb(source: &Source) -> Result<RgbImage> {
-    let layers = read_layers(source)?;
-    if let Some(image) = layers.rgb(source)? {
-        return Ok(image);
+/// The layer of this name, or the one of radiance; a luminance is repeated where there is no colour.
+pub fn read_photo(source: &Source, layer: Option<&str>) -> Result<PhotoFile> {
+    let file = read_file(source)?;
+    let layers = exr_layers::layers_of(&file.parts);
+    if let Some(chosen) = exr_layers::choose(&layers, layer, &source.path)? {
+        let mut photo = file.photo(source, chosen)?;
+        photo.findings.extend(exr_layers::told(&layers, chosen));
+        return Ok(photo);
     }
-    match layers.grey(source)? {
-        Some(image) => Ok(image.map(|&value| Vec3::splat(value))),
-        None => Err(layers.nothing_fits(source, "colour (R G B)")),
+    match file.grey(source)? {
+        Some(image) => {
+            let pixels = PhotoPixels::Linear(image.map(|&value| Vec3::splat(value)));
+            Ok(PhotoFile { pixels, ..PhotoFile::default() })
+        }
+        None => Err(file.nothing_fits(source, "colour (R G B)")),
     }
 }
 
 /// A lone channel as stored, else the luminance of the colour.
 pub fn read_grey(source: &Source) -> Result<GreyImage> {
-    let layers = read_layers(source)?;
-    if let Some(image) = layers.grey(source)? {
+    let file = read_file(source)?;
+    if let Some(image) = file.grey(source)? {
         return Ok(image);
     }
-    match layers.rgb(source)? {
-        Some(image) => Ok(image.map(|&rgb| super::grey_of_rgb(rgb))),
-        None => Err(layers.nothing_fits(source, "grey channel")),
+    let layers = exr_layers::layers_of(&file.parts);
+    match exr_layers::choose(&layers, None, &source.path)? {
+        Some(layer) => Ok(file.photo(source, layer)?.into_linear().map(|&rgb| super::grey_of_rgb(rgb))),
+        None => Err(file.nothing_fits(source, "grey channel")),
     }
 }
 

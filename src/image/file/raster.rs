@@ -1,11 +1,13 @@
-//! PNG, JPEG and Radiance HDR through the `image` crate.
+//! PNG and JPEG through the `image` crate.
 
 use super::guard::guarded;
-use super::source::{Format, Source, implausible, malformed, too_large};
-use crate::error::{Error, ErrorKind, Place, Result};
-use crate::image::{GreyImage, Image, RgbImage, transfer};
-use ::image::{DynamicImage, ImageError, ImageFormat, ImageReader, Limits, error::ImageFormatHint};
-use glam::Vec3;
+use super::jpeg;
+use super::source::{Format, Source, malformed, too_large};
+use super::stored::{Samples, Stored, refused};
+use super::{exif, png};
+use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use ::image::codecs::{jpeg::JpegDecoder, png::PngDecoder};
+use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits, error::ImageFormatHint};
 use std::io::{BufRead, Cursor, Seek};
 use std::path::Path;
 
@@ -14,53 +16,93 @@ const LARGEST_ALLOCATION: u64 = super::source::LARGEST_PIXEL_COUNT * 8;
 
 /// (width, height) from the header alone.
 pub fn size(reader: &mut (impl BufRead + Seek), path: &Path, format: Format) -> Result<(usize, usize)> {
-    let outcome = guarded(path, || Ok(ImageReader::with_format(&mut *reader, crate_format(format)).into_dimensions()))?;
+    let format = if format == Format::Jpeg { ImageFormat::Jpeg } else { ImageFormat::Png };
+    let outcome = guarded(path, || Ok(ImageReader::with_format(&mut *reader, format).into_dimensions()))?;
     let byte = reader.stream_position().unwrap_or(0);
     outcome.map(|(width, height)| (width as usize, height as usize)).map_err(|error| explain(error, path, byte))
 }
 
-fn crate_format(format: Format) -> ImageFormat {
-    match format {
-        Format::Png => ImageFormat::Png,
-        Format::Jpeg => ImageFormat::Jpeg,
-        Format::Hdr => ImageFormat::Hdr,
-        // The other formats have readers of their own and do not come here.
-        Format::Exr | Format::Pfm => ImageFormat::OpenExr,
+/// Decodes a PNG or JPEG, and reads its EXIF.
+pub fn read(source: &Source) -> Result<(Stored, exif::Exif)> {
+    let mut findings = Vec::new();
+    let is_jpeg = source.header.format == Format::Jpeg;
+    if is_jpeg {
+        findings = check_jpeg(source)?;
     }
+    let decoded = decode(source, &source.bytes)?;
+    let declared = if is_jpeg { None } else { png::declared(&source.bytes) };
+    let Decoded { image, icc, exif } = decoded;
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    let channels = usize::from(image.color().channel_count());
+    let has_alpha = image.color().has_alpha();
+    let samples = match image {
+        DynamicImage::ImageLuma8(image) => Samples::Bytes(image.into_raw()),
+        DynamicImage::ImageLumaA8(image) => Samples::Bytes(image.into_raw()),
+        DynamicImage::ImageRgb8(image) => Samples::Bytes(image.into_raw()),
+        DynamicImage::ImageRgba8(image) => Samples::Bytes(image.into_raw()),
+        DynamicImage::ImageLuma16(image) => Samples::Words(image.into_raw()),
+        DynamicImage::ImageLumaA16(image) => Samples::Words(image.into_raw()),
+        DynamicImage::ImageRgb16(image) => Samples::Words(image.into_raw()),
+        DynamicImage::ImageRgba16(image) => Samples::Words(image.into_raw()),
+        other => return Err(refused(source, &format!("pixels of the kind {:?}", other.color()))),
+    };
+    let stored =
+        Stored { width, height, channels, samples, has_alpha, is_premultiplied: false, icc, declared, findings };
+    Ok((stored.checked(source)?, exif.map(|bytes| exif::read(&bytes)).unwrap_or_default()))
 }
 
-fn decode(source: &Source) -> Result<DynamicImage> {
-    if source.header.format == Format::Jpeg && !jpeg_is_complete(&source.bytes) {
-        // The decoder would fill what is missing with grey.
-        return Err(malformed(&source.path, source.bytes.len() as u64, "the JPEG ends before its last pixel")
-            .remedy("the file is cut short: copy it again"));
-    }
-    let mut cursor = Cursor::new(source.bytes.as_slice());
+/// What a decoder gives.
+struct Decoded {
+    image: DynamicImage,
+    icc: Option<Vec<u8>>,
+    exif: Option<Vec<u8>>,
+}
+
+fn decode(source: &Source, bytes: &[u8]) -> Result<Decoded> {
+    let mut cursor = Cursor::new(bytes);
     let outcome = guarded(&source.path, || {
         let mut limits = Limits::default();
         limits.max_alloc = Some(LARGEST_ALLOCATION);
-        let mut reader = ImageReader::with_format(&mut cursor, crate_format(source.header.format));
-        reader.limits(limits);
-        Ok(reader.decode())
+        Ok(match source.header.format {
+            Format::Jpeg => JpegDecoder::new(&mut cursor).and_then(|decoder| decoded_by(decoder, limits)),
+            _ => PngDecoder::with_limits(&mut cursor, limits.clone()).and_then(|decoder| decoded_by(decoder, limits)),
+        })
     })?;
     outcome.map_err(|error| explain(error, &source.path, cursor.position()))
 }
 
-/// Whether a JPEG holds the end marker after its first scan. In coded data 0xFF is always followed by another byte
-/// than 0xD9; in the segments before it a thumbnail may hold one, so segments are stepped over.
-fn jpeg_is_complete(bytes: &[u8]) -> bool {
-    let mut position = 2;
-    while let Some(&[0xff, marker, high, low]) = bytes.get(position..position + 4) {
-        if marker == 0xff {
-            position += 1;
-            continue;
-        }
-        position += 2 + usize::from(u16::from_be_bytes([high, low]));
-        if marker == 0xda {
-            return bytes.get(position..).is_some_and(|scan| scan.windows(2).any(|pair| pair == [0xff, 0xd9]));
-        }
+fn decoded_by(mut decoder: impl ImageDecoder, limits: Limits) -> std::result::Result<Decoded, ImageError> {
+    decoder.set_limits(limits)?;
+    // A profile or EXIF block that cannot be read must not cost the pixels.
+    let icc = decoder.icc_profile().ok().flatten();
+    let exif = decoder.exif_metadata().ok().flatten();
+    Ok(Decoded { image: DynamicImage::from_decoder(decoder)?, icc, exif })
+}
+
+/// Refuses a JPEG of inks and one without its last pixels; tells of an end marker that is missing and of stray bytes.
+fn check_jpeg(source: &Source) -> Result<Vec<Finding>> {
+    let facts = jpeg::facts(&source.bytes);
+    if facts.components == 4 {
+        return Err(refused(source, "CMYK"));
     }
-    false
+    let mut findings = Vec::new();
+    if !facts.has_end {
+        let pixels = |bytes: &[u8]| decode(source, bytes).ok().map(|decoded| decoded.image);
+        // The decoder would fill what is missing with grey.
+        if !facts.has_scan || !facts.has_all_scans || !jpeg::is_whole_without_end(&source.bytes, pixels) {
+            return Err(malformed(&source.path, source.bytes.len() as u64, "the JPEG ends before its last pixel")
+                .remedy("the file is cut short: copy it again"));
+        }
+        findings.push(
+            Finding::new(Severity::Note, "jpeg-no-end", "the JPEG has no end marker, but all pixels are there")
+                .remedy("copy the photo again if it may have been cut short"),
+        );
+    }
+    if facts.stray_bytes > 0 {
+        let message = format!("{} bytes of the JPEG belong to no segment: they are skipped", facts.stray_bytes);
+        findings.push(Finding::new(Severity::Note, "jpeg-stray-bytes", message));
+    }
+    Ok(findings)
 }
 
 fn explain(error: ImageError, path: &Path, byte: u64) -> Error {
@@ -81,63 +123,4 @@ fn explain(error: ImageError, path: &Path, byte: u64) -> Error {
         error => malformed(path, byte, format!("the file breaks its format: {error}"))
             .remedy("the file is cut short or damaged: copy it again"),
     }
-}
-
-fn checked<T>(source: &Source, width: u32, height: u32, pixels: Vec<T>) -> Result<Image<T>> {
-    let (width, height) = (width as usize, height as usize);
-    if pixels.len() != width * height || (width, height) != (source.header.width, source.header.height) {
-        return Err(implausible(
-            &source.path,
-            format!("the decoded image is not the {width} x {height} of its header"),
-        ));
-    }
-    Ok(Image::from_pixels(width, height, pixels))
-}
-
-fn is_sixteen_bit(image: &DynamicImage) -> bool {
-    image.color().bytes_per_pixel() / image.color().channel_count() == 2
-}
-
-/// Linear RGB: HDR as stored, PNG and JPEG decoded from sRGB. An alpha channel is left out.
-pub fn read_rgb(source: &Source) -> Result<RgbImage> {
-    let image = decode(source)?;
-    let (width, height) = (image.width(), image.height());
-    let pixels = if source.header.format == Format::Hdr {
-        image.into_rgb32f().pixels().map(|pixel| Vec3::from_array(pixel.0)).collect()
-    } else if is_sixteen_bit(&image) {
-        let linear: Vec<f32> =
-            (0..=u16::MAX).map(|value| transfer::linear_from_srgb(f32::from(value) / 65_535.0)).collect();
-        image.into_rgb16().pixels().map(|pixel| Vec3::from_array(pixel.0.map(|value| linear[value as usize]))).collect()
-    } else {
-        image.into_rgb8().pixels().map(|pixel| transfer::linear_from_srgb8(pixel.0)).collect()
-    };
-    checked(source, width, height, pixels)
-}
-
-/// One value a pixel in [0, 1] without decoding from sRGB (HDR: luminance as stored).
-pub fn read_grey(source: &Source) -> Result<GreyImage> {
-    let image = decode(source)?;
-    let (width, height) = (image.width(), image.height());
-    let pixels = if source.header.format == Format::Hdr {
-        image.into_rgb32f().pixels().map(|pixel| super::grey_of_rgb(Vec3::from_array(pixel.0))).collect()
-    } else if is_sixteen_bit(&image) {
-        let pixel = |rgb: [u16; 3]| super::grey_of_rgb(Vec3::from_array(rgb.map(|value| f32::from(value) / 65_535.0)));
-        image.into_rgb16().pixels().map(|rgb| pixel(rgb.0)).collect()
-    } else {
-        let pixel = |rgb: [u8; 3]| super::grey_of_rgb(Vec3::from_array(rgb.map(|value| f32::from(value) / 255.0)));
-        image.into_rgb8().pixels().map(|rgb| pixel(rgb.0)).collect()
-    };
-    checked(source, width, height, pixels)
-}
-
-/// sRGB bytes as stored; 16 bits are rounded to 8.
-pub fn read_srgb8(source: &Source) -> Result<Image<[u8; 3]>> {
-    if source.header.format.is_linear() {
-        return Err(Error::new(ErrorKind::Unsupported, "the file holds linear values, not sRGB bytes")
-            .at(Place::File(source.path.clone()))
-            .remedy("give a PNG or JPEG, or read it as a linear image"));
-    }
-    let image = decode(source)?;
-    let (width, height) = (image.width(), image.height());
-    checked(source, width, height, image.into_rgb8().pixels().map(|pixel| pixel.0).collect())
 }

@@ -1,9 +1,9 @@
 //! What a file is and how large it claims to be, before anything is allocated for it.
 
-use super::{openexr, pfm, raster};
+use super::{hdr, openexr, pfm, raster, tiff};
 use crate::error::{Error, ErrorKind, Place, Result};
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read, Seek};
+use std::io::{BufRead, BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 
 /// Formats that are read, told apart by content and not by name.
@@ -13,6 +13,8 @@ pub enum Format {
     Png,
     /// 8 bits a channel, sRGB.
     Jpeg,
+    /// 8 or 16 bits a channel, sRGB; or floats, linear.
+    Tiff,
     /// OpenEXR: 16 or 32 bits a channel, linear.
     Exr,
     /// Radiance HDR: shared exponent, linear.
@@ -22,16 +24,15 @@ pub enum Format {
 }
 
 impl Format {
-    /// Whether stored values are linear. The others are sRGB-encoded.
-    pub fn is_linear(self) -> bool {
-        matches!(self, Format::Exr | Format::Hdr | Format::Pfm)
-    }
-
     /// The format of a file that begins with these bytes.
     fn of_first_bytes(bytes: &[u8]) -> Option<Self> {
-        const MAGIC: [(&[u8], Format); 6] = [
+        const MAGIC: [(&[u8], Format); 10] = [
             (b"\x89PNG\r\n\x1a\n", Format::Png),
             (b"\xff\xd8\xff", Format::Jpeg),
+            (b"II*\0", Format::Tiff),
+            (b"MM\0*", Format::Tiff),
+            (b"II+\0", Format::Tiff),
+            (b"MM\0+", Format::Tiff),
             (b"\x76\x2f\x31\x01", Format::Exr),
             (b"#?", Format::Hdr),
             (b"PF", Format::Pfm),
@@ -50,6 +51,8 @@ pub struct ImageHeader {
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
+    /// Whether values are linear floats. Integers are sRGB-encoded unless the file says otherwise.
+    pub is_linear: bool,
 }
 
 /// Largest number of pixels that is read: 16,384 x 16,384.
@@ -74,6 +77,16 @@ impl Source {
         reader.rewind().map_err(|error| Error::reading(path, error))?;
         let mut bytes = Vec::with_capacity(length as usize);
         reader.read_to_end(&mut bytes).map_err(|error| Error::reading(path, error))?;
+        Ok(Source { path: path.into(), bytes, header })
+    }
+
+    /// A file whose bytes are at hand, under the path that errors name. Errors as [`Source::open`].
+    pub fn of_bytes(path: &Path, bytes: Vec<u8>) -> Result<Self> {
+        let length = bytes.len() as u64;
+        if length > LARGEST_FILE {
+            return Err(too_large(path, format!("the file has {length} bytes")));
+        }
+        let header = header_of(&mut Cursor::new(bytes.as_slice()), path, length)?;
         Ok(Source { path: path.into(), bytes, header })
     }
 }
@@ -103,13 +116,16 @@ fn header_of(reader: &mut (impl BufRead + Seek), path: &Path, length: u64) -> Re
     if first.is_empty() {
         return Err(malformed(path, 0, "the file is empty").remedy("copy it again"));
     }
-    let Some(format) = Format::of_first_bytes(first) else {
-        return Err(Error::new(ErrorKind::Unsupported, "the content is not PNG, JPEG, OpenEXR, Radiance HDR or PFM")
-            .at(Place::File(path.into()))
-            .remedy("convert the image to one of these formats"));
-    };
+    let Some(format) = Format::of_first_bytes(first) else { return Err(unknown(path, first)) };
+    let mut is_linear = matches!(format, Format::Exr | Format::Hdr | Format::Pfm);
     let (width, height) = match format {
-        Format::Png | Format::Jpeg | Format::Hdr => raster::size(reader, path, format)?,
+        Format::Png | Format::Jpeg => raster::size(reader, path, format)?,
+        Format::Tiff => {
+            let header = tiff::read_header(reader, path, length)?;
+            is_linear = header.is_float;
+            (header.width, header.height)
+        }
+        Format::Hdr => hdr::read_header(reader, path)?.size(),
         Format::Exr => openexr::size(reader, path, length)?,
         Format::Pfm => pfm::read_header(reader, path)?.size(),
     };
@@ -120,10 +136,52 @@ fn header_of(reader: &mut (impl BufRead + Seek), path: &Path, length: u64) -> Re
     if pixels > LARGEST_PIXEL_COUNT {
         return Err(too_large(path, format!("the file claims {width} x {height} pixels")));
     }
-    if matches!(format, Format::Png | Format::Hdr) && pixels / MOST_PIXELS_PER_BYTE > length {
+    let most_per_byte = match format {
+        Format::Png | Format::Hdr => MOST_PIXELS_PER_BYTE,
+        // A block of 64 pixels takes a bit of each scan at least.
+        Format::Jpeg => 1024,
+        // Their readers know what they hold.
+        Format::Tiff | Format::Exr | Format::Pfm => u64::MAX,
+    };
+    if pixels / most_per_byte > length {
         return Err(implausible(path, format!("{length} bytes cannot hold the {width} x {height} pixels it claims")));
     }
-    Ok(ImageHeader { format, width, height })
+    Ok(ImageHeader { format, width, height, is_linear })
+}
+
+/// A file of another content. What photos come in is named, with a way out.
+fn unknown(path: &Path, first: &[u8]) -> Error {
+    let at = |place: usize, magic: &[u8]| first.get(place..).is_some_and(|rest| rest.starts_with(magic));
+    let raw =
+        [(0, b"FUJIFILMCCD-RAW".as_slice()), (0, b"IIU\0"), (0, b"IIRO"), (0, b"IIRS"), (0, b"MMOR"), (4, b"ftypcrx")];
+    if raw.iter().any(|(place, magic)| at(*place, magic)) {
+        return raw_file(path);
+    }
+    let phone = [b"ftypheic".as_slice(), b"ftypheix", b"ftyphevc", b"ftypmif1", b"ftypmsf1", b"ftypavif"];
+    let kind = if phone.iter().any(|magic| at(4, magic)) {
+        "HEIC or AVIF, which is"
+    } else if at(8, b"WEBP") {
+        "WebP, which is"
+    } else if at(0, b"GIF8") {
+        "GIF, which is"
+    } else {
+        ""
+    };
+    let message = if kind.is_empty() {
+        "the content is not PNG, JPEG, TIFF, OpenEXR, Radiance HDR or PFM".to_owned()
+    } else {
+        format!("the content is {kind} not read")
+    };
+    Error::new(ErrorKind::Unsupported, message)
+        .at(Place::File(path.into()))
+        .remedy("convert the image to PNG, JPEG, TIFF or OpenEXR, in its full size and with its colour profile")
+}
+
+/// A camera's raw file. No library reads them that is kept well and may be linked here; developing them is a craft besides.
+pub fn raw_file(path: &Path) -> Error {
+    Error::new(ErrorKind::Unsupported, "a camera's raw file is not read")
+        .at(Place::File(path.into()))
+        .remedy("develop it to a linear 16-bit TIFF, all photos alike: no sharpening, no tone curve, one white balance")
 }
 
 /// A file that breaks its format at a byte.

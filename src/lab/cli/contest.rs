@@ -268,6 +268,7 @@ mod tests {
             masks: MaskUse::Ignore,
             background: BackgroundChoice::Environment,
             encoding: ColourEncoding::Linear,
+            layer: Some("View Layer.Combined".into()),
             shrink: 2,
         };
         for read in [read, ReadSettings::default()] {

@@ -65,6 +65,7 @@ mod tests {
                 photo: Photo::Srgb8(Image::filled(side_pixels, side_pixels, [150; 3])),
                 states: Image::filled(side_pixels, side_pixels, PixelState::Surface),
                 held_out: false,
+                exposure_prior_stops: None,
             }
         };
         let small = DemoSettings { views: 1, held_out: 0, width: 8, height: 6, map_size: 64, seed: 1 };

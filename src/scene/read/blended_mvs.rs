@@ -4,20 +4,19 @@
 //! blended_images/ or images/   00000000.jpg ...; 00000000_masked.jpg are twins with a black background
 //! cams/                        00000000_cam.txt ...; pair.txt (optional)
 //! textured_mesh/               *.obj in one or several pieces, or *.ply; a separate download
-//! masks/                       00000000.png, 255 = object (optional, not part of the download)
+//! masks/ or mask/              00000000.png, 00000000.jpg.png, ...: 255 = object (optional, not part of the download)
 //! rendered_depth_maps/         *.pfm (optional): not read, the mesh says the same
 //! ```
 
 use super::camera_file;
+use super::mask_names::{self, Masks, PHOTO_EXTENSIONS};
 use super::source::{SourceScene, SourceView};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::image::file;
 use crate::scene::Background;
 use crate::scene::settings::{ColourEncoding, PixelCentre, Up};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-
-/// Extensions of photos.
-const PHOTO_EXTENSIONS: [&str; 6] = ["jpg", "jpeg", "png", "exr", "hdr", "pfm"];
 
 /// Whether the folder has one of the parts of this layout.
 pub fn is_folder_of_this_kind(folder: &Path) -> bool {
@@ -44,7 +43,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
             .at(Place::File(folder.into()))
             .remedy("a BlendedMVS folder holds blended_images/, cams/ and textured_mesh/; a scene.toml can name the parts by hand"));
     };
-    let views = views(images, cams, Some(&folder.join("masks")), &mut findings)?;
+    let views = views(images, cams, mask_names::folder_of_masks(folder).as_deref(), false, &mut findings)?;
     check_pairs(&cams.join("pair.txt"), &views, &mut findings);
     if folder.join("rendered_depth_maps").is_dir() {
         findings.push(Finding::new(
@@ -114,7 +113,7 @@ pub fn files_of(folder: &Path, extensions: &[&str]) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Photos of a folder by name, without `_masked` twins; and the twins by the name they belong to.
+/// Photos of a folder by name, without masks and `_masked` twins among them; and those by the name they belong to.
 pub fn photos_of(images: &Path) -> Result<(BTreeMap<String, PathBuf>, BTreeMap<String, PathBuf>)> {
     let (mut photos, mut twins) = (BTreeMap::new(), BTreeMap::new());
     for path in files_of(images, &PHOTO_EXTENSIONS)? {
@@ -130,16 +129,34 @@ pub fn photos_of(images: &Path) -> Result<(BTreeMap<String, PathBuf>, BTreeMap<S
             .remedy("keep one of them"));
         }
     }
+    for (stem, photo) in mask_names::beside_photos(&photos) {
+        if let Some(mask) = photos.remove(&stem) {
+            twins.entry(photo).or_insert(mask);
+        }
+    }
+    if photos.is_empty()
+        && let Some(other) = files_of(images, &mask_names::EXTENSIONS_NOT_READ)?.first()
+    {
+        // Its error names the kind and the way out.
+        file::read_header(other)?;
+    }
     if photos.is_empty() {
         return Err(Error::new(ErrorKind::Missing, "the folder holds no photos")
             .at(Place::File(images.into()))
-            .remedy("it must hold JPEG, PNG, EXR, HDR or PFM files"));
+            .remedy("it must hold JPEG, PNG, TIFF, EXR, HDR or PFM files"));
     }
     Ok((photos, twins))
 }
 
-/// Joins photos, cameras and masks by name; what stands alone becomes a finding.
-pub fn views(images: &Path, cams: &Path, masks: Option<&Path>, findings: &mut Vec<Finding>) -> Result<Vec<SourceView>> {
+/// Joins photos, cameras and masks by name; what stands alone becomes a finding. Masks that a manifest names must all belong
+/// to photos.
+pub fn views(
+    images: &Path,
+    cams: &Path,
+    masks: Option<&Path>,
+    masks_are_named: bool,
+    findings: &mut Vec<Finding>,
+) -> Result<Vec<SourceView>> {
     let (photos, twins) = photos_of(images)?;
     let mut cameras = BTreeMap::new();
     for path in files_of(cams, &["txt"])? {
@@ -148,7 +165,7 @@ pub fn views(images: &Path, cams: &Path, masks: Option<&Path>, findings: &mut Ve
             cameras.insert(name.to_owned(), path);
         }
     }
-    let mask_files = mask_files(masks)?;
+    let mask_files = mask_files(masks, &photos, masks_are_named, findings)?;
     for (name, path) in cameras.iter().filter(|(name, _)| !photos.contains_key(*name)) {
         findings.push(
             Finding::new(
@@ -197,15 +214,19 @@ pub fn views(images: &Path, cams: &Path, masks: Option<&Path>, findings: &mut Ve
     Ok(views)
 }
 
-/// Mask files by name; a suffix `_mask` is allowed.
-pub fn mask_files(masks: Option<&Path>) -> Result<BTreeMap<String, PathBuf>> {
-    let Some(masks) = masks else { return Ok(BTreeMap::new()) };
-    let files = files_of(masks, &PHOTO_EXTENSIONS)?;
-    let name_of = |path: &Path| {
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        stem.strip_suffix("_mask").map(str::to_owned).unwrap_or(stem)
-    };
-    Ok(files.into_iter().map(|path| (name_of(&path), path)).collect())
+/// The mask file of each photo that has one, by the photo's name; masks of no photo are told, or refused when named.
+pub fn mask_files(
+    folder: Option<&Path>,
+    photos: &BTreeMap<String, PathBuf>,
+    are_named: bool,
+    findings: &mut Vec<Finding>,
+) -> Result<BTreeMap<String, PathBuf>> {
+    let Some(folder) = folder else { return Ok(BTreeMap::new()) };
+    let mut masks = Masks::of_folder(folder)?;
+    let of_photo = |name: &String| Some((name.clone(), masks.of_photo(Path::new(&format!("{name}.png")))?));
+    let found = photos.keys().filter_map(of_photo).collect();
+    masks.tell_unused(folder, are_named, findings)?;
+    Ok(found)
 }
 
 /// Checks `pair.txt`. Nothing depends on it, so that what is wrong with it is a finding.

@@ -8,7 +8,7 @@
 //! masks = "masks"                    # optional folder: <photo>.png, 255 = object
 //! camera_axes = "opencv"             # opencv: x right, y down, z forward (default); opengl: x right, y up, z back
 //! camera_matrix = "camera_from_world"# or world_from_camera
-//! encoding = "auto"                  # auto (8 bits sRGB, floats linear), srgb, linear
+//! encoding = "auto"                  # auto (by profile, else integers sRGB, floats linear), srgb, linear
 //! up = "auto"                        # auto, X, Y, Z, -X, -Y, -Z
 //! pixel_centre = "auto"              # auto, integer, half
 //! background = "environment"         # or black
@@ -101,7 +101,7 @@ pub fn read(path: &Path) -> Result<SourceScene> {
     }
     let cameras = folder.join(&manifest.cameras);
     let mut views = if cameras.is_dir() {
-        blended_mvs::views(&images, &cameras, masks.as_deref(), &mut findings)?
+        blended_mvs::views(&images, &cameras, masks.as_deref(), true, &mut findings)?
     } else if cameras.is_file() {
         views_of_json(&images, &cameras, masks.as_deref(), &mut findings)?
     } else {
@@ -144,7 +144,7 @@ fn views_of_json(
     findings: &mut Vec<Finding>,
 ) -> Result<Vec<SourceView>> {
     let (photos, twins) = blended_mvs::photos_of(images)?;
-    let masks = blended_mvs::mask_files(masks)?;
+    let masks = blended_mvs::mask_files(masks, &photos, true, findings)?;
     let (entries, mut noticed) = read_cameras_json(cameras)?;
     findings.append(&mut noticed);
     let mut views: Vec<SourceView> = Vec::new();

@@ -11,8 +11,11 @@ pub mod blended_mvs;
 pub mod camera_file;
 pub mod exchange;
 pub mod manifest;
+mod mask_names;
+mod matte;
 pub mod mesh_file;
 mod obj;
+mod orientation;
 pub mod photos;
 mod ply;
 pub mod source;
@@ -130,7 +133,20 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
 
     // The photos.
     let encoding = if settings.encoding == ColourEncoding::Auto { source.encoding } else { settings.encoding };
-    let loaded = photos::load_all(&views, encoding, settings)?;
+    let mut loaded = photos::load_all(&views, encoding, settings)?;
+    let mut background = match settings.background {
+        BackgroundChoice::Auto => source.background,
+        BackgroundChoice::Environment => Background::Environment,
+        BackgroundChoice::Black => Background::Black,
+    };
+    let may_be_matte = settings.background == BackgroundChoice::Auto && background == Background::Environment;
+    if let Some(matte) = matte::find(&loaded).filter(|_| may_be_matte) {
+        matte::set_aside(&mut loaded, matte);
+        findings.push(matte::told(matte, loaded.len()));
+        if matte.is_masked {
+            background = Background::Black;
+        }
+    }
     if settings.masks == MaskUse::Use {
         let without = views.iter().filter(|view| view.mask.is_none()).count();
         if without > 0 && without < views.len() {
@@ -159,11 +175,7 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
         mesh,
         views: joined,
         world_from_source,
-        background: match settings.background {
-            BackgroundChoice::Auto => source.background,
-            BackgroundChoice::Environment => Background::Environment,
-            BackgroundChoice::Black => Background::Black,
-        },
+        background,
         truth: None,
         findings,
     };
@@ -202,6 +214,7 @@ fn join(
         photo: photo.photo,
         states: photo.states,
         held_out: false,
+        exposure_prior_stops: photo.exposure_prior_stops,
     }
 }
 

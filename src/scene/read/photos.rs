@@ -1,8 +1,10 @@
 //! Photos and masks: decoded in parallel, kept compact, each pixel told what it is evidence for.
 
+use super::orientation;
 use super::source::SourceView;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
-use crate::image::{GreyImage, Image, RgbImage, file};
+use crate::image::file::{self, Encoding, PhotoFile, PhotoOptions, PhotoPixels};
+use crate::image::{GreyImage, Image, RgbImage};
 use crate::scene::settings::{ColourEncoding, MaskUse, ReadSettings};
 use crate::scene::{Photo, PixelState};
 use glam::Vec3;
@@ -23,75 +25,147 @@ pub struct LoadedPhoto {
     pub photo: Photo,
     /// What each pixel is evidence for.
     pub states: Image<PixelState>,
-    /// Width and height of the file, before shrinking.
+    /// Width and height of the file as its camera sees it, before shrinking.
     pub file_size: (usize, usize),
-    /// What was noticed.
+    /// By how many stops it is exposed more than the mean of the photos, as EXIF says; `None` where it does not.
+    pub exposure_prior_stops: Option<f32>,
+    /// What was noticed of it alone.
     pub findings: Vec<Finding>,
+    /// What was noticed without a place, which other photos may share.
+    shared: Vec<Finding>,
 }
 
-/// Decodes all views; the first error in the order of `views` is returned.
+impl LoadedPhoto {
+    /// A photo with nothing noticed.
+    pub fn new(photo: Photo, states: Image<PixelState>) -> Self {
+        let file_size = (photo.width(), photo.height());
+        LoadedPhoto { photo, states, file_size, exposure_prior_stops: None, findings: Vec::new(), shared: Vec::new() }
+    }
+}
+
+/// Decodes all views; the first error in the order of `views` is returned. What several photos have in common is told once,
+/// with the first of them.
 pub fn load_all(views: &[SourceView], encoding: ColourEncoding, settings: &ReadSettings) -> Result<Vec<LoadedPhoto>> {
-    let sizes: Vec<_> = views.par_iter().map(check_size).collect::<Vec<_>>().into_iter().collect::<Result<_>>()?;
+    let size = |view: &SourceView| file::read_size(&view.photo);
+    let sizes: Vec<_> = views.par_iter().map(size).collect::<Vec<_>>().into_iter().collect::<Result<_>>()?;
     let pixels: usize = sizes.iter().map(|(width, height)| width * height).sum();
     let shrink = settings.shrink;
     let as_half = pixels / (shrink * shrink) * std::mem::size_of::<Vec3>() > MOST_FLOAT_BYTES;
     let loaded: Vec<Result<LoadedPhoto>> =
         views.par_iter().map(|view| load(view, encoding, settings, as_half)).collect();
-    loaded.into_iter().collect()
+    let mut loaded = loaded.into_iter().collect::<Result<Vec<_>>>()?;
+    let mut gathered = gather(views, &loaded);
+    gathered.extend(centre_exposures(&mut loaded));
+    if let Some(first) = loaded.first_mut() {
+        first.findings.splice(0..0, gathered);
+    }
+    Ok(loaded)
 }
 
-fn check_size(view: &SourceView) -> Result<(usize, usize)> {
-    let size = file::read_size(&view.photo)?;
-    if let Some(claimed) = view.size.filter(|claimed| *claimed != size) {
-        return Err(Error::new(
-            ErrorKind::InvalidScene,
-            format!("the photo is {} x {} but its camera is for {} x {}", size.0, size.1, claimed.0, claimed.1),
-        )
-        .at(Place::File(view.photo.clone()))
-        .remedy("use the photos the cameras were made for, or scale the intrinsics with them"));
+/// One finding of those that photos share, with the names of the photos.
+fn gather(views: &[SourceView], loaded: &[LoadedPhoto]) -> Vec<Finding> {
+    const SHOWN: usize = 6;
+    let mut groups: Vec<(&Finding, Vec<&str>)> = Vec::new();
+    for (view, photo) in views.iter().zip(loaded) {
+        for finding in &photo.shared {
+            match groups.iter_mut().find(|(own, _)| *own == finding) {
+                Some((_, names)) => names.push(&view.name),
+                None => groups.push((finding, vec![&view.name])),
+            }
+        }
     }
-    Ok(size)
+    let told = groups.into_iter().map(|(finding, names)| {
+        let count = names.len();
+        let which = match count {
+            _ if count == views.len() && count > 1 => format!("all {count} photos"),
+            1 => return finding.clone().at(Place::View(names[0].to_owned())),
+            _ if count <= SHOWN => format!("{count} of {} photos: {}", views.len(), names.join(", ")),
+            _ => format!("{count} of {} photos: {} and others", views.len(), names[..SHOWN].join(", ")),
+        };
+        Finding { message: format!("{} ({which})", finding.message), ..finding.clone() }
+    });
+    told.collect()
+}
+
+/// Makes exposures relative to their mean; tells how far they differ.
+fn centre_exposures(loaded: &mut [LoadedPhoto]) -> Option<Finding> {
+    /// Less than the third of a stop that cameras go by.
+    const SAME_STOPS: f32 = 0.1;
+    let known: Vec<f32> = loaded.iter().filter_map(|photo| photo.exposure_prior_stops).collect();
+    if known.len() < 2 {
+        loaded.iter_mut().for_each(|photo| photo.exposure_prior_stops = None);
+        return None;
+    }
+    let mean = known.iter().sum::<f32>() / known.len() as f32;
+    loaded.iter_mut().filter_map(|photo| photo.exposure_prior_stops.as_mut()).for_each(|stops| *stops -= mean);
+    let least = known.iter().copied().fold(f32::INFINITY, f32::min);
+    let span = known.iter().copied().fold(f32::NEG_INFINITY, f32::max) - least;
+    let message =
+        format!("EXIF gives the exposures of {} of {} photos: they span {span:.1} stops", known.len(), loaded.len());
+    (span > SAME_STOPS).then(|| Finding::new(Severity::Note, "exposure-by-exif", message))
 }
 
 fn load(view: &SourceView, encoding: ColourEncoding, settings: &ReadSettings, as_half: bool) -> Result<LoadedPhoto> {
-    let mut findings = Vec::new();
-    let (photo, mut states) = match file::read_srgb8(&view.photo) {
-        Ok(bytes) => from_bytes(bytes, encoding),
-        Err(error) if error.kind() == ErrorKind::Unsupported => {
-            from_floats(file::read_rgb(&view.photo)?, encoding, as_half, view, &mut findings)
-        }
-        Err(error) => return Err(error),
+    let (mut findings, mut shared) = (Vec::new(), Vec::new());
+    let options = PhotoOptions {
+        encoding: match encoding {
+            ColourEncoding::Auto => Encoding::Auto,
+            ColourEncoding::Srgb => Encoding::Srgb,
+            ColourEncoding::Linear => Encoding::Linear,
+        },
+        layer: settings.layer.as_deref(),
     };
+    let mut file = file::read_photo(&view.photo, &options)?;
+    shared.append(&mut file.findings);
+    let stored = (file.size(), file.orientation);
+    let file = orientation::as_the_camera_sees(file, view, &mut shared)?;
+    let PhotoFile { pixels, is_eight_bit, clipped, alpha, is_inside, exposure_stops, .. } = file;
+    let is_float = clipped.is_none();
+    let (photo, mut states) = match pixels {
+        PhotoPixels::Srgb8(bytes) => {
+            let states = Image::filled(bytes.width(), bytes.height(), PixelState::Surface);
+            (Photo::Srgb8(bytes), states)
+        }
+        PhotoPixels::Linear(image) => {
+            let (image, states) = checked_floats(image, is_float, view, &mut findings, &mut shared);
+            kept(image, states, is_eight_bit && encoding != ColourEncoding::Linear, is_eight_bit || as_half)
+        }
+    };
+    mark(&mut states, clipped.as_ref(), PixelState::SurfaceClipped, |clipped| clipped);
     let file_size = (photo.width(), photo.height());
-    if let (Some(mask), true) = (&view.mask, settings.masks == MaskUse::Use) {
-        apply_mask(mask, view, &photo, &mut states, &mut findings)?;
+    if settings.masks == MaskUse::Use {
+        match (&view.mask, &alpha) {
+            (Some(mask), _) => apply_mask(mask, view, &photo, stored, &mut states, &mut findings)?,
+            (None, Some(alpha)) => apply_alpha(alpha, is_float, &mut states, &mut shared),
+            (None, None) => {}
+        }
     }
+    mark(&mut states, is_inside.as_ref(), PixelState::Ignored, |is_inside| !is_inside);
     let (photo, states) = match settings.shrink {
         1 => (photo, states),
         factor => shrink(&photo, &states, factor),
     };
-    Ok(LoadedPhoto { photo, states, file_size, findings })
+    Ok(LoadedPhoto { photo, states, file_size, exposure_prior_stops: exposure_stops, findings, shared })
 }
 
-fn from_bytes(bytes: Image<[u8; 3]>, encoding: ColourEncoding) -> (Photo, Image<PixelState>) {
-    let clipped = |pixel: &[u8; 3]| pixel.iter().any(|&channel| channel >= CLIPPED_BYTE);
-    let states = bytes.map(|pixel| if clipped(pixel) { PixelState::SurfaceClipped } else { PixelState::Surface });
-    let photo = match encoding {
-        ColourEncoding::Linear => {
-            Photo::Linear16(bytes.map(|pixel| pixel.map(|byte| f16::from_f32(f32::from(byte) / 255.0))))
+/// Sets the state of the pixels that a map marks; ignored pixels stay so.
+fn mark(states: &mut Image<PixelState>, map: Option<&Image<bool>>, state: PixelState, marks: impl Fn(bool) -> bool) {
+    let Some(map) = map else { return };
+    for (own, value) in states.pixels_mut().iter_mut().zip(map.pixels()) {
+        if marks(*value) && *own != PixelState::Ignored {
+            *own = state;
         }
-        _ => Photo::Srgb8(bytes),
-    };
-    (photo, states)
+    }
 }
 
-fn from_floats(
+/// Radiance is finite and not negative: what is not is ignored or taken as 0.
+fn checked_floats(
     mut image: RgbImage,
-    encoding: ColourEncoding,
-    as_half: bool,
+    is_float: bool,
     view: &SourceView,
     findings: &mut Vec<Finding>,
-) -> (Photo, Image<PixelState>) {
+    shared: &mut Vec<Finding>,
+) -> (RgbImage, Image<PixelState>) {
     let mut states = Image::filled(image.width(), image.height(), PixelState::Surface);
     let width = image.width();
     let (mut not_finite, mut negative) = (0usize, 0usize);
@@ -107,9 +181,6 @@ fn from_floats(
         } else if pixel.min_element() < 0.0 {
             negative += 1;
             *pixel = pixel.max(Vec3::ZERO);
-        }
-        if encoding == ColourEncoding::Srgb {
-            *pixel = pixel.map(crate::image::transfer::linear_from_srgb);
         }
     }
     if not_finite > 0 {
@@ -127,7 +198,7 @@ fn from_floats(
             .remedy("render or export the photo again if they matter"),
         );
     }
-    if negative > 0 {
+    if negative > 0 && is_float {
         findings.push(
             Finding::new(
                 Severity::Note,
@@ -136,7 +207,18 @@ fn from_floats(
             )
             .at(Place::View(view.name.clone())),
         );
+    } else if negative > 0 {
+        shared.push(Finding::new(
+            Severity::Note,
+            "colour-out-of-gamut",
+            "some colours lie outside Rec. 709: their negative channels are taken as 0",
+        ));
     }
+    (image, states)
+}
+
+/// The smallest form that keeps what the file says. `of_bytes` photos are eight-bit photographs in another colour space.
+fn kept(image: RgbImage, mut states: Image<PixelState>, of_bytes: bool, as_half: bool) -> (Photo, Image<PixelState>) {
     let survives_half = |value: f32| f16::from_f32(value).to_f32() == value;
     if as_half || image.pixels().iter().all(|pixel| pixel.to_array().into_iter().all(survives_half)) {
         for (pixel, state) in image.pixels().iter().zip(states.pixels_mut()) {
@@ -144,7 +226,8 @@ fn from_floats(
                 *state = PixelState::SurfaceClipped;
             }
         }
-        return (Photo::Linear16(image.map(|pixel| to_half(*pixel))), states);
+        let half = image.map(|pixel| to_half(*pixel));
+        return (if of_bytes { Photo::MeanOfSrgb8(half) } else { Photo::Linear16(half) }, states);
     }
     (Photo::Linear32(image), states)
 }
@@ -153,17 +236,53 @@ fn to_half(pixel: Vec3) -> [f16; 3] {
     pixel.min(Vec3::splat(f16::MAX.to_f32())).to_array().map(f16::from_f32)
 }
 
-/// Turns the states of masked pixels to background.
+/// Turns the states of pixels with less than half of their opacity to background.
+///
+/// Floats were multiplied by their opacity, so that those with some of it are mixtures: evidence for neither side.
+fn apply_alpha(alpha: &GreyImage, is_float: bool, states: &mut Image<PixelState>, shared: &mut Vec<Finding>) {
+    /// What rounding leaves of 0 and 1.
+    const ROUNDING: f32 = 0.01;
+    let (least, most) = alpha.pixels().iter().fold((1f32, 0f32), |(a, b), &value| (a.min(value), b.max(value)));
+    if least >= 1.0 - ROUNDING {
+        return;
+    }
+    if most <= ROUNDING {
+        let message = "the opacity is 0 all over the photo: it is not used";
+        shared.push(Finding::new(Severity::Warning, "alpha-empty", message).remedy("export the photo without alpha"));
+        return;
+    }
+    for (state, &alpha) in states.pixels_mut().iter_mut().zip(alpha.pixels()) {
+        let is_mixture = is_float && alpha > ROUNDING && alpha < 1.0 - ROUNDING;
+        *state = match *state {
+            PixelState::Ignored => PixelState::Ignored,
+            _ if is_mixture || alpha.is_nan() => PixelState::Ignored,
+            PixelState::Surface if alpha < 0.5 => PixelState::Background,
+            PixelState::SurfaceClipped if alpha < 0.5 => PixelState::BackgroundClipped,
+            state => state,
+        };
+    }
+    shared.push(
+        Finding::new(Severity::Note, "alpha-as-mask", "the opacity of the photo is its mask")
+            .remedy("ignore it with --masks ignore"),
+    );
+}
+
+/// Turns the states of masked pixels to background. `stored` is the size and the orientation of the photo's file: a mask may
+/// lie as the file does or as the camera sees it.
 fn apply_mask(
     path: &Path,
     view: &SourceView,
     photo: &Photo,
+    stored: ((usize, usize), u8),
     states: &mut Image<PixelState>,
     findings: &mut Vec<Finding>,
 ) -> Result<()> {
     let is_twin = path.file_stem().is_some_and(|stem| stem.to_string_lossy().ends_with("_masked"));
-    let mask = file::read_grey(path)?;
+    let mut mask = file::read_grey(path)?;
     let size = (photo.width(), photo.height());
+    if (mask.width(), mask.height()) != size && (mask.width(), mask.height()) == stored.0 {
+        mask = file::turned(mask, stored.1);
+    }
     if (mask.width(), mask.height()) != size {
         return Err(Error::new(
             ErrorKind::InvalidScene,

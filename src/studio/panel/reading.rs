@@ -1,6 +1,6 @@
 //! How the scene was read, and reading it again in another way.
 
-use crate::scene::settings::{BackgroundChoice, MaskUse, ReadSettings, Up};
+use crate::scene::settings::{BackgroundChoice, ColourEncoding, MaskUse, ReadSettings, Up};
 use crate::studio::model::Model;
 use egui::{CollapsingHeader, ComboBox, DragValue, Grid, RichText, Ui};
 use std::path::PathBuf;
@@ -44,6 +44,26 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ReadingMemory) {
             let mut used = chosen.masks == MaskUse::Use;
             ui.checkbox(&mut used, "").labelled_by(label.id);
             chosen.masks = if used { MaskUse::Use } else { MaskUse::Ignore };
+            ui.end_row();
+            let label = ui.label("Encoding").on_hover_text("How the numbers of the photos are encoded");
+            let names = [
+                (ColourEncoding::Auto, "By the file"),
+                (ColourEncoding::Srgb, "sRGB"),
+                (ColourEncoding::Linear, "Linear"),
+            ];
+            let name = names.iter().find(|(own, _)| *own == chosen.encoding).map_or("", |(_, name)| name);
+            let response = ComboBox::from_id_salt("encoding of photos").selected_text(name).show_ui(ui, |ui| {
+                for (own, name) in names {
+                    ui.selectable_value(&mut chosen.encoding, own, name);
+                }
+            });
+            response.response.labelled_by(label.id);
+            ui.end_row();
+            let label = ui.label("OpenEXR layer").on_hover_text("Name of the layer to read; empty for the radiance");
+            let mut layer = chosen.layer.clone().unwrap_or_default();
+            ui.add(egui::TextEdit::singleline(&mut layer).desired_width(120.0).hint_text("radiance"))
+                .labelled_by(label.id);
+            chosen.layer = (!layer.is_empty()).then_some(layer);
             ui.end_row();
             let label = ui.label("Background").on_hover_text("What pixels show where no surface is");
             let names = [

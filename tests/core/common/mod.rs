@@ -140,6 +140,7 @@ impl Trial {
             photo: Photo::Linear32(Image::filled(camera.width, camera.height, Vec3::ZERO)),
             states: Image::filled(camera.width, camera.height, PixelState::Surface),
             held_out: false,
+            exposure_prior_stops: None,
         });
         Scene {
             name: "trial".into(),

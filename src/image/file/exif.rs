@@ -1,0 +1,204 @@
+//! What EXIF says of a photo: how it lies, and how it was exposed. Also what the directories of a TIFF say before it is
+//! decoded: whether it is a camera's raw file.
+//!
+//! EXIF is a TIFF without pixels (CIPA DC-008, 4.6). A dozen tags of fixed size are wanted, so that the reader is this
+//! page: it borrows the bytes, follows no chain and takes no memory. What is damaged is as if it were not there.
+
+/// Facts of a photo.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Exif {
+    /// Orientation, 1 to 8: how the stored rows and columns lie in the upright picture (CIPA DC-008, table 3).
+    pub orientation: Option<u8>,
+    /// Time of exposure in seconds.
+    pub exposure_seconds: Option<f64>,
+    /// Focal length over the diameter of the aperture.
+    pub f_number: Option<f64>,
+    /// Sensitivity.
+    pub iso: Option<f64>,
+}
+
+impl Exif {
+    /// Logarithm to base 2 of what the exposure makes of a radiance, `log2(t S / (100 N²))`: the negative of the exposure
+    /// value at ISO 100. An unknown aperture or sensitivity counts as 1 or 100: phones have one aperture. `None` without a
+    /// time.
+    pub fn exposure_stops(&self) -> Option<f32> {
+        let stops = (self.exposure_seconds? * self.iso.unwrap_or(100.0) / 100.0).log2()
+            - 2.0 * self.f_number.unwrap_or(1.0).log2();
+        stops.is_finite().then_some(stops as f32)
+    }
+}
+
+const ORIENTATION: u16 = 274;
+const SUB_DIRECTORIES: u16 = 330;
+const EXIF_DIRECTORY: u16 = 0x8769;
+const EXPOSURE_TIME: u16 = 33_434;
+const F_NUMBER: u16 = 33_437;
+const SENSITIVITY: u16 = 34_855;
+const DNG_VERSION: u16 = 50_706;
+const SUBFILE_TYPE: u16 = 254;
+const PHOTOMETRIC: u16 = 262;
+/// Colour filter array and linear raw, the kinds of pixels of raw files (TIFF/EP; DNG 1.7).
+const RAW_PHOTOMETRICS: [f64; 2] = [32_803.0, 34_892.0];
+/// Directories beside the first that are looked at.
+const MOST_SUB_DIRECTORIES: usize = 8;
+
+/// Reads the EXIF block of a JPEG or PNG, with or without the six letters before it, or a whole TIFF.
+pub fn read(bytes: &[u8]) -> Exif {
+    let bytes = bytes.strip_prefix(b"Exif\0\0").unwrap_or(bytes);
+    let Some((tiff, first)) = Tiff::open(bytes) else { return Exif::default() };
+    let positive = |value: f64| (value > 0.0 && value.is_finite()).then_some(value);
+    let mut exif = Exif {
+        orientation: tiff.number(first, ORIENTATION, 0).filter(|v| (1.0..=8.0).contains(v)).map(|v| v as u8),
+        ..Exif::default()
+    };
+    if let Some(directory) = tiff.number(first, EXIF_DIRECTORY, 0) {
+        let directory = directory as usize;
+        let number = |tag| tiff.number(directory, tag, 0).and_then(positive);
+        exif.exposure_seconds = number(EXPOSURE_TIME);
+        exif.f_number = number(F_NUMBER);
+        exif.iso = number(SENSITIVITY);
+    }
+    exif
+}
+
+/// Whether a TIFF is a camera's raw file: DNG, or a directory with the pixels of a sensor, or a preview before all else.
+pub fn is_raw(bytes: &[u8]) -> bool {
+    let Some((tiff, first)) = Tiff::open(bytes) else { return false };
+    let raw_pixels = |directory| {
+        tiff.number(directory, PHOTOMETRIC, 0).is_some_and(|photometric| RAW_PHOTOMETRICS.contains(&photometric))
+    };
+    let is_preview = tiff.number(first, SUBFILE_TYPE, 0).is_some_and(|kind| kind as u64 & 1 == 1);
+    let sub_directories = (0..MOST_SUB_DIRECTORIES).map_while(|index| tiff.number(first, SUB_DIRECTORIES, index));
+    bytes.get(8..10) == Some(b"CR")
+        || tiff.number(first, DNG_VERSION, 0).is_some()
+        || raw_pixels(first)
+        || sub_directories.into_iter().any(|directory| is_preview || raw_pixels(directory as usize))
+}
+
+/// The bytes of a TIFF with offsets of four bytes.
+struct Tiff<'a> {
+    bytes: &'a [u8],
+    little_endian: bool,
+}
+
+impl<'a> Tiff<'a> {
+    /// The file and the place of its first directory.
+    fn open(bytes: &'a [u8]) -> Option<(Self, usize)> {
+        let little_endian = match bytes.get(..4)? {
+            b"II*\0" => true,
+            b"MM\0*" => false,
+            _ => return None,
+        };
+        let tiff = Tiff { bytes, little_endian };
+        let first = tiff.u32(4)? as usize;
+        Some((tiff, first))
+    }
+
+    fn u16(&self, place: usize) -> Option<u16> {
+        let bytes: [u8; 2] = self.bytes.get(place..place.checked_add(2)?)?.try_into().ok()?;
+        Some(if self.little_endian { u16::from_le_bytes(bytes) } else { u16::from_be_bytes(bytes) })
+    }
+
+    fn u32(&self, place: usize) -> Option<u32> {
+        let bytes: [u8; 4] = self.bytes.get(place..place.checked_add(4)?)?.try_into().ok()?;
+        Some(if self.little_endian { u32::from_le_bytes(bytes) } else { u32::from_be_bytes(bytes) })
+    }
+
+    /// The number `index` of a tag in a directory.
+    fn number(&self, directory: usize, tag: u16, index: usize) -> Option<f64> {
+        let entries = usize::from(self.u16(directory)?);
+        let entry = (0..entries)
+            .map_while(|entry| directory.checked_add(2 + 12 * entry))
+            .find(|&entry| self.u16(entry) == Some(tag))?;
+        let kind = self.u16(entry + 2)?;
+        let size = match kind {
+            1 | 7 => 1,
+            3 => 2,
+            4 | 13 => 4,
+            5 | 10 => 8,
+            _ => return None,
+        };
+        let count = self.u32(entry + 4)? as usize;
+        if index >= count {
+            return None;
+        }
+        let inside = count.checked_mul(size)? <= 4;
+        let place = if inside { entry + 8 } else { self.u32(entry + 8)? as usize };
+        let place = place.checked_add(index.checked_mul(size)?)?;
+        match kind {
+            1 | 7 => self.bytes.get(place).map(|&byte| f64::from(byte)),
+            3 => self.u16(place).map(f64::from),
+            4 | 13 => self.u32(place).map(f64::from),
+            5 => Some(f64::from(self.u32(place)?) / f64::from(self.u32(place.checked_add(4)?)?)),
+            _ => Some(f64::from(self.u32(place)? as i32) / f64::from(self.u32(place.checked_add(4)?)? as i32)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An EXIF block with an orientation and an exposure, in either byte order.
+    fn block(little_endian: bool) -> Vec<u8> {
+        let two = |value: u16| if little_endian { value.to_le_bytes() } else { value.to_be_bytes() };
+        let four = |value: u32| if little_endian { value.to_le_bytes() } else { value.to_be_bytes() };
+        let mut bytes = if little_endian { b"II*\0".to_vec() } else { b"MM\0*".to_vec() };
+        let short = |bytes: &mut Vec<u8>, tag: u16, value: u16| {
+            bytes.extend([two(tag), two(3)].concat());
+            bytes.extend(four(1));
+            bytes.extend([two(value), two(0)].concat());
+        };
+        let long = |bytes: &mut Vec<u8>, tag: u16, kind: u16, value: u32| {
+            bytes.extend([two(tag), two(kind)].concat());
+            bytes.extend([four(1), four(value)].concat());
+        };
+        bytes.extend(four(8));
+        bytes.extend(two(2));
+        short(&mut bytes, ORIENTATION, 6);
+        long(&mut bytes, EXIF_DIRECTORY, 4, 38);
+        bytes.extend(four(0));
+        assert_eq!(bytes.len(), 38);
+        bytes.extend(two(3));
+        long(&mut bytes, EXPOSURE_TIME, 5, 80);
+        long(&mut bytes, F_NUMBER, 5, 88);
+        short(&mut bytes, SENSITIVITY, 400);
+        bytes.extend(four(0));
+        assert_eq!(bytes.len(), 80);
+        bytes.extend([four(1), four(8), four(28), four(10)].concat());
+        bytes
+    }
+
+    #[test]
+    fn orientation_and_exposure_are_read_in_both_byte_orders() {
+        for bytes in [block(true), block(false), [b"Exif\0\0".to_vec(), block(true)].concat()] {
+            let exif = read(&bytes);
+            assert_eq!(exif.orientation, Some(6));
+            assert_eq!((exif.exposure_seconds, exif.f_number, exif.iso), (Some(0.125), Some(2.8), Some(400.0)));
+            // An eighth of a second is -3 stops, ISO 400 is +2, f/2.8 is -2.97.
+            let stops = exif.exposure_stops().unwrap();
+            assert!((stops - (-1.0 - 2.0 * 2.8f32.log2())).abs() < 1e-5, "{stops}");
+            assert!(!is_raw(&bytes));
+        }
+        assert_eq!(Exif::default().exposure_stops(), None);
+    }
+
+    #[test]
+    fn every_cut_and_every_changed_byte_is_survived() {
+        let bytes = block(true);
+        for length in 0..bytes.len() {
+            let exif = read(&bytes[..length]);
+            assert!(exif.exposure_stops().is_none_or(f32::is_finite));
+        }
+        for place in 0..bytes.len() {
+            for value in [0, 1, 0x7f, 0xff] {
+                let mut changed = bytes.clone();
+                changed[place] = value;
+                let exif = read(&changed);
+                assert!(exif.exposure_stops().is_none_or(f32::is_finite));
+                assert!(exif.orientation.is_none_or(|orientation| (1..=8).contains(&orientation)));
+                is_raw(&changed);
+            }
+        }
+    }
+}

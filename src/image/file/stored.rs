@@ -1,0 +1,321 @@
+//! Pixels as PNG, JPEG and TIFF hold them, before curves and matrices; and the way from there to linear Rec. 709.
+
+use super::colour::{ColourSpace, Curve};
+use super::photo::{Encoding, PhotoFile, PhotoPixels};
+use super::profile::{self, Profile};
+use super::source::{Format, Source};
+use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::image::{GreyImage, Image, RgbImage};
+use glam::Vec3;
+
+/// From here on a channel of 8 bits is clipped, and one of 16 bits at the same share of full scale: cameras and JPEG move a
+/// saturated value by a step.
+const CLIPPED_BYTE: u8 = 254;
+
+/// Samples in row-major order, the channels of a pixel side by side.
+pub enum Samples {
+    /// 8 bits.
+    Bytes(Vec<u8>),
+    /// 16 bits.
+    Words(Vec<u16>),
+    /// Floats.
+    Floats(Vec<f32>),
+}
+
+impl Samples {
+    fn len(&self) -> usize {
+        match self {
+            Samples::Bytes(values) => values.len(),
+            Samples::Words(values) => values.len(),
+            Samples::Floats(values) => values.len(),
+        }
+    }
+
+    /// A sample as share of full scale; floats as they are.
+    fn share(&self, index: usize) -> f32 {
+        match self {
+            Samples::Bytes(values) => f32::from(values[index]) / 255.0,
+            Samples::Words(values) => f32::from(values[index]) / 65_535.0,
+            Samples::Floats(values) => values[index],
+        }
+    }
+}
+
+/// What a decoder hands over.
+pub struct Stored {
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// Channels of a pixel: grey, grey and alpha, colour, colour and alpha.
+    pub channels: usize,
+    /// The samples.
+    pub samples: Samples,
+    /// Whether the last of two or four channels is opacity; otherwise it is of unknown meaning and left out.
+    pub has_alpha: bool,
+    /// Whether colours were multiplied by the opacity.
+    pub is_premultiplied: bool,
+    /// The embedded profile.
+    pub icc: Option<Vec<u8>>,
+    /// What the file declares without a profile.
+    pub declared: Option<ColourSpace>,
+    /// What was noticed.
+    pub findings: Vec<Finding>,
+}
+
+impl Stored {
+    /// Errors where the samples are not those of a whole picture of the source's size.
+    pub fn checked(self, source: &Source) -> Result<Self> {
+        let (width, height) = (self.width, self.height);
+        if self.samples.len() != width * height * self.channels
+            || !(1..=4).contains(&self.channels)
+            || (width, height) != (source.header.width, source.header.height)
+        {
+            return Err(super::source::implausible(
+                &source.path,
+                format!("the decoded image is not the {width} x {height} of its header"),
+            ));
+        }
+        Ok(self)
+    }
+
+    fn pixel_count(&self) -> usize {
+        self.width * self.height
+    }
+
+    /// The samples of a pixel's colour as shares of full scale; grey is repeated.
+    fn shares(&self, pixel: usize) -> Vec3 {
+        let first = pixel * self.channels;
+        match self.channels {
+            1 | 2 => Vec3::splat(self.samples.share(first)),
+            _ => Vec3::new(self.samples.share(first), self.samples.share(first + 1), self.samples.share(first + 2)),
+        }
+    }
+
+    /// Whether some channel of a pixel's colour is at full scale; floats have none.
+    fn is_clipped(&self, pixel: usize) -> bool {
+        let colours = if self.channels < 3 { 1 } else { 3 };
+        let range = pixel * self.channels..pixel * self.channels + colours;
+        match &self.samples {
+            Samples::Bytes(values) => values[range].iter().any(|&value| value >= CLIPPED_BYTE),
+            Samples::Words(values) => values[range].iter().any(|&value| value >= u16::from(CLIPPED_BYTE) * 257),
+            Samples::Floats(_) => false,
+        }
+    }
+
+    /// One value a pixel as stored; colour gives its luminance.
+    pub fn grey(&self) -> GreyImage {
+        let pixels = (0..self.pixel_count()).map(|pixel| super::grey_of_rgb(self.shares(pixel))).collect();
+        Image::from_pixels(self.width, self.height, pixels)
+    }
+
+    /// Opacity, where there is any.
+    fn alpha(&self) -> Option<GreyImage> {
+        let places = (self.has_alpha && matches!(self.channels, 2 | 4)).then(|| 0..self.pixel_count())?;
+        let last = self.channels - 1;
+        let values = places.map(|pixel| self.samples.share(pixel * self.channels + last)).collect();
+        Some(Image::from_pixels(self.width, self.height, values))
+    }
+
+    /// Bytes as stored, without alpha; 16 bits are rounded.
+    pub fn bytes(&self) -> Image<[u8; 3]> {
+        let byte = |index: usize| match &self.samples {
+            Samples::Bytes(values) => values[index],
+            samples => (samples.share(index) * 255.0 + 0.5) as u8,
+        };
+        let pixels = (0..self.pixel_count()).map(|pixel| {
+            let first = pixel * self.channels;
+            if self.channels < 3 { [byte(first); 3] } else { [byte(first), byte(first + 1), byte(first + 2)] }
+        });
+        Image::from_pixels(self.width, self.height, pixels.collect())
+    }
+
+    /// The photo in linear Rec. 709, or in bytes of sRGB where that is what the file holds.
+    pub fn into_photo(mut self, source: &Source, encoding: Encoding) -> Result<PhotoFile> {
+        let is_float = matches!(self.samples, Samples::Floats(_));
+        let mut findings = std::mem::take(&mut self.findings);
+        let told = interpretation(&self, source, encoding, is_float, &mut findings)?;
+        let alpha = self.alpha();
+        let clipped = (!is_float).then(|| {
+            let clipped = (0..self.pixel_count()).map(|pixel| self.is_clipped(pixel)).collect();
+            Image::from_pixels(self.width, self.height, clipped)
+        });
+        let is_eight_bit = matches!(self.samples, Samples::Bytes(_));
+        let premultiplied = alpha.as_ref().filter(|_| self.is_premultiplied);
+        let pixels = match told {
+            Interpretation::Space(space) if is_eight_bit && space.is_srgb() && premultiplied.is_none() => {
+                PhotoPixels::Srgb8(self.bytes())
+            }
+            told => PhotoPixels::Linear(self.linear(told, premultiplied)),
+        };
+        Ok(PhotoFile { pixels, is_eight_bit, clipped, alpha, findings, ..PhotoFile::default() })
+    }
+
+    /// Linear Rec. 709 of all pixels; colours that were multiplied by their opacity are divided by it.
+    fn linear(&self, told: Interpretation, premultiplied: Option<&GreyImage>) -> RgbImage {
+        let straight = |pixel: usize, shares: Vec3| match premultiplied.map(|alpha| alpha.pixels()[pixel]) {
+            Some(alpha) if alpha > 0.0 => (shares / alpha).min(Vec3::ONE),
+            _ => shares,
+        };
+        let shares = (0..self.pixel_count()).map(|pixel| straight(pixel, self.shares(pixel)));
+        let pixels: Vec<Vec3> = match told {
+            Interpretation::Tables(transform) => {
+                let shares: Vec<Vec3> = shares.collect();
+                profile::through_tables(transform.as_ref(), &shares).unwrap_or(shares)
+            }
+            Interpretation::Space(space) => {
+                let tables = Tables::new(&space, &self.samples, self.pixel_count());
+                let matrix = space.rec709_from_rgb;
+                shares
+                    .enumerate()
+                    .map(|(pixel, shares)| {
+                        let linear = match (&tables, premultiplied) {
+                            (Some(tables), None) => tables.linear(self, pixel),
+                            _ => Vec3::from_array(std::array::from_fn(|c| space.curves[c].linear(shares[c]))),
+                        };
+                        matrix.map_or(linear, |matrix| matrix * linear)
+                    })
+                    .collect()
+            }
+        };
+        Image::from_pixels(self.width, self.height, pixels)
+    }
+}
+
+/// The linear value of each integer, for each channel.
+struct Tables([Vec<f32>; 3]);
+
+impl Tables {
+    /// `None` for floats, and where a table would have more entries than there are pixels.
+    fn new(space: &ColourSpace, samples: &Samples, pixels: usize) -> Option<Self> {
+        let last = match samples {
+            Samples::Bytes(_) => u8::MAX.into(),
+            Samples::Words(_) => u16::MAX,
+            Samples::Floats(_) => return None,
+        };
+        if pixels < usize::from(last) {
+            return None;
+        }
+        let table = |curve: &Curve| -> Vec<f32> {
+            (0..=last).map(|value| curve.linear(f32::from(value) / f32::from(last))).collect()
+        };
+        let [red, green, blue] = &space.curves;
+        let first = table(red);
+        let other = |curve: &Curve| if curve == red { first.clone() } else { table(curve) };
+        Some(Tables([first.clone(), other(green), other(blue)]))
+    }
+
+    fn linear(&self, stored: &Stored, pixel: usize) -> Vec3 {
+        let at = |channel: usize| {
+            let index = pixel * stored.channels + if stored.channels < 3 { 0 } else { channel };
+            match &stored.samples {
+                Samples::Bytes(values) => self.0[channel][usize::from(values[index])],
+                Samples::Words(values) => self.0[channel][usize::from(values[index])],
+                Samples::Floats(values) => values[index],
+            }
+        };
+        Vec3::new(at(0), at(1), at(2))
+    }
+}
+
+/// How the samples are to be understood.
+enum Interpretation {
+    Space(ColourSpace),
+    Tables(std::sync::Arc<moxcms::TransformF32Executor>),
+}
+
+/// By what the user says of the curve, then the profile, then what the file declares, then the kind of the numbers.
+fn interpretation(
+    stored: &Stored,
+    source: &Source,
+    encoding: Encoding,
+    is_float: bool,
+    findings: &mut Vec<Finding>,
+) -> Result<Interpretation> {
+    let curve = match encoding {
+        Encoding::Auto => None,
+        Encoding::Srgb => Some(Curve::Srgb),
+        Encoding::Linear => Some(Curve::Linear),
+    };
+    let with_curve = |space: ColourSpace| match &curve {
+        Some(curve) => ColourSpace {
+            curves: [curve.clone(), curve.clone(), curve.clone()],
+            rec709_from_rgb: space.rec709_from_rgb,
+        },
+        None => space,
+    };
+    let note = |code, message: String| Finding::new(Severity::Note, code, message);
+    let found = stored.icc.as_deref().map(|bytes| {
+        let read = super::guard::guarded(&source.path, || Ok(profile::read(bytes)));
+        (bytes.len(), read.ok().flatten())
+    });
+    let space = match found {
+        Some((_, Some(named))) => {
+            let name = if named.name.is_empty() { "without a name".into() } else { format!("'{}'", named.name) };
+            match named.profile {
+                Profile::Other(space) => return Err(refused(source, space)),
+                Profile::Tables(_) if curve.is_some() => {
+                    findings.push(note(
+                        "profile-set-aside",
+                        format!(
+                            "the colour profile {name} consists of tables: it is set aside since an encoding is given"
+                        ),
+                    ));
+                    ColourSpace::of_curve(Curve::Srgb)
+                }
+                Profile::Tables(transform) => {
+                    findings.push(note(
+                        "colour-converted",
+                        format!("colours are converted from the profile {name} to linear Rec. 709"),
+                    ));
+                    return Ok(Interpretation::Tables(transform));
+                }
+                Profile::Matrix(space) => {
+                    if !space.is_srgb() {
+                        findings.push(note(
+                            "colour-converted",
+                            format!("colours are converted from the profile {name} to linear Rec. 709"),
+                        ));
+                    }
+                    space
+                }
+            }
+        }
+        Some((length, None)) => {
+            findings.push(
+                Finding::new(
+                    Severity::Warning,
+                    "profile-damaged",
+                    format!("the colour profile of {length} bytes cannot be read: the photo is taken for sRGB"),
+                )
+                .remedy("export the photo again with an sRGB or Display P3 profile"),
+            );
+            ColourSpace::of_curve(if is_float { Curve::Linear } else { Curve::Srgb })
+        }
+        None => match &stored.declared {
+            Some(space) => {
+                findings.push(note(
+                    "colour-converted",
+                    "colours are converted from the gamma and primaries of the file to linear Rec. 709".into(),
+                ));
+                space.clone()
+            }
+            None if is_float => ColourSpace::of_curve(Curve::Linear),
+            None => {
+                // A PNG without a profile is one of sRGB by its standard; others may have lost theirs on the way.
+                if curve.is_none() && source.header.format != Format::Png {
+                    findings.push(note("profile-missing", "no colour profile is embedded: taken for sRGB".into()));
+                }
+                ColourSpace::of_curve(Curve::Srgb)
+            }
+        },
+    };
+    Ok(Interpretation::Space(with_curve(space)))
+}
+
+/// Colours that are not light: inks, or other spaces.
+pub fn refused(source: &Source, space: &str) -> Error {
+    Error::new(ErrorKind::Unsupported, format!("the photo is in {space}: its colours are not those of a camera"))
+        .at(Place::File(source.path.clone()))
+        .remedy("export it in RGB, with an sRGB or Display P3 profile")
+}

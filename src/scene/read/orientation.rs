@@ -1,0 +1,114 @@
+//! How a photo lies: as stored, or turned by its EXIF orientation. The camera decides.
+//!
+//! Programs that calibrate cameras disagree: some turn photos upright first, some take them as stored. A camera that is for
+//! the stored width and height wants the photo as stored; one for the exchanged sides wants it turned; another is for another
+//! photo. Where a source gives no size, the principal point tells: it lies near the middle of the picture.
+
+use super::source::SourceView;
+use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::image::file::{PhotoFile, swaps_sides};
+
+/// The photo as its camera sees it, and what was done as a finding without a place.
+///
+/// # Errors
+/// `InvalidScene` when the camera is for neither size, with all of them.
+pub fn as_the_camera_sees(photo: PhotoFile, view: &SourceView, shared: &mut Vec<Finding>) -> Result<PhotoFile> {
+    let (stored, tag) = (photo.size(), photo.orientation);
+    let swapped = (stored.1, stored.0);
+    let can_turn = swaps_sides(tag) && stored != swapped;
+    let turns = match view.size {
+        Some(size) if size == stored => false,
+        Some(size) if size == swapped && can_turn => true,
+        Some(size) => {
+            let turned = if can_turn {
+                format!(" ({} x {} when turned by its EXIF orientation {tag})", swapped.0, swapped.1)
+            } else {
+                String::new()
+            };
+            return Err(Error::new(
+                ErrorKind::InvalidScene,
+                format!(
+                    "the photo is {} x {}{turned} but its camera is for {} x {}",
+                    stored.0, stored.1, size.0, size.1
+                ),
+            )
+            .at(Place::File(view.photo.clone()))
+            .remedy("use the photos the cameras were made for, or scale the intrinsics with them"));
+        }
+        None => can_turn && distance_to_middle(view, swapped) < distance_to_middle(view, stored),
+    };
+    if tag == 1 {
+        return Ok(photo);
+    }
+    let (code, message) = if turns {
+        ("photo-turned", format!("turned by the EXIF orientation {tag}: the cameras are for the upright picture"))
+    } else if swaps_sides(tag) && !can_turn {
+        let message = "is not applied: the picture is square, so that the camera does not say whether to turn it";
+        ("photo-as-stored", format!("the EXIF orientation {tag} {message}"))
+    } else {
+        ("photo-as-stored", format!("the EXIF orientation {tag} is not applied: the cameras fit the picture as stored"))
+    };
+    let finding = Finding::new(Severity::Note, code, message);
+    shared.push(if turns { finding } else { finding.remedy("if photos lie on their side, turn them in an editor") });
+    Ok(if turns { photo.turned() } else { photo })
+}
+
+/// How far the principal point is from the middle of a picture, in widths and heights of it.
+fn distance_to_middle(view: &SourceView, size: (usize, usize)) -> f64 {
+    let along = |row: usize, length: usize| (view.camera.intrinsics.row(row).z / length.max(1) as f64 - 0.5).abs();
+    along(0, size.0) + along(1, size.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Image;
+    use crate::image::file::PhotoPixels;
+    use crate::scene::read::source::SourceCamera;
+    use glam::{DMat3, DVec3};
+
+    fn view(size: Option<(usize, usize)>, principal_point: (f64, f64)) -> SourceView {
+        let camera = SourceCamera {
+            intrinsics: DMat3::from_cols(
+                DVec3::new(9.0, 0.0, 0.0),
+                DVec3::new(0.0, 9.0, 0.0),
+                DVec3::new(principal_point.0, principal_point.1, 1.0),
+            ),
+            rotation: DMat3::IDENTITY,
+            translation: DVec3::ZERO,
+        };
+        let place = Place::Nowhere;
+        SourceView { name: "a".into(), photo: "a.jpg".into(), mask: None, camera, size, place }
+    }
+
+    fn photo(width: usize, height: usize, orientation: u8) -> PhotoFile {
+        let pixels = PhotoPixels::Srgb8(Image::filled(width, height, [0; 3]));
+        PhotoFile { pixels, orientation, ..PhotoFile::default() }
+    }
+
+    #[test]
+    fn the_camera_decides_by_its_size_or_its_principal_point() {
+        let seen = |tag, view: &SourceView| {
+            let mut told = Vec::new();
+            let photo = as_the_camera_sees(photo(6, 4, tag), view, &mut told).unwrap();
+            (photo.size(), told.first().map(|finding| finding.code))
+        };
+        let stored = view(Some((6, 4)), (3.0, 2.0));
+        let upright = view(Some((4, 6)), (2.0, 3.0));
+        assert_eq!(seen(1, &stored), ((6, 4), None));
+        assert_eq!(seen(6, &stored), ((6, 4), Some("photo-as-stored")));
+        assert_eq!(seen(8, &upright), ((4, 6), Some("photo-turned")));
+        assert_eq!(seen(3, &stored), ((6, 4), Some("photo-as-stored")));
+        assert_eq!(seen(6, &view(None, (1.5, 2.5))), ((4, 6), Some("photo-turned")));
+        assert_eq!(seen(6, &view(None, (2.6, 1.9))), ((6, 4), Some("photo-as-stored")));
+    }
+
+    #[test]
+    fn a_camera_for_another_photo_is_an_error_with_all_numbers() {
+        let error = as_the_camera_sees(photo(6, 4, 6), &view(Some((12, 8)), (6.0, 4.0)), &mut Vec::new()).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::InvalidScene);
+        assert!(error.message().contains("6 x 4 (4 x 6") && error.message().contains("12 x 8"), "{error}");
+        let error = as_the_camera_sees(photo(6, 4, 1), &view(Some((4, 6)), (2.0, 3.0)), &mut Vec::new()).unwrap_err();
+        assert!(error.message().contains("is 6 x 4 but"), "{error}");
+    }
+}
