@@ -57,5 +57,5 @@ class Scale:
     samples: int
 
 
-SCALES = {"full": Scale(192, 144, 36, 256, 256), "quarter": Scale(96, 72, 24, 128, 256)}
+SCALES = {"full": Scale(192, 144, 36, 256, 512), "quarter": Scale(96, 72, 24, 128, 1024)}
 HOLD_OUT_EVERY = 6
