@@ -1,4 +1,5 @@
 """The lobe against quadrature: its density integrates to the share of valid samples, its samples give its albedo."""
+import itertools
 import sys
 
 import numpy as np
@@ -20,12 +21,23 @@ def closed_form(rho_d, f0, r, i, o):
     return (rho_d / np.pi + d * f * g[0] * g[1] / (4 * i[2] * o[2])) * o[2]
 
 
+def closed_form_ggx(rho_d, f0, r, i, o):
+    """The same with the distribution of Trowbridge and Reitz and Smith's height-correlated masking."""
+    h = i + o
+    h /= np.linalg.norm(h, axis=0)
+    d = r / (np.pi * (h[2] ** 2 * (r - 1) + 1) ** 2)
+    f = f0 + (1 - f0) * (1 - (h * o).sum(0)) ** 5
+    masked = lambda c: (np.sqrt(1 + r * (1 - c * c) / (c * c)) - 1) / 2
+    return (rho_d / np.pi + d * f / (1 + masked(i[2]) + masked(o[2])) / (4 * i[2] * o[2])) * o[2]
+
+
 def main():
     mi, dr = ex.start()
     context, random, worst, bad = mi.BSDFContext(), np.random.default_rng(1), 0.0, 0
-    for rho_d, f0, r, theta in CASES:
+    kinds = (("modct", closed_form), ("ggx", closed_form_ggx))
+    for (kind, formula), (rho_d, f0, r, theta) in itertools.product(kinds, CASES):
         grey = lambda value: {"type": "uniform", "value": value}
-        lobe = mi.load_dict({"type": "modct", "diffuse": grey(rho_d), "specular": grey(f0), "roughness": grey(r)})
+        lobe = mi.load_dict({"type": kind, "diffuse": grey(rho_d), "specular": grey(f0), "roughness": grey(r)})
         i = np.array([np.sin(theta), 0.0, np.cos(theta)])
 
         def hit(count):
@@ -40,7 +52,7 @@ def main():
         out = mi.Vector3f(*(mi.Float(x.astype(np.float32)) for x in o))
         value, density = lobe.eval_pdf(context, hit(o.shape[1]), out)
         value, density = np.array(value)[0], np.array(density)
-        exact = closed_form(rho_d, f0, r, np.repeat(i[:, None], o.shape[1], 1), o)
+        exact = formula(rho_d, f0, r, np.repeat(i[:, None], o.shape[1], 1), o)
         departure = np.max(np.abs(value - exact) / (exact + 1e-3 * exact.max()))
         count = 2_000_000
         sample, weight = lobe.sample(context, hit(count), mi.Float(random.random(count, np.float32)),
@@ -51,7 +63,7 @@ def main():
         mass = density.astype(float).mean() * 2 * np.pi
         good = departure < 2e-3 and abs(z_albedo) < 4 and abs(mass - valid) < 3e-3
         bad += not good
-        print(f"rho_d {rho_d} F0 {f0} r {r} theta {theta}: eval off by {departure:.1e}, "
+        print(f"{kind}: rho_d {rho_d} F0 {f0} r {r} theta {theta}: eval off by {departure:.1e}, "
               f"density {mass:.4f} / valid {valid:.4f}, "
               f"albedo {albedo:.5f} sampled {weight.mean():.5f} +- {error:.1e}  {'ok' if good else 'BAD'}")
     sys.exit(int(bad > 0))

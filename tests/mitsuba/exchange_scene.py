@@ -18,9 +18,11 @@ def start(variant="llvm_ad_rgb"):
     mi, dr = mitsuba, drjit
     mi.set_variant(variant)
     mi.set_log_level(mi.LogLevel.Warn)
+    import ggx_lobe
     import modct
 
     modct.register()
+    ggx_lobe.register()
     return mi, dr
 
 
@@ -69,6 +71,10 @@ class Folder:
     def light(self, name="env"):
         return read_exr(self.folder / f"{name}.exr")[..., :3]
 
+    def light_of_photos(self):
+        """What the photos were taken under: env_full.exr where there is one, of which env.exr holds the means."""
+        return self.light("env_full" if (self.folder / "env_full.exr").exists() else "env")
+
     @property
     def background_is_visible(self):
         return self.facts.get("background", "black") == "environment"
@@ -114,7 +120,7 @@ def scene(folder, light, blend_log_width=False):
     maps = dict(folder.maps)
     if blend_log_width:
         maps["roughness"] = 0.5 * np.log(np.clip(maps["roughness"], 2.5e-5, 1.0))
-    lobe = {"type": "modct", "log_width": blend_log_width,
+    lobe = {"type": folder.facts.get("lobe", "modct"), "log_width": blend_log_width,
             "lobe_strength": float(folder.facts.get("lobe_strength", 1.0))}
     return mi.load_dict({
         "type": "scene",

@@ -33,11 +33,15 @@ def main():
     options = parser.parse_args()
     mi, dr = ex.start()
     folder = ex.Folder(options.scene)
+    # Before anything is rendered, so that a slip in the list ends the run at once.
+    relit = ex.chosen_views(options.relight_views, len(folder.views))
+    fill_folder(mi, dr, folder, options.spp, relit, options.direct)
+
+
+def fill_folder(mi, dr, folder, spp, relit, direct=0, sampler="independent"):
     depth, count = folder.facts["max_depth"], len(folder.views)
     hidden, visible_only = ex.integrator(depth, True), ex.integrator(1, False)
-    batches = max(1, options.spp // 64)
-    # Before anything is rendered, so that a slip in the list ends the run at once.
-    relit = ex.chosen_views(options.relight_views, count)
+    batches = max(1, spp // 64)
 
     def fill(name, world, how, views, seed):
         start = time.time()
@@ -45,11 +49,11 @@ def main():
         missing = [index for index, path in path_of.items() if not path.exists()]
         if missing:
             # Said before the first of them: the rest of a run that was cut off may find nothing left to render.
-            folder.save_facts(spp_ref=options.spp // batches * batches, roughness_interpolation="linear",
+            folder.save_facts(spp_ref=spp // batches * batches, roughness_interpolation="linear",
                               rendered_by=f"mitsuba {importlib.metadata.version('mitsuba')}")
         for index in missing:
-            path, camera = path_of[index], ex.sensor(folder.views[index])
-            picture, _ = ex.render(world, how, camera, options.spp, batches, seed * 4096 + index)
+            path, camera = path_of[index], ex.sensor(folder.views[index], sampler)
+            picture, _ = ex.render(world, how, camera, spp, batches, seed * 4096 + index)
             shown = folder.background_is_visible
             if shown and name in ("views", "relight"):
                 # The light itself is what paths of depth 1 carry; both parts have the same expectation as one render.
@@ -61,9 +65,9 @@ def main():
         print(f"{name}: {len(missing)} of {len(views)} pictures made, {time.time() - start:.1f} s, "
               f"load {os.getloadavg()[0]:.1f}", flush=True)
 
-    world = ex.scene(folder, folder.light())
+    world = ex.scene(folder, folder.light_of_photos())
     fill("views", world, hidden, range(count), 11)
-    fill("views_d2", world, ex.integrator(2, True), range(min(options.direct, count)), 12)
+    fill("views_d2", world, ex.integrator(2, True), range(min(direct, count)), 12)
     if (folder.folder / "env_heldout.exr").exists():
         other = ex.scene(folder, folder.light("env_heldout"))
         fill("relight", other, hidden, relit, 13)
@@ -102,4 +106,5 @@ def coverage_and_texels(folder, world, mi, dr):
     print(f"texels seen: {seen.mean():.3f}")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -95,6 +95,7 @@ class Problem:
         folder.maps = {name: self.values[name] for name in MAPS}
         # Whether there is a lobe is for the fit to find out.
         folder.facts["lobe_strength"] = 1.0
+        folder.facts["lobe"] = "modct"
         self.world = ex.scene(folder, self.values[NAME_OF_LIGHT])
         self.integrator = mi.load_dict({"type": "prb", "max_depth": depth, "rr_depth": 100000, "hide_emitters": hidden})
         self.parameters = mi.traverse(self.world)

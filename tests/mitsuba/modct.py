@@ -73,11 +73,19 @@ def lobe_class():
             s, d = self.strength * mi.luminance(self.schlick(f0, i.z)), mi.luminance(rho_d)
             return dr.clip(s / dr.maximum(s + d, 1e-6), 0.15 if self.strength > 0.0 else 0.0, 0.85)
 
-        def density(self, surface, i, o):
+        def density_of_half(self, surface, h):
             e = dr.detach(surface[3])
+            return (e + 2.0) * dr.inv_two_pi * self.power_of_cosine(h, e) * h.z
+
+        def drawn_half(self, surface, uv):
+            """Sine, cosine and azimuth of a half vector: inverts the distribution of n.h, 1 - c^(e + 2)."""
+            e = dr.detach(surface[3])
+            cosine2 = dr.exp(2.0 * dr.log(dr.maximum(uv.y, 1e-12)) / (e + 2.0))
+            return dr.safe_sqrt(1.0 - cosine2), dr.sqrt(cosine2), dr.two_pi * uv.x
+
+        def density(self, surface, i, o):
             h = dr.normalize(i + o)
-            share = self.share_of_specular(surface, i)
-            half = (e + 2.0) * dr.inv_two_pi * self.power_of_cosine(h, e) * h.z
+            share, half = self.share_of_specular(surface, i), self.density_of_half(surface, h)
             return (1.0 - share) * o.z * dr.inv_pi + share * half / dr.maximum(4.0 * dr.dot(h, o), 1e-8)
 
         def eval_pdf(self, context, si, wo, active=True):
@@ -94,12 +102,9 @@ def lobe_class():
 
         def sample(self, context, si, which, uv, active=True):
             surface = self.surface(si, active)
-            e = dr.detach(surface[3])
             glossy = which < self.share_of_specular(surface, si.wi)
-            # Invert the distribution of n.h: 1 - c^(e + 2).
-            cosine2 = dr.exp(2.0 * dr.log(dr.maximum(uv.y, 1e-12)) / (e + 2.0))
-            sine, cosine = dr.safe_sqrt(1.0 - cosine2), dr.sqrt(cosine2)
-            sin_phi, cos_phi = dr.sincos(dr.two_pi * uv.x)
+            sine, cosine, azimuth = self.drawn_half(surface, uv)
+            sin_phi, cos_phi = dr.sincos(azimuth)
             h = mi.Vector3f(sine * cos_phi, sine * sin_phi, cosine)
             mirrored = 2.0 * dr.dot(si.wi, h) * h - si.wi
             wo = dr.detach(dr.select(glossy, mirrored, mi.warp.square_to_cosine_hemisphere(uv)))

@@ -19,6 +19,19 @@ def overlaps(fine, coarse):
     return np.maximum(high - low, 0.0)
 
 
+def means(fine, height):
+    """The map with `height` rows that keeps the energy through every cell, and the mean radiance over the sphere."""
+    rows, columns, width = *fine.shape[:2], 2 * height
+    # Heights on the sphere are even in area when counted by -cos(theta).
+    edges = lambda count: -np.cos(np.pi * np.arange(count + 1) / count)
+    down = overlaps(edges(rows), edges(height))
+    across = overlaps(np.linspace(0, 1, columns + 1), np.linspace(0, 1, width + 1))
+    energy = np.einsum("rh,rcx,cw->hwx", down, fine, across, optimize=True)
+    areas = down.sum(0)[:, None] * across.sum(0)[None, :]
+    light = energy / areas[..., None]
+    return light, (light * areas[..., None]).sum((0, 1)) / 2.0
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("source")
@@ -28,15 +41,7 @@ def main():
     options = parser.parse_args()
     ex.start("scalar_rgb")
     fine = ex.read_exr(options.source)[..., :3].astype(np.float64)
-    rows, columns, height, width = *fine.shape[:2], options.height, 2 * options.height
-    # Heights on the sphere are even in area when counted by -cos(theta).
-    edges = lambda count: -np.cos(np.pi * np.arange(count + 1) / count)
-    down = overlaps(edges(rows), edges(height))
-    across = overlaps(np.linspace(0, 1, columns + 1), np.linspace(0, 1, width + 1))
-    energy = np.einsum("rh,rcx,cw->hwx", down, fine, across, optimize=True)
-    areas = down.sum(0)[:, None] * across.sum(0)[None, :]
-    light = energy / areas[..., None]
-    mean = (light * areas[..., None]).sum((0, 1)) / 2.0
+    light, mean = means(fine, options.height)
     if options.mean is not None:
         factor = options.mean / (mean @ [0.2126, 0.7152, 0.0722])
         light, mean = factor * light, factor * mean
@@ -44,4 +49,5 @@ def main():
     print(f"{options.target}: mean {mean.round(4)}, largest {light.max():.1f}")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -68,4 +68,5 @@ def main():
     print(f"{options.target}: {len(triangles)} triangles, {atlas.chart_count} charts, {atlas.width} x {atlas.height}")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -5,12 +5,12 @@ use crate::cli::arguments::ReadOptions;
 use crate::cli::fit::stop_on_interrupt;
 use crate::error::{Error, Result};
 use crate::lab::contest::entry::{self, EntryOptions};
-use crate::lab::contest::{self, ContestOptions, Contestant};
+use crate::lab::contest::{self, ContestOptions, Contestant, all};
 use crate::lab::hard::{self, HardOptions};
 use crate::lab::scenes::hard::HardCase;
 use crate::lab::tracer_speed::{self, TracerOptions};
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -19,8 +19,12 @@ use std::sync::atomic::AtomicBool;
 pub struct ContestArguments {
     /// Exchange folders with their truth; without one, the demo is made in code and written as one.
     pub scenes: Vec<PathBuf>,
-    /// The methods, in the order they run.
-    #[arg(long, value_enum, value_delimiter = ',', default_values_t = Contestant::ALL)]
+    /// Fit every scene of this folder once and make one table of scenes by measures, with means and standard errors. What
+    /// an earlier run left in the output folder is used again while program, scenes and options are the same.
+    #[arg(long, conflicts_with_all = ["scenes", "reuse", "seeds"])]
+    pub all: Option<PathBuf>,
+    /// The methods, in the order they run; all when not given, with --all the solver.
+    #[arg(long, value_enum, value_delimiter = ',')]
     pub methods: Vec<Contestant>,
     /// Wall-clock seconds that each fit may take, from the start of its process.
     #[arg(long, default_value_t = 600.0)]
@@ -31,7 +35,7 @@ pub struct ContestArguments {
     /// Number of seeds: 1, 2, 3 and so on.
     #[arg(long, default_value_t = 5)]
     pub seeds: usize,
-    /// A tiny demo when no scene is named.
+    /// A tiny demo when no scene is named; with --all, at most 20 s a fit and 3 pictures of each kind of 16 paths.
     #[arg(long)]
     pub quick: bool,
     /// Judge what an earlier contest left in the output folder, and run only what it lacks.
@@ -194,7 +198,7 @@ pub fn fit(options: &ContestArguments, json: bool, threads: Option<usize>) -> Re
     let contest = ContestOptions {
         scenes: options.scenes.clone(),
         read: options.read.settings(),
-        methods: options.methods.clone(),
+        methods: methods_of(options),
         seconds: options.seconds,
         at: options.at.clone(),
         seeds: options.seeds,
@@ -210,11 +214,42 @@ pub fn fit(options: &ContestArguments, json: bool, threads: Option<usize>) -> Re
         output: options.output.clone(),
     };
     let tell = teller("contest", json);
+    if let Some(folder) = &options.all {
+        return every(folder, contest, &stop, &tell, json);
+    }
     let result = contest::run(&contest, &stop, &tell)?;
     if !json {
         println!("{}", result.to_markdown());
     }
     tell(&format!("tables and plots: {}", options.output.display()));
+    Ok(())
+}
+
+fn methods_of(options: &ContestArguments) -> Vec<Contestant> {
+    match (options.methods.as_slice(), &options.all) {
+        ([], None) => Contestant::ALL.to_vec(),
+        ([], Some(_)) => vec![Contestant::Solver],
+        (named, _) => named.to_vec(),
+    }
+}
+
+/// Fits every scene of a folder and prints the table.
+fn every(folder: &Path, mut contest: ContestOptions, stop: &AtomicBool, tell: &dyn Fn(&str), json: bool) -> Result<()> {
+    if contest.quick {
+        contest.seconds = contest.seconds.min(20.0);
+        contest.samples = contest.samples.min(16);
+        contest.most_views = contest.most_views.min(3);
+    }
+    if contest.at.is_empty() {
+        // Doublings from half a second: first maps are looked for among them.
+        let doublings = std::iter::successors(Some(0.5), |due| Some(2.0 * due));
+        contest.at = doublings.take_while(|due| *due < contest.seconds).collect();
+    }
+    let table = all::run(folder, &contest, stop, tell)?;
+    if !json {
+        println!("{}", table.to_markdown());
+    }
+    tell(&format!("table: {}", contest.output.join("all.md").display()));
     Ok(())
 }
 

@@ -3,7 +3,7 @@
 use super::clock::Clock;
 use super::contestant::Contestant;
 use super::pace::Pace;
-use super::snapshot::{Progress, Snapshots};
+use super::snapshot::{self, Progress, Snapshots};
 use crate::error::{Error, ErrorKind, Result};
 use crate::fit::{FitSettings, Fitter, StepOutcome};
 use crate::render::Surface;
@@ -93,6 +93,9 @@ pub fn enter(options: &EntryOptions, stop: &AtomicBool, tell: &dyn Fn(&str)) -> 
     }
     let findings = fitter.findings().iter().map(ToString::to_string).collect();
     offer(&fitter, &mut snapshots, &mut clock, Some(findings))?;
+    if let Some(deviations) = fitter.deviations() {
+        snapshot::write_deviations(&options.output, &deviations)?;
+    }
     tell(&format!("{}: {} steps, {:.1} s", options.method.name(), fitter.state().step, clock.seconds()));
     Ok(())
 }

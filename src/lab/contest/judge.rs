@@ -7,6 +7,7 @@
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::image::{Image, RgbImage};
+use crate::insight::intervals::{IntervalCoverage, interval_coverage};
 use crate::insight::scores::AlignmentSums;
 use crate::insight::truth::{ErrorPair, environment_errors, map_errors};
 use crate::job::against_truth::resampled;
@@ -148,6 +149,26 @@ impl Judge {
         scores.extend(relit);
         scores.push(broken as f64);
         Ok(scores)
+    }
+
+    /// The error of training pictures alone: the first score, for a fraction of the work.
+    pub fn training_error(&self, maps: &MaterialMaps, light: &Environment, stop: &AtomicBool) -> f64 {
+        let photos = self.training.iter().map(|&view| {
+            let photo = &self.scene.views[view].photo;
+            (view, Image::from_fn(photo.width(), photo.height(), |row, column| photo.radiance(row, column)))
+        });
+        self.sums(&parameters(maps, light), photos, &mut 0, stop).rmse()
+    }
+
+    /// How often the 90 % intervals of stated deviations hold the truth; `None` where sizes do not agree.
+    ///
+    /// # Errors
+    /// Maps that do not belong to the scene.
+    pub fn intervals(&self, maps: &MaterialMaps, deviations: &MaterialMaps) -> Result<Option<IntervalCoverage>> {
+        let Some(truth) = &self.scene.truth else { return Ok(None) };
+        let (maps, deviations) = (resampled(maps, size_of(&truth.maps)), resampled(deviations, size_of(&truth.maps)));
+        let errors = map_errors(&maps, &truth.maps, &truth.texels_seen)?;
+        Ok(interval_coverage(&maps, &deviations, &truth.maps, &truth.texels_seen, &errors))
     }
 
     /// Sums over all pixels of some pictures, without the noise of ours.

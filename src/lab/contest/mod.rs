@@ -5,11 +5,15 @@
 //! is its counterpart. Both write [`snapshot`]s, timed by a [`clock`] that starts with the process; [`pace`] makes Adam
 //! end with its time. [`race`] starts the processes, [`judge`] scores what they wrote, [`tables`] and [`reach`] say it.
 //!
+//! [`all`] does so on every scene of a folder, and [`all_table`] is its one table of scenes by measures.
+//!
 //! What counts: seconds from the start of the process, reading and compiling included. What does not: writing snapshots,
 //! and judging, which is done afterwards. All begin from the same maps and light, of the same sizes, with the same views,
 //! and paths of the same length. Judges never see which method made a file. What it refuses to do: to compare methods on
 //! scenes without truth, and to hide one that could not run; the tables say so.
 
+pub mod all;
+pub mod all_table;
 pub mod clock;
 pub mod contestant;
 pub mod entry;

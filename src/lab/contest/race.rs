@@ -131,11 +131,7 @@ pub fn run(options: &ContestOptions, stop: &AtomicBool, tell: &dyn Fn(&str)) -> 
 fn able(options: &ContestOptions, contest: &mut Contest, tell: &dyn Fn(&str)) -> Vec<Contestant> {
     let mut able = Vec::new();
     for &method in &options.methods {
-        let trouble = match method {
-            Contestant::Mitsuba => mitsuba_trouble(options),
-            own => own.settings(&FitSettings::default()).is_none().then(|| "this build has no such method".to_string()),
-        };
-        match trouble {
+        match trouble_of(method, options) {
             None if !able.contains(&method) => able.push(method),
             None => {}
             Some(why) => {
@@ -146,6 +142,14 @@ fn able(options: &ContestOptions, contest: &mut Contest, tell: &dyn Fn(&str)) ->
         }
     }
     able
+}
+
+/// Why a method cannot run here, if so.
+pub(super) fn trouble_of(method: Contestant, options: &ContestOptions) -> Option<String> {
+    match method {
+        Contestant::Mitsuba => mitsuba_trouble(options),
+        own => own.settings(&FitSettings::default()).is_none().then(|| "this build has no such method".to_string()),
+    }
 }
 
 /// Why Mitsuba cannot run, if so.
@@ -200,7 +204,7 @@ fn built_in(options: &ContestOptions, stop: &AtomicBool) -> Result<PathBuf> {
 }
 
 /// Writes what every method begins from, at full size.
-fn write_start(scene: &Scene, base: &FitSettings, folder: &Path) -> Result<PathBuf> {
+pub(super) fn write_start(scene: &Scene, base: &FitSettings, folder: &Path) -> Result<PathBuf> {
     let settings = Contestant::Adam.settings(base).unwrap_or_else(|| base.clone());
     let surface = Arc::new(Surface::new(scene.mesh.clone())?);
     let fitter = Fitter::new(Arc::new(scene.clone()), surface, settings, None)?;
@@ -210,13 +214,20 @@ fn write_start(scene: &Scene, base: &FitSettings, folder: &Path) -> Result<PathB
     Ok(start)
 }
 
-struct Race<'a> {
-    options: &'a ContestOptions,
-    scene: &'a Path,
-    judge: &'a Judge,
-    start: &'a Path,
-    place: &'a Path,
-    seed: u64,
+/// One fit by a process of its own.
+pub(super) struct Race<'a> {
+    /// What is asked of it.
+    pub(super) options: &'a ContestOptions,
+    /// Folder of the scene it fits.
+    pub(super) scene: &'a Path,
+    /// Who scores; its scene names the views.
+    pub(super) judge: &'a Judge,
+    /// Folder of the maps and light that all begin from.
+    pub(super) start: &'a Path,
+    /// Folder of its snapshots.
+    pub(super) place: &'a Path,
+    /// Seed of the fit.
+    pub(super) seed: u64,
 }
 
 impl Race<'_> {
@@ -231,19 +242,27 @@ impl Race<'_> {
             return self.judge(method, contest, stop, tell);
         }
         tell(&format!("{scene}, seed {}: {} for {} s", self.seed, method.name(), self.options.seconds));
-        let mut command = match method {
-            Contestant::Mitsuba => self.script(),
-            own => self.program(own),
-        };
-        // A process that fails at once must not leave the list of an earlier one.
-        let _ = std::fs::remove_file(self.place.join("snapshots.jsonl"));
-        let trouble = wait(&mut command, stop)?;
+        let trouble = self.fit(method, stop)?;
         if let Some(trouble) = trouble {
             let note = format!("`{}` on {scene}, seed {}: {trouble}.", method.name(), self.seed);
             tell(&note);
             contest.notes.push(note);
         }
         self.judge(method, contest, stop, tell)
+    }
+
+    /// Runs the process of a method to its end; says what went wrong, if anything.
+    ///
+    /// # Errors
+    /// `Stopped` when `stop` is raised.
+    pub(super) fn fit(&self, method: Contestant, stop: &AtomicBool) -> Result<Option<String>> {
+        let mut command = match method {
+            Contestant::Mitsuba => self.script(),
+            own => self.program(own),
+        };
+        // A process that fails at once must not leave the list of an earlier one.
+        let _ = std::fs::remove_file(self.place.join("snapshots.jsonl"));
+        wait(&mut command, stop)
     }
 
     /// Judges what a method wrote.

@@ -12,6 +12,9 @@ use crate::material::MaterialMaps;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
+/// Folder of stated standard deviations beside the list.
+const DEVIATIONS: &str = "deviations";
+
 /// Figures of a snapshot.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Snapshot {
@@ -45,20 +48,39 @@ impl Snapshot {
 
 /// Maps and light of a folder.
 pub fn read_maps(folder: &Path) -> Result<(MaterialMaps, Environment)> {
-    let maps = MaterialMaps {
+    let maps = read_three(folder)?;
+    Ok((maps, Environment { radiance: read_rgb(&folder.join("env.exr"))? }))
+}
+
+fn read_three(folder: &Path) -> Result<MaterialMaps> {
+    Ok(MaterialMaps {
         diffuse: read_rgb(&folder.join("diffuse.exr"))?,
         specular: read_rgb(&folder.join("specular.exr"))?,
         roughness: read_grey(&folder.join("roughness.exr"))?,
-    };
-    Ok((maps, Environment { radiance: read_rgb(&folder.join("env.exr"))? }))
+    })
+}
+
+fn write_three(folder: &Path, maps: &MaterialMaps) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|source| Error::writing(folder, source))?;
+    write_exr_rgb(&folder.join("diffuse.exr"), &maps.diffuse)?;
+    write_exr_rgb(&folder.join("specular.exr"), &maps.specular)?;
+    write_exr_grey(&folder.join("roughness.exr"), &maps.roughness)
+}
+
+/// Writes the standard deviations a fit states at its end, as maps, beside its list.
+pub fn write_deviations(list_folder: &Path, deviations: &MaterialMaps) -> Result<()> {
+    write_three(&list_folder.join(DEVIATIONS), deviations)
+}
+
+/// The standard deviations a fit stated; `None` where it stated none.
+pub fn read_deviations(list_folder: &Path) -> Result<Option<MaterialMaps>> {
+    let folder = list_folder.join(DEVIATIONS);
+    if folder.join("roughness.exr").is_file() { read_three(&folder).map(Some) } else { Ok(None) }
 }
 
 /// Writes maps and light into a folder, which is made.
 pub fn write_maps(folder: &Path, maps: &MaterialMaps, light: &Environment) -> Result<()> {
-    std::fs::create_dir_all(folder).map_err(|source| Error::writing(folder, source))?;
-    write_exr_rgb(&folder.join("diffuse.exr"), &maps.diffuse)?;
-    write_exr_rgb(&folder.join("specular.exr"), &maps.specular)?;
-    write_exr_grey(&folder.join("roughness.exr"), &maps.roughness)?;
+    write_three(folder, maps)?;
     write_exr_rgb(&folder.join("env.exr"), &light.radiance)
 }
 
