@@ -10,7 +10,7 @@ use patina::image::{RgbImage, metrics};
 use patina::math::{luminance, statistics::quantile};
 use patina::scene::settings::{BackgroundChoice, ColourEncoding, MaskUse};
 use patina::scene::{PixelState, ReadSettings, Scene, View, read};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 fn scene(name: &str, settings: ReadSettings) -> Option<Scene> {
     Some(read(&cases()?.join(name), &ReadSettings { hold_out_every: 0, ..settings }).unwrap())

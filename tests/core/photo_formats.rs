@@ -1,5 +1,6 @@
 //! Photos of every format keep their precision, their colours and their place, and tell what was done to them.
 
+#![allow(clippy::type_complexity)]
 #![allow(clippy::unwrap_used)]
 
 use exr::prelude as openexr;

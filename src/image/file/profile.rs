@@ -15,6 +15,7 @@ use std::sync::Arc;
 const LARGEST_PROFILE: usize = 1 << 24;
 
 /// What an embedded profile says.
+#[allow(clippy::large_enum_variant, reason = "there is one for each file that is open")]
 pub enum Profile {
     /// Curves and a matrix.
     Matrix(ColourSpace),

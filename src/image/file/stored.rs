@@ -219,6 +219,7 @@ impl Tables {
 }
 
 /// How the samples are to be understood.
+#[allow(clippy::large_enum_variant, reason = "there is one for each file that is open")]
 enum Interpretation {
     Space(ColourSpace),
     Tables(std::sync::Arc<moxcms::TransformF32Executor>),

@@ -249,6 +249,7 @@ fn append(path: &Path, line: &Line) -> Result<()> {
 }
 
 #[cfg(test)]
+#[allow(clippy::disallowed_methods)]
 mod tests {
     use super::*;
 

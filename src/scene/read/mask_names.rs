@@ -180,6 +180,7 @@ pub fn beside_photos(photos: &BTreeMap<String, PathBuf>) -> Vec<(String, String)
 }
 
 #[cfg(test)]
+#[allow(clippy::disallowed_methods)]
 mod tests {
     use super::*;
 
