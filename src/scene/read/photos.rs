@@ -31,26 +31,14 @@ pub struct LoadedPhoto {
 
 /// Decodes all views; the first error in the order of `views` is returned.
 pub fn load_all(views: &[SourceView], encoding: ColourEncoding, settings: &ReadSettings) -> Result<Vec<LoadedPhoto>> {
-    let sizes: Vec<_> = views.par_iter().map(check_size).collect::<Vec<_>>().into_iter().collect::<Result<_>>()?;
+    let size = |view: &SourceView| file::read_size(&view.photo);
+    let sizes: Vec<_> = views.par_iter().map(size).collect::<Vec<_>>().into_iter().collect::<Result<_>>()?;
     let pixels: usize = sizes.iter().map(|(width, height)| width * height).sum();
     let shrink = settings.shrink;
     let as_half = pixels / (shrink * shrink) * std::mem::size_of::<Vec3>() > MOST_FLOAT_BYTES;
     let loaded: Vec<Result<LoadedPhoto>> =
         views.par_iter().map(|view| load(view, encoding, settings, as_half)).collect();
     loaded.into_iter().collect()
-}
-
-fn check_size(view: &SourceView) -> Result<(usize, usize)> {
-    let size = file::read_size(&view.photo)?;
-    if let Some(claimed) = view.size.filter(|claimed| *claimed != size) {
-        return Err(Error::new(
-            ErrorKind::InvalidScene,
-            format!("the photo is {} x {} but its camera is for {} x {}", size.0, size.1, claimed.0, claimed.1),
-        )
-        .at(Place::File(view.photo.clone()))
-        .remedy("use the photos the cameras were made for, or scale the intrinsics with them"));
-    }
-    Ok(size)
 }
 
 fn load(view: &SourceView, encoding: ColourEncoding, settings: &ReadSettings, as_half: bool) -> Result<LoadedPhoto> {
