@@ -21,6 +21,7 @@ pub mod background;
 pub mod contest;
 pub mod demo;
 pub mod entanglement;
+mod explained;
 mod facts;
 pub mod gallery;
 pub mod gauge;
