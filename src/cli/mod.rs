@@ -4,7 +4,17 @@
 //! [`contest`] holds methods against each other, [`study`] runs studies, [`measured`] is for measured reflectance and
 //! [`neural`] for its neural model, [`object`] is object mode, [`gauge`] moves the scale of a run,
 //! [`turntable`] belongs to `relight`, [`commands`] holds
-//! the rest. Whatever is asked here can be asked of the library in the same words.
+//! the rest; `say` writes lines where somebody listens, `threads` starts what everything works on. Whatever is asked here can be asked of the library in the same words.
+
+/// A line on standard output; lost where nobody listens, see [`say`].
+macro_rules! println {
+    ($($text:tt)*) => { $crate::cli::say::out(format_args!($($text)*)) };
+}
+
+/// A line on standard error; lost where nobody listens, see [`say`].
+macro_rules! eprintln {
+    ($($text:tt)*) => { $crate::cli::say::error(format_args!($($text)*)) };
+}
 
 pub mod arguments;
 pub mod commands;
@@ -15,7 +25,9 @@ pub mod measure;
 pub mod measured;
 pub mod neural;
 pub mod object;
+mod say;
 pub mod study;
+mod threads;
 pub mod turntable;
 
 use crate::error::{Error, ErrorKind, Result};
@@ -34,11 +46,14 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             return ExitCode::from(if usage.use_stderr() { 2 } else { 0 });
         }
     };
-    if let Some(threads) = arguments.threads {
-        // Fails only when a pool exists already, as in tests: then that one serves.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
-    }
     let json = arguments.json;
+    match threads::start(arguments.threads) {
+        Ok(told) => commands::tell_findings(told.as_slice(), json),
+        Err(error) => {
+            show(&error, json);
+            return ExitCode::from(1);
+        }
+    }
     let outcome = match arguments.task {
         Some(Task::Demo(options)) => fit::demo(&options, json),
         Some(Task::Fit(options)) => fit::fit(&options, json),
