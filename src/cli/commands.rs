@@ -61,7 +61,9 @@ pub fn check(options: &CheckOptions, json: bool) -> Result<()> {
         }
         if let Some(light) = report.light.as_ref().filter(|light| light.kind() == doctor::lights::LightKind::One) {
             let share = 100.0 * light.of_each;
-            println!("the light is one: another for each photo would explain {share:.0} % of what differs in its shading");
+            println!(
+                "the light is one: another for each photo would explain {share:.0} % of what differs in its shading"
+            );
         }
         for finding in &report.findings {
             println!("{finding}");
