@@ -255,9 +255,8 @@ fn line_of(event: &Event) -> serde_json::Value {
 }
 
 /// Findings that are repeated when a fit has ended.
-const SPOILS_ALL: [&str; 9] = [
+const SPOILS_ALL: [&str; 8] = [
     "intrinsics-scaled",
-    "light-differs",
     "light-in-groups",
     "light-turns-with-camera",
     "photo-turned",

@@ -11,8 +11,9 @@
 //! that stands still in the cameras, or as one vector for each run of photos in the order of their names. The share of
 //! the squared residuals that each of these takes away decides.
 //!
-//! It refuses to judge where the photos share too little, and it takes no gloss for a light: a highlight's mean pull is
-//! towards the camera alone, and small.
+//! It refuses to judge where the photos share too little, and it takes no gloss for a light: what a light must explain is
+//! larger than what highlights leave. Of a metal, all of whose light is mirrored, a turning light is not told: its shading
+//! goes with the mirrored direction, not with the normal.
 
 use super::Report;
 use super::probe::{Probe, surface_at};
@@ -37,12 +38,16 @@ const DARK: f32 = 2e-3;
 const LEAST_SHARE: f64 = 0.25;
 /// Share of what a light of its own for each photo takes away that the simpler explanation must reach.
 const LEAST_PART: f64 = 0.55;
+/// Root mean square of what it takes away, in natural logarithms of radiance: gloss under one light comes to 0.1.
+const LEAST_SIZE: f64 = 0.15;
 /// Rounds of weighting.
 const ROUNDS: usize = 4;
 
 /// How the shading of the photos goes with the cameras.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct LightCheck {
+    /// Root mean square of what one light leaves of the logarithms of radiance.
+    pub one_light_residual: f64,
     /// Share of the squared residuals under one light that a light standing still in the cameras takes away, in [0, 1].
     pub with_camera: f64,
     /// The same for the best cut of the photos, in the order of their names, into two groups with a light each.
@@ -62,20 +67,19 @@ pub enum LightKind {
     WithCamera,
     /// One for each of two groups of photos.
     InGroups,
-    /// Another one in each photo.
-    OfEach,
 }
 
 impl LightCheck {
     /// Which explanation is believed: the simplest that is as good as any.
     pub fn kind(&self) -> LightKind {
-        let explained = |share: f64| share > LEAST_SHARE && share > LEAST_PART * self.of_each;
+        let explained = |share: f64| {
+            let is_most = share > LEAST_SHARE && share > LEAST_PART * self.of_each;
+            is_most && self.one_light_residual * share.sqrt() > LEAST_SIZE
+        };
         if explained(self.with_camera) && self.with_camera >= self.in_groups {
             LightKind::WithCamera
         } else if explained(self.in_groups) {
             LightKind::InGroups
-        } else if self.of_each > 2.0 * LEAST_SHARE {
-            LightKind::OfEach
         } else {
             LightKind::One
         }
@@ -129,12 +133,6 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
         report.findings.push(
             Finding::new(Severity::Warning, "light-in-groups", message).at(Place::View(first.into())).remedy(remedy),
         );
-    } else if found.kind() == LightKind::OfEach {
-        let message = format!(
-            "the light differs from photo to photo: that explains {} of how the shading of the same surface differs",
-            percent(found.of_each)
-        );
-        report.findings.push(Finding::new(Severity::Warning, "light-differs", message).remedy(remedy));
     }
     report.light = Some(found);
 }
@@ -314,7 +312,9 @@ fn explain(points: &[Sighted], rotations: &[glam::DMat3]) -> Option<(LightCheck,
         })
         .min_by(|a, b| a.1.total_cmp(&b.1))?;
     let share = |residual: f64| if of_one > 0.0 { (1.0 - residual / of_one).clamp(0.0, 1.0) } else { 0.0 };
+    let total: f64 = weights.iter().flatten().sum();
     let found = LightCheck {
+        one_light_residual: (of_one / total.max(1e-12)).sqrt(),
         with_camera: share(of_camera),
         in_groups: share(of_groups),
         of_each: share(of_each),
