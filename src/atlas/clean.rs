@@ -8,6 +8,7 @@
 use super::topology::weld;
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::scene::Mesh;
+use crate::scene::read::outliers::bounds_of_most;
 use glam::DVec3;
 use std::collections::{HashMap, HashSet};
 
@@ -50,17 +51,19 @@ impl Cleaned {
 }
 
 /// Dissolves what is degenerate. `relative_distance` is the length below which an edge or the height of a face counts
-/// as none, in diagonals of the bounding box (rounded down to a power of two, so that cleaning twice is cleaning once).
+/// as none, in diagonals of the box around most of the mesh (rounded down to a power of two, so that cleaning twice is cleaning once).
 ///
 /// # Errors
 /// `InvalidScene` when the mesh is inconsistent, has no triangles, or none that has an area; `NonFinite` for a vertex that
 /// is not finite.
 pub fn dissolve_degenerate(mesh: &Mesh, relative_distance: f64) -> Result<Cleaned> {
     mesh.validate()?;
-    let Some((low, high)) = mesh.bounds() else {
+    // One vertex far from all others must not make short edges of theirs.
+    let points = mesh.triangles.iter().flatten().map(|&vertex| mesh.positions[vertex as usize].as_dvec3()).collect();
+    let Some((low, high)) = bounds_of_most(points) else {
         return Err(Error::new(ErrorKind::InvalidScene, "the mesh has no triangles").remedy("give a mesh with faces"));
     };
-    let diagonal = (high.as_dvec3() - low.as_dvec3()).length();
+    let diagonal = (high - low).length();
     let distance = if diagonal > 0.0 { (diagonal * relative_distance).log2().floor().exp2() } else { 0.0 };
     let mut work = Work::new(mesh, distance);
     let mut round = 0;

@@ -101,16 +101,20 @@ impl AtlasSettings {
             if good {
                 return Ok(());
             }
-            Err(Error::new(ErrorKind::InvalidSetting, format!("the value is outside {range}"))
-                .at(Place::Setting(name.into()))
+            // Of these only the size of the maps can be typed; the others stand in a settings file.
+            Err(Error::new(ErrorKind::InvalidSetting, format!("{name} of the atlas is outside {range}"))
                 .remedy(format!("give a value in {range}")))
         };
-        check("resolution", (8..=16384).contains(&self.resolution_texels), "8 to 16384 texels")?;
-        check("gutter", self.gutter_texels <= 64, "0 to 64 texels")?;
-        check("dissolve-distance", (0.0..=0.01).contains(&self.dissolve_distance), "0 to 0.01")?;
-        check("normal-spread", (0.01..=0.9).contains(&self.normal_spread), "0.01 to 0.9")?;
-        check("angle-distortion-limit", self.angle_distortion_limit > 1.0, "numbers above 1")?;
-        check("area-distortion-limit", self.area_distortion_limit > 1.0, "numbers above 1")
+        if !(8..=16384).contains(&self.resolution_texels) {
+            return Err(Error::new(ErrorKind::InvalidSetting, "the size of the maps is outside 8 to 16384 texels")
+                .at(Place::Setting("map-size".into()))
+                .remedy("give a value in 8 to 16384 texels"));
+        }
+        check("gutter_texels", self.gutter_texels <= 64, "0 to 64 texels")?;
+        check("dissolve_distance", (0.0..=0.01).contains(&self.dissolve_distance), "0 to 0.01")?;
+        check("normal_spread", (0.01..=0.9).contains(&self.normal_spread), "0.01 to 0.9")?;
+        check("angle_distortion_limit", self.angle_distortion_limit > 1.0, "numbers above 1")?;
+        check("area_distortion_limit", self.area_distortion_limit > 1.0, "numbers above 1")
     }
 }
 

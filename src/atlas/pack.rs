@@ -74,8 +74,8 @@ pub(crate) fn pack(
 
 fn does_not_fit(charts: usize, resolution: usize) -> Error {
     Error::new(ErrorKind::InvalidSetting, format!("{charts} charts do not fit on {resolution} x {resolution} texels"))
-        .at(Place::Setting("resolution".into()))
-        .remedy("raise the resolution or lower the gutter")
+        .at(Place::Setting("map-size".into()))
+        .remedy("give a larger --map-size, or a mesh of fewer parts")
 }
 
 fn chart_area(flat: &FlatChart) -> f64 {

@@ -21,8 +21,24 @@ use crate::trace::Bvh;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+/// Refuses a folder whose pictures a reader would take for photos or masks of the scene.
+fn refuse_folder_of_photos(output: &Path, scene: &Path) -> Result<()> {
+    let real = |path: &Path| std::fs::canonicalize(path).or_else(|_| std::path::absolute(path));
+    let Ok(output) = real(output) else { return Ok(()) };
+    let folders = crate::scene::read::picture_folders(scene)?;
+    if folders.iter().any(|folder| real(folder).is_ok_and(|folder| folder == output)) {
+        return Err(Error::new(ErrorKind::InvalidSetting, "the folder holds the photos or masks of the scene")
+            .at(Place::File(output))
+            .remedy("name another folder with --output: its pictures would be read as photos the next time"));
+    }
+    Ok(())
+}
+
 /// Checks a scene and prints what was found.
 pub fn check(options: &CheckOptions, json: bool) -> Result<()> {
+    if let Some(output) = &options.output {
+        refuse_folder_of_photos(output, &options.scene)?;
+    }
     let scene = crate::scene::read(&options.scene, &options.read.settings())?;
     let bvh = Bvh::build(&scene.mesh.positions, &scene.mesh.triangles)?;
     let report = doctor::check_with(&scene, &bvh);
@@ -30,7 +46,8 @@ pub fn check(options: &CheckOptions, json: bool) -> Result<()> {
         println!(
             "{}",
             serde_json::json!({"event": "check", "findings": report.findings, "views": report.views,
-            "texels_resolved": report.texels_resolved, "surface": report.surface})
+            "texels_resolved": report.texels_resolved, "surface": report.surface, "agreement": report.agreement,
+            "light": report.light})
         );
     } else {
         println!("{}: {} triangles, {} views", scene.name, scene.mesh.triangles.len(), scene.views.len());
@@ -38,6 +55,15 @@ pub fn check(options: &CheckOptions, json: bool) -> Result<()> {
             let size = Suited::to(&scene, &report).map_size.unwrap_or_default();
             let texels = number::whole(texels as u64);
             println!("the photos resolve some {texels} texels of the surface, about maps of {size} x {size}");
+        }
+        if let Some(agreement) = report.agreement {
+            println!("the photos agree by {agreement:.2} where they show the same surface (1 is alike)");
+        }
+        if let Some(light) = report.light.as_ref().filter(|light| light.kind() == doctor::lights::LightKind::One) {
+            let share = 100.0 * light.of_each;
+            println!(
+                "the light is one: another for each photo would explain {share:.0} % of what differs in its shading"
+            );
         }
         for finding in &report.findings {
             println!("{finding}");
@@ -98,7 +124,7 @@ pub(super) fn tell_written(path: &Path, json: bool) {
 }
 
 /// Says what was noticed, a line each.
-fn tell_findings(findings: &[Finding], json: bool) {
+pub(super) fn tell_findings(findings: &[Finding], json: bool) {
     for finding in findings {
         match json {
             true => println!("{}", serde_json::json!({"event": "finding", "finding": finding})),

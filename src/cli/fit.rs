@@ -16,7 +16,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Runs the demo.
 pub fn demo(options: &DemoOptions, json: bool) -> Result<()> {
-    let folder = RunFolder::create(&options.output)?;
+    let folder = RunFolder::create(&options.output)?.held()?;
     let stop = Arc::new(AtomicBool::new(false));
     stop_on_interrupt(Arc::clone(&stop));
     let mut settings = demo::settings();
@@ -43,12 +43,12 @@ pub fn demo(options: &DemoOptions, json: bool) -> Result<()> {
 pub fn fit(options: &FitOptions, json: bool) -> Result<()> {
     let AskedSettings { mut settings, chosen } = run_settings(options)?;
     settings.fit.validate()?;
-    let folder = RunFolder::create(&options.output)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    stop_on_interrupt(Arc::clone(&stop));
+    let folder = RunFolder::create(&options.output)?.held()?;
     if !json {
         eprintln!("reading and checking {}", settings.scene.display());
     }
-    let stop = Arc::new(AtomicBool::new(false));
-    stop_on_interrupt(Arc::clone(&stop));
     let mut told = Vec::new();
     let (prepared, fitter, settings) = with_bar(json, |tell| {
         let opened = open::open_scene(&settings.scene, &settings.read, &stop, tell)?;
@@ -110,7 +110,7 @@ fn absolute(path: &Path) -> PathBuf {
 
 /// Takes up a run.
 pub fn resume(options: &ResumeOptions, json: bool) -> Result<()> {
-    let folder = RunFolder::open(&options.run)?;
+    let folder = RunFolder::open(&options.run)?.held()?;
     let stop = Arc::new(AtomicBool::new(false));
     stop_on_interrupt(Arc::clone(&stop));
     let (prepared, fitter, settings) =
@@ -119,24 +119,43 @@ pub fn resume(options: &ResumeOptions, json: bool) -> Result<()> {
     watch(job, &folder, &stop, json)
 }
 
-/// Raises a flag on Ctrl-C; a second Ctrl-C ends the program at once.
+/// Raises a flag on Ctrl-C or SIGTERM; a second one ends the program at once. While something is opened, the program ends
+/// within half a second, whatever it is at.
 pub(crate) fn stop_on_interrupt(stop: Arc<AtomicBool>) {
     // Fails only if a handler exists already, as in tests.
     let _ = ctrlc::set_handler(move || {
         if stop.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
+        // What is opened may be deep in a file, a tree or an atlas, and nothing is written yet that could be half done.
+        for _ in 0..PATIENCE_ON_OPENING.as_millis() / 20 {
+            if !OPENING.load(Ordering::Relaxed) {
+                return;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+        if OPENING.load(Ordering::Relaxed) {
+            eprintln!("stopped before the fit began");
+            std::process::exit(3);
+        }
     });
 }
+
+/// Whether something is being opened: no file is written meanwhile.
+static OPENING: AtomicBool = AtomicBool::new(false);
+/// How long what is opened is waited for when a stop is asked for.
+const PATIENCE_ON_OPENING: std::time::Duration = std::time::Duration::from_millis(400);
 
 /// Shows how far something is that is opened.
 fn with_bar<T>(json: bool, work: impl FnOnce(Tell) -> Result<T>) -> Result<T> {
     let bar = if json { ProgressBar::hidden() } else { ProgressBar::new(1000) };
     bar.set_style(ProgressStyle::with_template("{msg} [{bar:30}] {percent} %").unwrap_or(ProgressStyle::default_bar()));
+    OPENING.store(true, Ordering::Relaxed);
     let outcome = work(&|stage: OpenStage, share: f32| {
         bar.set_message(stage.label());
         bar.set_position((share * 1000.0) as u64);
     });
+    OPENING.store(false, Ordering::Relaxed);
     bar.finish_and_clear();
     outcome
 }
@@ -171,17 +190,18 @@ fn watch(job: JobHandle, folder: &RunFolder, stop: &AtomicBool, json: bool) -> R
                 let row = &progress.row;
                 bar.set_position(row.step as u64);
                 bar.set_prefix(row.stage.clone());
-                let held_out = row.held_out_rmse.map_or(String::new(), |rmse| format!(", held-out RMSE {rmse:.4}"));
-                let rmse = row.image_loss.max(0.0).sqrt();
+                let held_out = row.held_out_rmse.map_or(String::new(), |rms| format!(", held-out residual {rms:.4}"));
+                // Of the pixels and the level of this step: another measure than the RMSE of whole photos at the end.
+                let residual = row.image_loss.max(0.0).sqrt();
                 let left = crate::insight::report::number::duration(progress.seconds_left);
                 bar.set_message(format!(
-                    "RMSE {rmse:.4}{held_out}, {:.1} steps/s, {left} left",
+                    "residual (RMS) {residual:.4}{held_out}, {:.1} steps/s, {left} left",
                     progress.steps_per_second
                 ));
                 // Without a terminal a bar shows nothing: a line now and then does.
                 if !json && bar.is_hidden() && (last_line.elapsed().as_secs() >= 5 || row.held_out_rmse.is_some()) {
                     eprintln!(
-                        "{} step {} of {}: RMSE {rmse:.4}{held_out}, {left} left",
+                        "{} step {} of {}: residual (RMS) {residual:.4}{held_out}, {left} left",
                         row.stage, row.step, progress.steps_total
                     );
                     last_line = std::time::Instant::now();
@@ -233,6 +253,18 @@ fn line_of(event: &Event) -> serde_json::Value {
     }
 }
 
+/// Findings that are repeated when a fit has ended.
+const SPOILS_ALL: [&str; 8] = [
+    "intrinsics-scaled",
+    "light-in-groups",
+    "light-turns-with-camera",
+    "photo-turned",
+    "photos-disagree",
+    "photos-exchanged",
+    "photos-not-explained",
+    "photos-shifted",
+];
+
 /// Prints the scores and where to look.
 fn summarise(data: &ReportData, folder: &RunFolder) {
     for aggregate in &data.aggregates {
@@ -248,6 +280,10 @@ fn summarise(data: &ReportData, folder: &RunFolder) {
             aligned.ssim_srgb,
             aligned.rmse_linear
         );
+    }
+    // What spoils a fit as a whole is said once more beside its scores.
+    for finding in data.findings.iter().filter(|finding| SPOILS_ALL.contains(&finding.code.as_str())) {
+        println!("warning [{}]: {} ({})", finding.code, finding.message, finding.remedy);
     }
     if let Some(truth) = &data.truth {
         println!("against the truth, raw (scale-aligned):");

@@ -2,7 +2,18 @@
 //!
 //! [`arguments`] is what can be typed, [`fit`] drives a job and shows its events, [`measured`] is for measured
 //! reflectance, [`object`] is object mode, [`gauge`] moves the scale of a run, [`turntable`] belongs to `relight`,
-//! [`commands`] holds the rest. Whatever is asked here can be asked of the library in the same words.
+//! [`commands`] holds the rest; `say` writes lines where somebody listens, `threads` starts what everything works on.
+//! Whatever is asked here can be asked of the library in the same words.
+
+/// A line on standard output; lost where nobody listens, see [`say`].
+macro_rules! println {
+    ($($text:tt)*) => { $crate::cli::say::out(format_args!($($text)*)) };
+}
+
+/// A line on standard error; lost where nobody listens, see [`say`].
+macro_rules! eprintln {
+    ($($text:tt)*) => { $crate::cli::say::error(format_args!($($text)*)) };
+}
 
 pub mod arguments;
 pub mod commands;
@@ -10,6 +21,8 @@ pub mod fit;
 pub mod gauge;
 pub mod measured;
 pub mod object;
+mod say;
+mod threads;
 pub mod turntable;
 
 use crate::error::{Error, ErrorKind, Result};
@@ -28,8 +41,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             return ExitCode::from(if usage.use_stderr() { 2 } else { 0 });
         }
     };
-    use_threads(arguments.threads);
     let json = arguments.json;
+    if let Err(code) = use_threads(arguments.threads, json) {
+        return code;
+    }
     let outcome = match arguments.task {
         Some(Task::Demo(options)) => fit::demo(&options, json),
         Some(Task::Fit(options)) => fit::fit(&options, json),
@@ -47,12 +62,16 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     exit_code(outcome, json)
 }
 
-/// Limits the threads of the program.
-pub(crate) fn use_threads(threads: Option<usize>) {
-    if let Some(threads) = threads {
-        // Fails only when a pool exists already, as in tests: then that one serves.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+/// Starts the threads of the program, and tells where they are fewer than asked for.
+///
+/// # Errors
+/// The code to exit with, after the error is shown.
+pub(crate) fn use_threads(asked: Option<usize>, json: bool) -> std::result::Result<(), ExitCode> {
+    match threads::start(asked) {
+        Ok(told) => commands::tell_findings(told.as_slice(), json),
+        Err(error) => return Err(exit_code(Err(error), json)),
     }
+    Ok(())
 }
 
 /// Shows an error and gives the code to exit with.

@@ -14,9 +14,11 @@
 //! | `loss.csv` | the loss of every step | `patina fit` |
 //! | `capture.csv` | how each photo lies against the model's picture: shift, roll, gain, doubtful mask | `patina fit`, at its end |
 //! | `report.json report.html` | scores and pictures | `patina fit`, at its end |
+//! | `lock` | who fits into the folder now | [`RunFolder::held`] |
 //! | `earlier` | the result that was here before, a run folder of its own | `patina fit` at its start, until its end |
 
 pub(super) mod earlier;
+mod lock;
 mod stated;
 
 use super::{LossRow, convention, loss_log, obj};
@@ -26,6 +28,7 @@ use crate::light::Environment;
 use crate::material::MaterialMaps;
 use crate::scene::Mesh;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What a fit found.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,9 +44,17 @@ pub struct RunResult {
 }
 
 /// A folder that holds a run.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct RunFolder {
     path: PathBuf,
+    /// Its lock, where it is held.
+    lock: Option<Arc<lock::RunLock>>,
+}
+
+impl PartialEq for RunFolder {
+    fn eq(&self, other: &Self) -> bool {
+        self.path == other.path
+    }
 }
 
 impl RunFolder {
@@ -54,7 +65,7 @@ impl RunFolder {
     /// `Unwritable` when the folder cannot be made, or when it holds other things than a run: a scene's own `mesh.obj`
     /// must not be overwritten.
     pub fn create(path: &Path) -> Result<Self> {
-        let folder = RunFolder { path: path.into() };
+        let folder = RunFolder { path: path.into(), lock: None };
         if path.exists() && !folder.is_run() {
             let mut entries = std::fs::read_dir(path).map_err(|source| {
                 Error::writing(path, source).remedy("name a folder that does not exist yet with -o")
@@ -82,7 +93,7 @@ impl RunFolder {
                 .at(Place::File(path.into()))
                 .remedy("check the path, or make it with `patina fit SCENE -o RUN`"));
         }
-        Ok(RunFolder { path: path.into() })
+        Ok(RunFolder { path: path.into(), lock: None })
     }
 
     /// Whether the folder bears the mark of a run.
@@ -108,6 +119,18 @@ impl RunFolder {
     /// Where the checkpoint lies; its content is the fit's own.
     pub fn checkpoint_path(&self) -> PathBuf {
         self.file("checkpoint")
+    }
+
+    /// Removes the checkpoint, where there is one.
+    ///
+    /// # Errors
+    /// `Unwritable` when it is there and cannot be removed.
+    pub fn remove_checkpoint(&self) -> Result<()> {
+        let path = self.checkpoint_path();
+        match std::fs::remove_file(&path) {
+            Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(Error::writing(&path, source)),
+            _ => Ok(()),
+        }
     }
 
     /// Where the HTML report lies.

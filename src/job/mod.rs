@@ -17,6 +17,7 @@ pub mod against_truth;
 pub mod background;
 pub mod demo;
 pub mod entanglement;
+mod explained;
 mod facts;
 pub mod gallery;
 pub mod gauge;

@@ -137,7 +137,8 @@ pub fn open_scene(path: &Path, settings: &ReadSettings, stop: &AtomicBool, tell:
     let mut timings = Vec::new();
     let scene =
         told(OpenStage::Read, stop, tell, || timed(&mut timings, "read", || crate::scene::read(path, settings)))?;
-    let report = told(OpenStage::Check, stop, tell, || Ok(timed(&mut timings, "check", || doctor::check(&scene))))?;
+    let report =
+        told(OpenStage::Check, stop, tell, || timed(&mut timings, "check", || doctor::check_until(&scene, stop)))?;
     Ok(OpenedScene { scene, report, timings })
 }
 

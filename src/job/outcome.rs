@@ -2,6 +2,7 @@
 
 use super::Event;
 use super::against_truth::truth_errors;
+use super::explained;
 use super::facts::describe;
 use super::pictures::parameters;
 use super::prepare::{Prepared, RunSettings, covered, timed};
@@ -70,6 +71,10 @@ pub fn write(
     finishing("pictures of the views");
     let own = parameters(&result.maps, &result.environment);
     let views = timed(&mut timings, "score views", || score_views(fitter, surface, &own, settings, stop))?;
+    if let Some(finding) = explained::finding(&views) {
+        tell(Event::Finding(finding.clone()));
+        prepared.findings.push(finding);
+    }
     finishing("look at the capture");
     let capture = timed(&mut timings, "capture", || capture::check(fitter, stop));
     crate::files::write_bytes(&folder.file(capture::table::FILE), capture::table::to_csv(&capture.views).as_bytes())?;

@@ -25,7 +25,7 @@ const PATIENCE: Duration = Duration::from_millis(50);
 /// Starts a job over a prepared scene. `fitter` may be new or resumed; results go to `folder`.
 ///
 /// # Errors
-/// `Internal` when no thread can be started. What goes wrong later is told as [`Event::Failed`].
+/// `Internal` when no thread can be started, `Unwritable` when another fit holds the folder. What goes wrong later is told as [`Event::Failed`].
 pub fn start(prepared: Prepared, fitter: Fitter, settings: RunSettings, folder: RunFolder) -> Result<JobHandle> {
     start_with(prepared, fitter, settings, folder, JobOptions::default())
 }
@@ -41,6 +41,7 @@ pub fn start_with(
     folder: RunFolder,
     options: JobOptions,
 ) -> Result<JobHandle> {
+    let folder = folder.held()?;
     // Neither channel makes its sender wait; what is sent is little, since progress is dropped when nobody reads it.
     let (commands, command_receiver) = unbounded();
     let (event_sender, events) = unbounded();
@@ -129,6 +130,8 @@ impl Worker {
         let steps_done = self.fitter.state().step;
         if steps_done == 0 {
             self.saver.folder().set_result_aside()?;
+            // A program that is killed before its first checkpoint must not leave an earlier one beside another mesh.
+            self.saver.folder().remove_checkpoint()?;
         }
         crate::export::obj::write(&self.saver.folder().file("mesh.obj"), self.fitter.surface().mesh())?;
         if steps_done == 0 {

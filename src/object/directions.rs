@@ -139,7 +139,7 @@ impl TexelDirections {
         if width < 4 || height < 2 || width * height > 1 << 16 {
             let message = format!("an environment of {width} x {height} texels cannot be fitted");
             return Err(Error::new(ErrorKind::InvalidSetting, message)
-                .at(Place::Setting("light-size".into()))
+                .at(Place::Setting("light-height".into()))
                 .remedy(format!("ask for 8 to {MOST_ROWS} rows, twice as many columns")));
         }
         Ok(Self::of_any_size(width, height))

@@ -2,7 +2,7 @@
 
 use super::prepare::Prepared;
 use crate::math::random::SequentialRandom;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
@@ -61,8 +61,23 @@ const REINSERTED_SHARE: f32 = 1.0;
 ///
 /// Meister and Bittner 2018, "Parallel locally-ordered clustering for bounding volume hierarchy construction" and
 /// "Parallel reinsertion for bounding volume hierarchy optimization".
+///
+/// The builder sorts by a grid over the box around everything, in `f32`: a few triangles far from all others would leave
+/// it one cell for the rest, and time in the square of their number. They make a tree of their own, beside it.
 pub(super) fn by_surface_area(prepared: &Prepared) -> BinaryTree {
-    let boxes = boxes_for_obvhs(prepared);
+    let (middle, reach) = middle_and_reach(prepared);
+    let is_far = |slot: &u32| {
+        let (low, high) = prepared.triangles[*slot as usize].bounds();
+        let offset = (low.as_dvec3() - middle).abs().max((high.as_dvec3() - middle).abs());
+        offset.max_element() > FAR_REACHES * reach
+    };
+    let (mut far, mut near): (Vec<u32>, Vec<u32>) = (0..prepared.triangles.len() as u32).partition(is_far);
+    if far.len() > near.len() {
+        // Most of them are no exception.
+        near.append(&mut far);
+        near.sort_unstable();
+    }
+    let boxes = boxes_for_obvhs(prepared, &near, middle);
     let indices = (0..boxes.len() as u32).collect();
     let mut built = PlocBuilder::with_capacity(boxes.len()).build(
         PlocSearchDistance::Medium,
@@ -72,30 +87,81 @@ pub(super) fn by_surface_area(prepared: &Prepared) -> BinaryTree {
         3,
     );
     ReinsertionOptimizer::default().run(&mut built, REINSERTED_SHARE, None);
-    from_topology(prepared, |node| {
-        let node = &built.nodes[node as usize];
-        if node.is_leaf() {
-            Content::Triangle(built.primitive_indices[node.first_index as usize])
-        } else {
-            Content::Children([node.first_index, node.first_index + 1])
-        }
-    })
+    let mut contents: Vec<Content> = built
+        .nodes
+        .iter()
+        .map(|node| {
+            if node.is_leaf() {
+                // Places of the builder that hold no node look like leaves of nothing; nobody asks for them.
+                let slot = built.primitive_indices.get(node.first_index as usize).copied().unwrap_or_default();
+                Content::Triangle(near[slot as usize])
+            } else {
+                Content::Children([node.first_index, node.first_index + 1])
+            }
+        })
+        .collect();
+    if far.is_empty() {
+        return from_topology(prepared, 0, |node| contents[node as usize]);
+    }
+    let first = contents.len() as u32;
+    contents.extend(halves(prepared, far).into_iter().map(|content| match content {
+        Content::Children([left, right]) => Content::Children([first + left, first + right]),
+        triangle => triangle,
+    }));
+    contents.push(Content::Children([0, first]));
+    from_topology(prepared, contents.len() as u32 - 1, |node| contents[node as usize])
+}
+
+/// Triangles that reach further out than so many times the reach of most have a tree of their own.
+const FAR_REACHES: f64 = 256.0;
+
+/// The median of the triangles' middles, and the median of how far they lie from it; the latter may be 0.
+fn middle_and_reach(prepared: &Prepared) -> (DVec3, f64) {
+    let middles: Vec<DVec3> = prepared
+        .triangles
+        .iter()
+        .map(|triangle| {
+            let (low, high) = triangle.bounds();
+            0.5 * (low.as_dvec3() + high.as_dvec3())
+        })
+        .collect();
+    let median = |mut values: Vec<f64>| {
+        let half = values.len() / 2;
+        *values.select_nth_unstable_by(half, f64::total_cmp).1
+    };
+    let middle = DVec3::from_array([0, 1, 2].map(|axis| median(middles.iter().map(|point| point[axis]).collect())));
+    let reach = median(middles.iter().map(|point| (*point - middle).abs().max_element()).collect());
+    // Where most triangles lie at one place, their own size is the measure.
+    let own = median(
+        prepared
+            .triangles
+            .iter()
+            .map(|triangle| (triangle.bounds().1 - triangle.bounds().0).as_dvec3().max_element())
+            .collect(),
+    );
+    (middle, reach.max(own))
 }
 
 /// Boxes of which obvhs reads only how they lie to each other.
 ///
-/// They are scaled to about one, so that areas neither overflow nor vanish. Boxes that coincide are moved apart a
-/// little: obvhs joins each box with the neighbour that suits it best, and where all suit alike, only one pair a round
-/// is joined, which takes time in proportion to the square of their number and makes a tree as deep as they are many.
-fn boxes_for_obvhs(prepared: &Prepared) -> Vec<Aabb> {
-    let (low, high) = prepared.bounds();
-    let centre = 0.5 * (low.as_dvec3() + high.as_dvec3());
-    let scale = 2.0 / (high.as_dvec3() - low.as_dvec3()).max_element();
-    let scaled = |point: Vec3| ((point.as_dvec3() - centre) * scale).as_vec3a();
-    prepared
-        .triangles
+/// They are scaled to about one around the middle of most, so that areas neither overflow nor vanish. Boxes that
+/// coincide are moved apart a little: obvhs joins each box with the neighbour that suits it best, and where all suit
+/// alike, only one pair a round is joined, which takes time in proportion to the square of their number and makes a
+/// tree as deep as they are many.
+fn boxes_for_obvhs(prepared: &Prepared, slots: &[u32], middle: DVec3) -> Vec<Aabb> {
+    let largest = slots
         .iter()
-        .map(|triangle| {
+        .map(|&slot| {
+            let (low, high) = prepared.triangles[slot as usize].bounds();
+            (low.as_dvec3() - middle).abs().max((high.as_dvec3() - middle).abs()).max_element()
+        })
+        .fold(0.0, f64::max);
+    let scale = 1.0 / largest;
+    let scaled = |point: Vec3| ((point.as_dvec3() - middle) * scale).as_vec3a();
+    slots
+        .iter()
+        .map(|&slot| {
+            let triangle = &prepared.triangles[slot as usize];
             let (low, high) = triangle.bounds();
             let (mut low, mut high) = (scaled(low), scaled(high));
             if triangle.box_copies > 0 {
@@ -112,15 +178,16 @@ fn boxes_for_obvhs(prepared: &Prepared) -> Vec<Aabb> {
 /// A balanced tree: halves along the longest side of the box around the triangles' middles. Its depth is the logarithm
 /// of their number whatever they look like; it is slower to walk than [`by_surface_area`].
 pub(super) fn balanced(prepared: &Prepared) -> BinaryTree {
-    let middles: Vec<Vec3> = prepared
-        .triangles
-        .iter()
-        .map(|triangle| {
-            let (low, high) = triangle.bounds();
-            0.5 * low + 0.5 * high
-        })
-        .collect();
-    let mut order: Vec<u32> = (0..middles.len() as u32).collect();
+    let contents = halves(prepared, (0..prepared.triangles.len() as u32).collect());
+    from_topology(prepared, 0, |node| contents[node as usize])
+}
+
+/// The nodes of a balanced tree over some triangles, the root first.
+fn halves(prepared: &Prepared, mut order: Vec<u32>) -> Vec<Content> {
+    let middle = |slot: u32| {
+        let (low, high) = prepared.triangles[slot as usize].bounds();
+        0.5 * low + 0.5 * high
+    };
     // Node k covers order[ranges[k]]; children are added behind, so the list is the topology.
     let mut ranges = vec![(0, order.len())];
     let mut contents = Vec::new();
@@ -132,25 +199,25 @@ pub(super) fn balanced(prepared: &Prepared) -> BinaryTree {
         }
         let part = &mut order[start..end];
         let (low, high) = part.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &slot| {
-            (low.min(middles[slot as usize]), high.max(middles[slot as usize]))
+            (low.min(middle(slot)), high.max(middle(slot)))
         });
         let axis = (0.5 * high - 0.5 * low).max_position();
         let half = part.len() / 2;
         part.select_nth_unstable_by(half, |&one, &other| {
-            middles[one as usize][axis].total_cmp(&middles[other as usize][axis]).then(one.cmp(&other))
+            middle(one)[axis].total_cmp(&middle(other)[axis]).then(one.cmp(&other))
         });
         let first_child = ranges.len() as u32;
         ranges.push((start, start + half));
         ranges.push((start + half, end));
         contents.push(Content::Children([first_child, first_child + 1]));
     }
-    from_topology(prepared, |node| contents[node as usize])
+    contents
 }
 
-/// Lays the nodes out with parents before children and computes their boxes from the triangles alone.
-fn from_topology(prepared: &Prepared, content: impl Fn(u32) -> Content) -> BinaryTree {
+/// Lays the nodes out from the root on, with parents before children, and computes their boxes from the triangles alone.
+fn from_topology(prepared: &Prepared, root: u32, content: impl Fn(u32) -> Content) -> BinaryTree {
     let mut nodes: Vec<BinaryNode> = Vec::with_capacity(2 * prepared.triangles.len());
-    let mut sources = vec![0];
+    let mut sources = vec![root];
     while let Some(&source) = sources.get(nodes.len()) {
         let (left, right) = match content(source) {
             Content::Triangle(triangle) => (triangle, LEAF),

@@ -294,4 +294,19 @@ mod tests {
         assert!(wide.depth <= 16, "{} levels", wide.depth);
         check(&prepared, &wide);
     }
+
+    #[test]
+    fn a_triangle_far_from_all_others_does_not_spoil_their_tree() {
+        let mut random = SequentialRandom::new(4);
+        let near = prepared_soup(20_000, &mut random);
+        let mut positions: Vec<Vec3> = near.triangles.iter().flat_map(|triangle| triangle.corners).collect();
+        positions.extend([Vec3::ZERO, Vec3::X, Vec3::splat(1e6)]);
+        let triangles: Vec<[u32; 3]> = (0..20_001).map(|index| [3 * index, 3 * index + 1, 3 * index + 2]).collect();
+        let spiked = prepare::prepare(&positions, &triangles).unwrap();
+        let trees = [&near, &spiked].map(|prepared| collapse(prepared, &binary::by_surface_area(prepared)));
+        check(&spiked, &trees[1]);
+        // The tree of the others hangs below one more node.
+        assert!(trees[1].depth <= trees[0].depth + 2, "{} and {} levels", trees[1].depth, trees[0].depth);
+        assert!(trees[1].nodes.len() <= trees[0].nodes.len() + trees[0].nodes.len() / 50 + 2);
+    }
 }

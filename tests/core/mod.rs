@@ -6,6 +6,8 @@
 mod atlas;
 pub mod beside;
 mod capture;
+mod cli_process;
+mod cli_remedies;
 pub mod common;
 mod demo_scene;
 mod fit_course;
@@ -49,7 +51,9 @@ mod report;
 mod scene_bad_input;
 mod scene_doctor;
 mod scene_fixture;
+mod scene_meshes;
 mod scene_read;
 mod scene_real;
+mod scene_together;
 mod solver_run;
 mod trace;

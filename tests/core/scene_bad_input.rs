@@ -40,15 +40,15 @@ fn bad_obj_files_are_named_by_line() {
         ("f 0 1 2", ErrorKind::Malformed, "line 4: index 0 is not a vertex"),
         ("f 1 2 4", ErrorKind::Malformed, "line 4: vertex 4 of 3"),
         ("f 1 2 -4", ErrorKind::Malformed, "line 4: vertex -4 of 3"),
-        ("f 1/1 2/2 3/3", ErrorKind::Malformed, "line 4: texture coordinate 1 of 0"),
-        ("f 1//0 2//0 3//0", ErrorKind::Malformed, "line 4: index 0 is not a normal"),
-        ("f 1 2", ErrorKind::Malformed, "line 4: a face of 2 corners"),
+        ("f 1/x 2/2 3/3", ErrorKind::Malformed, "line 4: '1/x' is not an index"),
+        ("f 1/1/1/1 2 3", ErrorKind::Malformed, "line 4: '1/1/1/1' has too many slashes"),
+        ("f 1 2", ErrorKind::Malformed, "line 4: no face of the OBJ file has three corners"),
         ("f 1 2 x", ErrorKind::Malformed, "line 4: 'x' is not an index"),
         ("f 1 2 99999999999999999999", ErrorKind::Malformed, "line 4:"),
         ("v 1 2\nf 1 2 3", ErrorKind::Malformed, "line 4: fewer than 3 numbers"),
-        ("v 1 2 3,5\nf 1 2 3", ErrorKind::Malformed, "line 4: '3,5' is not a number"),
-        ("v 1 nan 3\nf 1 2 3", ErrorKind::NonFinite, "line 4: vertex 4"),
-        ("v 1 1e300 3\nf 1 2 3", ErrorKind::NonFinite, "line 4: vertex 4"),
+        ("v 1.0 2 3,5\nf 1 2 3", ErrorKind::Malformed, "line 4: '3,5' is not a number"),
+        ("v 1 nan 3\nf 1 2 4", ErrorKind::NonFinite, "line 4: vertex 4"),
+        ("v 1 1e300 3\nf 1 2 4", ErrorKind::NonFinite, "line 4: vertex 4"),
         ("", ErrorKind::Malformed, "no faces"),
     ];
     for line_end in ["\n", "\r\n"] {
@@ -61,7 +61,7 @@ fn bad_obj_files_are_named_by_line() {
         }
     }
     assert_error(&mesh_error("a.obj", b""), ErrorKind::Malformed, "no faces");
-    assert_error(&mesh_error("a.stl", b"solid"), ErrorKind::Unsupported, ".stl");
+    assert_error(&mesh_error("a.fbx", b"solid"), ErrorKind::Unsupported, ".fbx");
     assert_error(&read_mesh(Path::new("/nowhere/a.obj")).unwrap_err(), ErrorKind::Missing, "no mesh file");
 }
 
@@ -80,8 +80,8 @@ fn bad_ply_files_are_named_by_line_or_byte() {
     };
     assert_error(&ascii(points, "3 0 1 3\n"), ErrorKind::Malformed, "line 13: face 0 names vertex 3 of 3");
     assert_error(&ascii(points, "3 0 1 -1\n"), ErrorKind::Malformed, "face 0 names vertex -1 of 3");
-    assert_error(&ascii(points, "2 0 1\n"), ErrorKind::Malformed, "line 13: face 0 has 2 corners");
-    assert_error(&ascii("0 0 0\n1 inf 0\n0 1 0\n", "3 0 1 2\n"), ErrorKind::Malformed, "line 11");
+    assert_error(&ascii(points, "2 0 1\n"), ErrorKind::Malformed, "line 13: no face of the PLY file has three corners");
+    assert_error(&ascii("0 0 0\n1 inf 0\n0 1 0\n", "3 0 1 2\n"), ErrorKind::NonFinite, "line 11");
     assert_error(&ascii("0 0 0\n1 zero 0\n0 1 0\n", "3 0 1 2\n"), ErrorKind::Malformed, "line 11");
     assert_error(&ascii("0 0 0\n1 0 0\n", ""), ErrorKind::Malformed, "");
     assert_error(&mesh_error("a.ply", b""), ErrorKind::Malformed, "header");
@@ -101,6 +101,7 @@ fn bad_ply_files_are_named_by_line_or_byte() {
     binary.extend([3, 0, 0, 0, 0]);
     assert_error(&mesh_error("a.ply", &binary), ErrorKind::Malformed, "ends within the 1 elements 'face'");
     let mut not_a_number = binary[..header + 36].to_vec();
+    not_a_number.extend([3, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0]);
     not_a_number[header + 12..header + 16].copy_from_slice(&f32::NAN.to_le_bytes());
     assert_error(&mesh_error("a.ply", &not_a_number), ErrorKind::NonFinite, "vertex 1 is at [NaN, 0, 0]");
     for (vertices, faces) in [("1000000000", "1"), ("3", "4000000000"), ("18446744073709551615", "1")] {
@@ -168,11 +169,6 @@ fn bad_camera_files_are_named_by_line() {
     assert_error(&edited("extrinsic\n", "extrinsic\nnan "), ErrorKind::NonFinite, "00000001_cam.txt, line 2");
     assert_error(&edited("extrinsic\n", "extrinsic\n0,5 "), ErrorKind::Malformed, "line 2: '0,5' is not a number");
     assert_error(&edited("extrinsic", "extrinsics"), ErrorKind::Malformed, "line 1: the word 'extrinsic' is missing");
-    assert_error(
-        &edited("2.0 0.01 192 9.0", "2.0 0.01 192"),
-        ErrorKind::Malformed,
-        "line 12: the last line holds 3 numbers",
-    );
     assert_error(&edited("0.0 0.0 0.0 1.0", "0.0 0.0 5.0 1.0"), ErrorKind::InvalidScene, "transposed");
     assert_error(&edited("\n0.0 0.0 1.0\n", "\n0.0 0.0 -1.0\n"), ErrorKind::InvalidScene, "the intrinsics are not");
     let truncated = folder_error(|folder| {
@@ -187,7 +183,7 @@ fn bad_camera_files_are_named_by_line() {
         "line 1",
     );
     assert_error(
-        &folder_error(|folder| put(folder.join("cams/00000000_cam.txt"), [0xff; 9]).unwrap()),
+        &folder_error(|folder| put(folder.join("cams/00000000_cam.txt"), [0; 9]).unwrap()),
         ErrorKind::Malformed,
         "byte 0: the file is not text",
     );

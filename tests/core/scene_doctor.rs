@@ -196,7 +196,12 @@ fn exposure_jumps_are_measured() {
         let expected = if index == 5 { -1.0 } else { 0.0 };
         assert!((view.exposure_stops.unwrap() - expected).abs() < 0.06, "{index}: {:?}", view.exposure_stops);
     }
-    assert_eq!(report.findings.iter().filter(|finding| finding.code == "exposure-jump").count(), 1);
+    change_photo(&mut scene.views[1], |radiance| radiance * 0.25);
+    let report = assert_finding(&scene, "exposure-jump", Severity::Warning);
+    let told: Vec<_> = report.findings.iter().filter(|finding| finding.code == "exposure-jump").collect();
+    assert_eq!(told.len(), 1, "one finding with a list: {told:?}");
+    assert!(told[0].message.contains("2 of 8") && told[0].message.contains("00000005 by -1.0"), "{}", told[0]);
+    assert!(told[0].place.contains("00000001"), "the worst is where to go: {}", told[0]);
 }
 
 #[test]
@@ -206,6 +211,12 @@ fn photos_that_are_black_clipped_or_wrongly_encoded_are_named() {
     assert_finding(&black, "photo-black", Severity::Warning);
     black.views.iter_mut().for_each(|view| change_photo(view, |_| Vec3::ZERO));
     assert_finding(&black, "photo-black", Severity::Fatal);
+
+    let mut white = scene(4);
+    white.views[1].states.pixels_mut().fill(PixelState::SurfaceClipped);
+    assert_finding(&white, "photo-white", Severity::Warning);
+    white.views.iter_mut().for_each(|view| view.states.pixels_mut().fill(PixelState::SurfaceClipped));
+    assert_finding(&white, "photo-white", Severity::Fatal);
 
     let mut clipped = scene(4);
     clipped.views[2].states.pixels_mut()[..4000].fill(PixelState::BackgroundClipped);

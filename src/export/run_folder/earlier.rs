@@ -46,7 +46,7 @@ impl RunFolder {
         if !path.is_dir() || !self.has_result() {
             return Ok(());
         }
-        let earlier = RunFolder { path };
+        let earlier = RunFolder { path, lock: None };
         earlier.remove_files()?;
         if is_empty_but_for_its_mark(&earlier) {
             std::fs::remove_dir_all(earlier.path()).map_err(|source| Error::writing(earlier.path(), source))?;
@@ -56,7 +56,7 @@ impl RunFolder {
 
     /// Whether a result was set aside.
     pub fn has_earlier(&self) -> bool {
-        RunFolder { path: self.file(EARLIER) }.has_result()
+        RunFolder { path: self.file(EARLIER), lock: None }.has_result()
     }
 
     fn remove_files(&self) -> Result<()> {

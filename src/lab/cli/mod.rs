@@ -26,8 +26,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             return ExitCode::from(if usage.use_stderr() { 2 } else { 0 });
         }
     };
-    use_threads(arguments.threads);
     let (json, threads) = (arguments.json, arguments.threads);
+    if let Err(code) = use_threads(threads, json) {
+        return code;
+    }
     let outcome = match arguments.task {
         Task::Audit(AuditTask::Gradients(options)) => measure::audit_gradients(&options, json),
         Task::Bench(BenchTask::Scale(options)) => measure::bench_scale(&options, json),

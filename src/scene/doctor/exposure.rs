@@ -4,7 +4,7 @@
 //! views' exposures are the least-squares solution of all pairs, with median zero.
 
 use super::probe::{Probe, surface_at};
-use super::{Report, ViewCheck};
+use super::{Report, ViewCheck, names_of};
 use crate::error::{Finding, Place, Severity};
 use crate::math::{luminance, statistics::quantile};
 use crate::scene::{PixelState, Scene};
@@ -44,29 +44,28 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
         .flatten()
         .collect();
     let exposures = solve(scene.views.len(), &pairs);
-    let mut jumps = 0;
-    for ((view, line), exposure) in scene.views.iter().zip(&mut report.views).zip(&exposures) {
+    for (line, exposure) in report.views.iter_mut().zip(&exposures) {
         line.exposure_stops = exposure.map(|log| log / std::f64::consts::LN_2);
-        if let Some(stops) = jump_stops(line) {
-            jumps += 1;
-            report.findings.push(
-                Finding::new(
-                    Severity::Warning,
-                    "exposure-jump",
-                    format!(
-                        "the view is {:.1} stops {} than the others see the same surface",
-                        stops.abs(),
-                        if stops > 0.0 { "brighter" } else { "darker" }
-                    ),
-                )
-                .at(Place::View(view.name.clone()))
-                .remedy(
-                    "fit an exposure per view, as is done with photos of 8 bits, or develop all photos with one exposure and \
-                     white balance; of things that shine all over it may be their gloss",
-                ),
-            );
-        }
     }
+    let mut jumps: Vec<(f64, &str)> =
+        report.views.iter().filter_map(|line| Some((jump_stops(line)?, line.name.as_str()))).collect();
+    jumps.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()).then(a.1.cmp(b.1)));
+    let found = jumps.first().map(|&(_, first)| {
+        let listed: Vec<String> = jumps.iter().map(|(stops, name)| format!("{name} by {stops:+.1}")).collect();
+        let listed: Vec<&str> = listed.iter().map(String::as_str).collect();
+        let message = format!(
+            "{} of {} views are brighter or darker than the others see the same surface, by more than {JUMP_STOPS} stops: {}",
+            jumps.len(),
+            scene.views.len(),
+            names_of(&listed)
+        );
+        Finding::new(Severity::Warning, "exposure-jump", message).at(Place::View(first.into())).remedy(
+            "fit an exposure per view, as is done with photos of 8 bits, or develop all photos with one exposure and \
+             white balance; of things that shine all over it may be their gloss",
+        )
+    });
+    let jumps = jumps.len();
+    report.findings.extend(found);
     if let Some(spread) = spread_stops(&report.views).filter(|spread| jumps == 0 && *spread > SPREAD_STOPS) {
         report.findings.push(
             Finding::new(

@@ -12,12 +12,15 @@
 //! | [`silhouette`] | do masks and mesh agree |
 //! | [`pixel_centre`], [`edge_profile`] | where do pixel centres lie in the intrinsics, to a hundredth of a pixel |
 //! | [`pictures`] | encoding, clipping, darkness |
+//! | [`agreement`] | do photos belong to their cameras, by the photos alone |
+//! | [`lights`] | is the light one, does it turn with the camera, does it fall into groups |
 //! | [`exposure`] | do views agree on the radiance of what they share |
 //! | [`resolution`] | how much detail of the surface do the photos resolve |
 //! | [`facets`], [`closeness`], [`detail`] | is the mesh too coarse, are walls or gaps or patterns as fine as pixels |
 //!
 //! It refuses to repair: it measures and says what to do.
 
+pub mod agreement;
 pub mod cameras;
 pub mod closeness;
 pub mod detail;
@@ -25,6 +28,7 @@ pub mod edge_profile;
 pub mod exposure;
 pub mod facets;
 pub mod geometry;
+pub mod lights;
 pub mod normals;
 pub mod overlay;
 pub mod pictures;
@@ -36,10 +40,11 @@ pub mod silhouette;
 pub use overlay::overlay;
 pub use pixel_centre::CentreMeasurement;
 
-use crate::error::{Finding, Severity};
-use crate::scene::Scene;
+use crate::error::{Error, ErrorKind, Finding, Result, Severity};
+use crate::scene::{Scene, View};
 use crate::trace::Bvh;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What the check found.
 #[derive(Clone, Debug, Default, serde::Serialize)]
@@ -55,6 +60,11 @@ pub struct Report {
     /// How many texels of one size the whole surface takes so that each is as small as what a pixel covers where training
     /// photos look closely; `None` where none of them sees it.
     pub texels_resolved: Option<f64>,
+    /// How photos agree where they show the same surface, the median over the views: [`agreement`]; `None` where they share
+    /// too little.
+    pub agreement: Option<f64>,
+    /// How shading goes with the cameras: [`lights`]; `None` where the photos share too little.
+    pub light: Option<lights::LightCheck>,
     /// Of what training photos show of the surface, how much is too fine for them, or too coarse in the mesh.
     pub surface: SurfaceCheck,
 }
@@ -93,6 +103,9 @@ pub struct ViewCheck {
     pub ignored_share: f64,
     /// Median luminance of the mesh's pixels, linear.
     pub median_luminance: f64,
+    /// How the photo agrees with others where they show the same surface: the median correlation of the logarithms of
+    /// radiance, in [-1, 1]; `None` when nothing is shared.
+    pub agreement: Option<f64>,
     /// Brightness against the other views by the surface they share, in stops; `None` when nothing is shared.
     pub exposure_stops: Option<f64>,
 }
@@ -106,9 +119,17 @@ impl Report {
 
 /// Checks a scene; builds its ray structure for that.
 pub fn check(scene: &Scene) -> Report {
+    check_until(scene, &AtomicBool::new(false)).unwrap_or_default()
+}
+
+/// [`check`] that ends soon after a flag is raised, between two of its questions.
+///
+/// # Errors
+/// `Stopped` when the flag is raised.
+pub fn check_until(scene: &Scene, stop: &AtomicBool) -> Result<Report> {
     let bvh = scene.mesh.validate().and_then(|()| Bvh::build(&scene.mesh.positions, &scene.mesh.triangles));
     match bvh {
-        Ok(bvh) => check_with(scene, &bvh),
+        Ok(bvh) => check_with_until(scene, &bvh, stop),
         Err(error) => {
             let mut report = Report { findings: scene.findings.clone(), ..Default::default() };
             report.findings.push(
@@ -122,39 +143,53 @@ pub fn check(scene: &Scene) -> Report {
             );
             cameras::check(scene, &mut report);
             sort(&mut report.findings);
-            report
+            Ok(report)
         }
     }
 }
 
 /// Checks a scene whose ray structure is at hand. `bvh` must be of the scene's mesh.
 pub fn check_with(scene: &Scene, bvh: &Bvh) -> Report {
+    check_with_until(scene, bvh, &AtomicBool::new(false)).unwrap_or_default()
+}
+
+fn check_with_until(scene: &Scene, bvh: &Bvh, stop: &AtomicBool) -> Result<Report> {
+    let stopped = || Error::new(ErrorKind::Stopped, "stopped while the scene was checked");
     let mut report = Report { findings: scene.findings.clone(), ..Default::default() };
     let usable = cameras::check(scene, &mut report);
-    let probes: Vec<Vec<probe::Probe>> = scene
-        .views
-        .par_iter()
-        .zip(&usable)
-        .map(|(view, usable)| if *usable { probe::probe_view(view, bvh) } else { Vec::new() })
-        .collect();
+    let probe = |(view, usable): (&View, &bool)| {
+        let is_wanted = *usable && !stop.load(Ordering::Relaxed);
+        if is_wanted { probe::probe_view(view, bvh) } else { Vec::new() }
+    };
+    let probes: Vec<Vec<probe::Probe>> = scene.views.par_iter().zip(&usable).map(probe).collect();
     report.views = scene
         .views
         .iter()
         .map(|view| ViewCheck { name: view.name.clone(), held_out: view.held_out, ..Default::default() })
         .collect();
-    geometry::check(scene, &probes, &mut report);
-    normals::check(scene, &mut report);
-    cameras::check_sight(scene, &probes, &mut report);
-    silhouette::check(scene, &probes, &mut report);
-    pictures::check(scene, &probes, &mut report);
-    resolution::check(scene, &probes, &mut report);
-    facets::check(scene, &probes, &mut report);
-    closeness::check(scene, bvh, &probes, &mut report);
-    detail::check(scene, bvh, &probes, &mut report);
-    exposure::check(scene, bvh, &probes, &mut report);
-    pixel_centre::check(scene, bvh, &mut report);
+    let questions: [&dyn Fn(&mut Report); 13] = [
+        &|report| geometry::check(scene, &probes, report),
+        &|report| normals::check(scene, report),
+        &|report| cameras::check_sight(scene, &probes, report),
+        &|report| silhouette::check(scene, &probes, report),
+        &|report| pictures::check(scene, &probes, report),
+        &|report| resolution::check(scene, &probes, report),
+        &|report| facets::check(scene, &probes, report),
+        &|report| closeness::check(scene, bvh, &probes, report),
+        &|report| detail::check(scene, bvh, &probes, report),
+        &|report| agreement::check(scene, bvh, &probes, report),
+        &|report| lights::check(scene, bvh, &probes, report),
+        &|report| exposure::check(scene, bvh, &probes, report),
+        &|report| pixel_centre::check(scene, bvh, report),
+    ];
+    for question in questions {
+        if stop.load(Ordering::Relaxed) {
+            return Err(stopped());
+        }
+        question(&mut report);
+    }
     sort(&mut report.findings);
-    report
+    Ok(report)
 }
 
 /// Gravest first; findings of one severity keep their order.

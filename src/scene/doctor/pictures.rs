@@ -8,12 +8,15 @@ use crate::scene::{PixelState, Scene, View};
 
 /// A view with more clipped pixels than this loses highlights that tell roughness.
 const HIGH_CLIPPED_SHARE: f64 = 0.05;
+/// A photo of which more than this is clipped is white.
+const WHITE_SHARE: f64 = 0.995;
 /// A photo whose brightest percent stays below this luminance is black.
 const BLACK_LUMINANCE: f64 = 1e-4;
 
 /// Checks each photo, and the encoding over all of them.
 pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
-    let (mut clipped, mut black, mut linear_looking, mut srgb_looking) = (Vec::new(), Vec::new(), 0usize, 0usize);
+    let (mut clipped, mut white, mut black) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut linear_looking, mut srgb_looking) = (0usize, 0usize);
     for ((view, probes), line) in scene.views.iter().zip(probes).zip(&mut report.views) {
         let count = view.states.pixels().len().max(1) as f64;
         let share_of = |select: &dyn Fn(PixelState) -> bool| {
@@ -21,6 +24,11 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
         };
         line.clipped_share = share_of(&|state| state.is_clipped());
         line.ignored_share = share_of(&|state| state == PixelState::Ignored);
+        let counted = 1.0 - line.ignored_share;
+        if counted > 0.0 && line.clipped_share > WHITE_SHARE * counted {
+            white.push(view.name.as_str());
+            continue;
+        }
         if line.clipped_share > HIGH_CLIPPED_SHARE {
             clipped.push(view.name.as_str());
         }
@@ -55,6 +63,17 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
         report.findings.push(
             Finding::new(severity, "photo-black", format!("{} views are black: {}", black.len(), names_of(&black)))
                 .remedy("check the files, or leave these views out"),
+        );
+    }
+    if !white.is_empty() {
+        let severity = if white.len() == views { Severity::Fatal } else { Severity::Warning };
+        report.findings.push(
+            Finding::new(
+                severity,
+                "photo-white",
+                format!("{} views are clipped all over: {}", white.len(), names_of(&white)),
+            )
+            .remedy("they tell no radiance: check the files and their exposure, or leave these views out"),
         );
     }
     if linear_looking * 2 > views {

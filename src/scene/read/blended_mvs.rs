@@ -69,24 +69,24 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
     })
 }
 
-/// Mesh files of the folder: OBJ pieces before PLY.
+/// Mesh files of the folder: OBJ pieces before PLY, glTF and STL.
 fn find_mesh(folder: &Path) -> Result<(Vec<PathBuf>, Vec<Finding>)> {
     let mut findings = Vec::new();
     for place in [folder.join("textured_mesh"), folder.join("mesh"), folder.to_path_buf()] {
-        let of_kind = |extension: &str| files_of(&place, &[extension]);
-        let (pieces, plys) = (of_kind("obj")?, of_kind("ply")?);
-        if !pieces.is_empty() && !plys.is_empty() {
+        let of_kinds = |extensions: &[&str]| files_of(&place, extensions);
+        let kinds = [of_kinds(&["obj"])?, of_kinds(&["ply"])?, of_kinds(&["glb", "gltf"])?, of_kinds(&["stl"])?];
+        if kinds.iter().filter(|files| !files.is_empty()).count() > 1 {
             findings.push(
                 Finding::new(
                     Severity::Note,
                     "mesh-choice",
-                    "OBJ and PLY files lie side by side: the OBJ files are read",
+                    "mesh files of several kinds lie side by side: OBJ is read before PLY, glTF and STL",
                 )
                 .at(Place::File(place.clone()))
                 .remedy("name the mesh in scene.toml to read another"),
             );
         }
-        let mesh = if pieces.is_empty() { plys } else { pieces };
+        let mesh = kinds.into_iter().find(|files| !files.is_empty()).unwrap_or_default();
         if !mesh.is_empty() {
             return Ok((mesh, findings));
         }

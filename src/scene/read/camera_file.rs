@@ -1,79 +1,18 @@
 //! Files that hold cameras: `*_cam.txt` and `pair.txt` of the MVSNet family, and `cameras.json`.
 
 use super::source::SourceCamera;
-use crate::error::{Error, ErrorKind, Finding, Place, Result};
+pub use super::text::read as read_text;
+use super::text::{self, Words};
+use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use glam::{DMat3, DVec3};
 use std::path::{Path, PathBuf};
-
-/// Words of a text file with the line of each.
-struct Words<'a> {
-    path: &'a Path,
-    words: Vec<(usize, &'a str)>,
-    next: usize,
-    last_line: usize,
-}
-
-impl<'a> Words<'a> {
-    fn new(path: &'a Path, text: &'a str) -> Self {
-        let words = text
-            .lines()
-            .enumerate()
-            .flat_map(|(number, line)| line.split_whitespace().map(move |word| (number + 1, word)));
-        Words { path, words: words.collect(), next: 0, last_line: text.lines().count().max(1) }
-    }
-
-    fn line(&self) -> usize {
-        self.words.get(self.next).map_or(self.last_line, |word| word.0)
-    }
-
-    fn malformed(&self, message: String) -> Error {
-        Error::new(ErrorKind::Malformed, message)
-            .at(Place::Line(self.path.into(), self.line()))
-            .remedy("the file is cut short or damaged: copy it again")
-    }
-
-    fn take(&mut self, what: &str) -> Result<&'a str> {
-        let word = self.words.get(self.next).ok_or_else(|| self.malformed(format!("the file ends before {what}")))?;
-        self.next += 1;
-        Ok(word.1)
-    }
-
-    fn keyword(&mut self, keyword: &str) -> Result<()> {
-        if self.words.get(self.next).is_some_and(|word| word.1 == keyword) {
-            self.next += 1;
-            return Ok(());
-        }
-        Err(self.malformed(format!("the word '{keyword}' is missing")))
-    }
-
-    fn number(&mut self, what: &str) -> Result<f64> {
-        let word = self.take(what)?;
-        self.next -= 1;
-        let value: f64 = word.parse().map_err(|_| self.malformed(format!("'{word}' is not a number of {what}")))?;
-        if !value.is_finite() {
-            return Err(Error::new(ErrorKind::NonFinite, format!("{what} holds {word}"))
-                .at(Place::Line(self.path.into(), self.line()))
-                .remedy("remove the view or export its camera again"));
-        }
-        self.next += 1;
-        Ok(value)
-    }
-
-    fn index(&mut self, what: &str) -> Result<usize> {
-        let word = self.take(what)?;
-        word.parse().map_err(|_| {
-            self.next -= 1;
-            self.malformed(format!("'{word}' is not {what}"))
-        })
-    }
-}
 
 /// Reads a camera file of BlendedMVS: `extrinsic` 4x4, `intrinsic` 3x3, and a last line of 2 or 4 numbers (depth range),
 /// which may be missing.
 ///
 /// Yao et al. 2020, "BlendedMVS"; the layout is MVSNet's (Yao et al. 2018).
 pub fn read_cam_txt(path: &Path) -> Result<(SourceCamera, Vec<Finding>)> {
-    let text = read_text(path)?;
+    let text = text::read(path)?;
     let mut words = Words::new(path, &text);
     words.keyword("extrinsic")?;
     let mut extrinsic = [0.0; 16];
@@ -85,16 +24,19 @@ pub fn read_cam_txt(path: &Path) -> Result<(SourceCamera, Vec<Finding>)> {
     for value in &mut intrinsic {
         *value = words.number("the intrinsic matrix")?;
     }
-    let mut depth_numbers = 0;
-    while words.next < words.words.len() {
-        words.number("the depth range")?;
-        depth_numbers += 1;
-    }
+    // The depth range is not used here: whatever stands for it is no reason to refuse a camera.
+    let noticed = words.finding();
+    let depth_line = words.line();
+    let depth_numbers = words.left();
+    let (camera, mut findings) = camera_from_rows(&intrinsic, &extrinsic, &Place::File(path.into()))?;
+    findings.extend(noticed);
     if !matches!(depth_numbers, 0 | 2 | 4) {
-        words.next = words.words.len() - 1;
-        return Err(words.malformed(format!("the last line holds {depth_numbers} numbers, not 2 or 4")));
+        let message = format!("the depth range has {depth_numbers} words, not 2 or 4: it is not used");
+        findings.push(
+            Finding::new(Severity::Note, "camera-depth-ignored", message).at(Place::Line(path.into(), depth_line)),
+        );
     }
-    camera_from_rows(&intrinsic, &extrinsic, &Place::File(path.into()))
+    Ok((camera, findings))
 }
 
 /// A camera from row-major 3x3 intrinsics and 4x4 `camera_from_source`.
@@ -120,7 +62,7 @@ pub type Pairs = Vec<(usize, Vec<(usize, f64)>)>;
 
 /// Reads `pair.txt`: the number of views, then for each its index and `count id score id score ...`.
 pub fn read_pairs(path: &Path) -> Result<Pairs> {
-    let text = read_text(path)?;
+    let text = text::read(path)?;
     let mut words = Words::new(path, &text);
     let count = words.index("the number of views")?;
     let mut pairs = Vec::new();
@@ -133,7 +75,7 @@ pub fn read_pairs(path: &Path) -> Result<Pairs> {
         }
         pairs.push((view, list));
     }
-    if words.next < words.words.len() {
+    if words.left() > 0 {
         return Err(words.malformed(format!("more follows after the {count} views")));
     }
     Ok(pairs)
@@ -176,7 +118,7 @@ struct ViewJson {
 
 /// Reads `cameras.json`: `{"convention":"opencv","views":[{"file","width","height","K":3x3,"w2c":4x4}]}`.
 pub fn read_cameras_json(path: &Path) -> Result<(Vec<JsonView>, Vec<Finding>)> {
-    let text = read_text(path)?;
+    let text = text::read(path)?;
     let json: CamerasJson = serde_json::from_str(&text).map_err(|error| {
         Error::new(ErrorKind::Malformed, format!("not a list of cameras: {error}"))
             .at(Place::Line(path.into(), error.line().max(1)))
@@ -215,20 +157,4 @@ pub fn read_cameras_json(path: &Path) -> Result<(Vec<JsonView>, Vec<Finding>)> {
         });
     }
     Ok((views, findings))
-}
-
-/// Reads a text file of at most 256 MB.
-pub fn read_text(path: &Path) -> Result<String> {
-    let size = std::fs::metadata(path).map_err(|source| Error::reading(path, source))?.len();
-    if size > 1 << 28 {
-        return Err(Error::new(ErrorKind::TooLarge, format!("a text file of {size} bytes"))
-            .at(Place::File(path.into()))
-            .remedy("this is not the file it should be: check the path"));
-    }
-    let bytes = std::fs::read(path).map_err(|source| Error::reading(path, source))?;
-    String::from_utf8(bytes).map_err(|error| {
-        Error::new(ErrorKind::Malformed, "the file is not text")
-            .at(Place::Byte(path.into(), error.utf8_error().valid_up_to() as u64))
-            .remedy("the file is damaged: copy it again")
-    })
 }

@@ -8,9 +8,10 @@
 //! texel_seen.exr (or texel_covered.exr)                    texels to compare
 //! ```
 
-use super::camera_file::{read_cameras_json, read_text};
+use super::camera_file::read_cameras_json;
 use super::photos::shrink_linear;
 use super::source::{SourceScene, SourceView};
+use super::text;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::{Image, file};
 use crate::light::Environment;
@@ -38,7 +39,7 @@ fn read_scene_json(folder: &Path) -> Result<SceneJson> {
     if !path.is_file() {
         return Ok(SceneJson::default());
     }
-    serde_json::from_str(&read_text(&path)?).map_err(|error| {
+    serde_json::from_str(&text::read(&path)?).map_err(|error| {
         Error::new(ErrorKind::Malformed, format!("the description of the scene cannot be read: {error}"))
             .at(Place::Line(path, error.line().max(1)))
             .remedy("export the folder again")

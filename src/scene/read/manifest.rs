@@ -17,8 +17,9 @@
 //! ```
 
 use super::blended_mvs;
-use super::camera_file::{read_cameras_json, read_text};
+use super::camera_file::read_cameras_json;
 use super::source::{SourceCamera, SourceScene, SourceView};
+use super::text;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::scene::Background;
 use crate::scene::settings::{ColourEncoding, PixelCentre, Up};
@@ -82,7 +83,7 @@ enum CameraMatrix {
 
 /// Reads a manifest, lists what it names and reads the cameras.
 pub fn read(path: &Path) -> Result<SourceScene> {
-    let text = read_text(path)?;
+    let text = text::read(path)?;
     let manifest: Manifest = toml::from_str(&text).map_err(|error| {
         let line = error.span().map_or(1, |span| text[..span.start.min(text.len())].lines().count().max(1));
         Error::new(ErrorKind::Malformed, format!("the manifest cannot be read: {}", error.message()))

@@ -1,10 +1,11 @@
 //! From mesh files to one clean mesh.
 
-use super::{obj, ply};
+use super::{obj, outliers, ply, stl};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::scene::Mesh;
 use glam::{DVec3, Vec2, Vec3};
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::path::{Path, PathBuf};
 
 /// A mesh in the coordinates of its source, in `f64` because survey coordinates are large.
@@ -20,6 +21,14 @@ pub struct SourceMesh {
     pub triangles: Vec<[u32; 3]>,
     /// What the reader noticed.
     pub findings: Vec<Finding>,
+}
+
+/// Coordinates beyond this are no place of a scene.
+const LARGEST_COORDINATE: f64 = 1e30;
+
+/// Whether a vertex is somewhere: finite, and not so far out that it can only be a mistake.
+pub(super) fn is_a_place(point: DVec3) -> bool {
+    point.is_finite() && point.abs().max_element() <= LARGEST_COORDINATE
 }
 
 /// A vertex count as an index, or an error when a mesh outgrows 32-bit indices.
@@ -42,9 +51,11 @@ pub fn read_one(path: &Path) -> Result<SourceMesh> {
     match extension.as_str() {
         "obj" => obj::read(path),
         "ply" => ply::read(path),
+        "glb" | "gltf" => super::gltf::read(path),
+        "stl" => stl::read(path),
         _ => Err(Error::new(ErrorKind::Unsupported, format!("'.{extension}' is not a mesh that is read here"))
             .at(Place::File(path.into()))
-            .remedy("give an OBJ or a PLY file")),
+            .remedy("give an OBJ, PLY, glTF or STL file")),
     }
 }
 
@@ -91,7 +102,56 @@ pub fn read_pieces(paths: &[PathBuf]) -> Result<SourceMesh> {
         );
     }
     join_equal_vertices(&mut whole);
+    outliers::leave_out(&mut whole);
+    leave_out_copies(&mut whole);
     Ok(whole)
+}
+
+/// Leaves out triangles between the same three places as an earlier one, whichever way they are wound.
+fn leave_out_copies(mesh: &mut SourceMesh) {
+    let mut point_of_bits: HashMap<[u64; 3], u32> = HashMap::with_capacity(mesh.positions.len());
+    let points: Vec<u32> = mesh
+        .positions
+        .iter()
+        .map(|position| {
+            let next = point_of_bits.len() as u32;
+            *point_of_bits.entry((*position + 0.0).to_array().map(f64::to_bits)).or_insert(next)
+        })
+        .collect();
+    let mut first_of: HashMap<[u32; 3], [u32; 3]> = HashMap::with_capacity(mesh.triangles.len());
+    let (mut copies, mut reversed) = (0usize, 0usize);
+    mesh.triangles.retain(|triangle| {
+        let mut corners = triangle.map(|vertex| points[vertex as usize]);
+        let least = (0..3).min_by_key(|&corner| corners[corner]).unwrap_or(0);
+        corners.rotate_left(least);
+        let mut key = corners;
+        key.sort_unstable();
+        if key[0] == key[1] || key[1] == key[2] {
+            // What has no area is told of as such.
+            return true;
+        }
+        match first_of.entry(key) {
+            Entry::Vacant(vacant) => {
+                vacant.insert(corners);
+                true
+            }
+            Entry::Occupied(first) => {
+                copies += 1;
+                reversed += usize::from(*first.get() != corners);
+                false
+            }
+        }
+    });
+    if copies > 0 {
+        let severity = if copies * 20 > mesh.triangles.len() { Severity::Warning } else { Severity::Note };
+        let message = format!(
+            "{copies} triangles lie between the corners of an earlier one, {reversed} of them turned over: they are left out"
+        );
+        mesh.findings.push(
+            Finding::new(severity, "mesh-copies", message)
+                .remedy("rays meet the first of each only; export the mesh without double faces"),
+        );
+    }
 }
 
 /// Joins vertices whose position, normal and texture coordinate are the same bits; the first one stays.
@@ -129,6 +189,14 @@ fn join_equal_vertices(mesh: &mut SourceMesh) {
 }
 
 impl SourceMesh {
+    /// Lower and upper corner of the vertices in use, without those far from the others: `f32` is to fit what is there,
+    /// not what one bad vertex adds.
+    pub fn bounds_of_most(&self) -> Option<(DVec3, DVec3)> {
+        outliers::bounds_of_most(
+            self.triangles.iter().flatten().map(|&corner| self.positions[corner as usize]).collect(),
+        )
+    }
+
     /// Lower and upper corner of the referenced vertices; `None` without triangles.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         let mut points = self.triangles.iter().flatten().map(|&corner| self.positions[corner as usize]);
@@ -181,7 +249,7 @@ impl SourceMesh {
 pub fn read_mesh(path: &Path) -> Result<(Mesh, Vec<Finding>)> {
     let source = read_pieces(&[path.to_path_buf()])?;
     let origin_in_source =
-        source.bounds().and_then(|(low, high)| super::world::far_origin(low, high)).unwrap_or_default();
+        source.bounds_of_most().and_then(|(low, high)| super::world::far_origin(low, high)).unwrap_or_default();
     let world = crate::scene::WorldFromSource { origin_in_source, ..Default::default() };
     let (mesh, findings) = source.into_world(&world);
     mesh.validate()?;

@@ -2,23 +2,31 @@
 //!
 //! [`read`] is the door. It finds out the kind of the scene ([`exchange`], [`blended_mvs`], [`manifest`]); each kind
 //! only lists files and reads cameras into a [`source::SourceScene`]. What follows is the same for all: mesh
-//! ([`mesh_file`], with `obj` and `ply`), up axis and origin ([`world`]), photos and masks ([`photos`]), pixel centres.
+//! ([`mesh_file`], with `obj`, `ply`, `gltf` and `stl`), up axis and origin ([`world`]), photos and masks ([`photos`]), pixel centres.
 //!
 //! What it refuses to do: guess. What is missing or contradictory is an error with place and remedy, or a finding; what
 //! was assumed is a finding. Whether the parts fit together is judged by [`doctor`](crate::scene::doctor), not here.
 
 pub mod blended_mvs;
+mod calibrated_size;
 pub mod camera_file;
 pub mod exchange;
+mod gltf;
 pub mod manifest;
 mod mask_names;
 mod matte;
 pub mod mesh_file;
 mod obj;
+mod obj_elements;
 mod orientation;
+pub mod outliers;
 pub mod photos;
 mod ply;
+mod ply_header;
+pub mod polygon;
 pub mod source;
+mod stl;
+pub mod text;
 pub mod world;
 
 pub use mesh_file::read_mesh;
@@ -62,6 +70,16 @@ fn find(path: &Path) -> Result<SourceScene> {
         Located::Exchange(folder) => exchange::read(&folder),
         Located::BlendedMvs(folder) => blended_mvs::read(&folder),
     }
+}
+
+/// The folders that hold photos and masks of a scene, without decoding any.
+///
+/// # Errors
+/// As of [`read`], as far as files are listed and cameras read.
+pub fn picture_folders(path: &Path) -> Result<std::collections::BTreeSet<PathBuf>> {
+    let views = find(path)?.views;
+    let files = views.iter().flat_map(|view| std::iter::once(&view.photo).chain(&view.mask));
+    Ok(files.filter_map(|file| file.parent().map(Path::to_path_buf)).collect())
 }
 
 /// Finds out whether a scene is at a path, and of which kind, by the names of files alone.
@@ -114,7 +132,7 @@ fn only_subfolder(folder: &Path) -> Result<Option<PathBuf>> {
 /// Turns, decodes and joins what a reader listed.
 fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
     let SourceScene { name, folder, mesh, views, mut findings, .. } = source;
-    let views = choose_views(views, settings.max_views, &folder)?;
+    let mut views = choose_views(views, settings.max_views, &folder)?;
 
     // The mesh, turned so that +y is up.
     let mut source_mesh = mesh_file::read_pieces(&mesh)?;
@@ -126,7 +144,7 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
     let asked_up = if settings.up == Up::Auto { source.up } else { settings.up };
     let (up, mut noticed) = world::up_in_source(asked_up, &cameras)?;
     findings.append(&mut noticed);
-    let world_from_source = world::world_from_source(up, source_mesh.bounds());
+    let world_from_source = world::world_from_source(up, source_mesh.bounds_of_most());
     let (mesh, mut noticed) = source_mesh.into_world(&world_from_source);
     findings.append(&mut noticed);
     mesh.validate()?;
@@ -163,6 +181,7 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
     let asked_centre =
         if settings.pixel_centre == PixelCentre::Auto { source.pixel_centre } else { settings.pixel_centre };
     let assumed_centre = if asked_centre == PixelCentre::Auto { source.default_pixel_centre } else { asked_centre };
+    calibrated_size::fit(&mut views, &loaded, assumed_centre.shift_pixels(), &mut findings)?;
     let mut joined = Vec::with_capacity(views.len());
     for (view, photo) in views.iter().zip(loaded) {
         joined.push(join(view, photo, &world_from_source, assumed_centre, settings.shrink, &mut findings));

@@ -1,214 +1,133 @@
-//! Wavefront OBJ, by `tobj`.
+//! Wavefront OBJ: what the file means is decided here, vertices are joined by `tobj`.
 //!
-//! `tobj` says what is wrong but not where, and takes index 0 for "no index". So the text is scanned first: every
-//! number and every index is checked, and the first bad line is named. The scan also sees coordinates too large for
-//! `f32` and shifts them before they are rounded.
+//! `tobj` takes lines (`l`) and points (`p`) for faces, knows neither `\` nor comments behind data, refuses vertices of
+//! four colours and `usemtl` without a name, and rounds to `f32` at once. So the file is read statement by statement
+//! ([`super::text`]), in `f64`: what no face uses is not looked at, polygons are cut ([`super::polygon`]), and `tobj` is
+//! given plain triangles near the origin, whose corners it joins. Their number is compared with that of the file.
 
 use super::mesh_file::SourceMesh;
+use super::obj_elements::{Elements, NONE};
+use super::text;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use glam::{DVec3, Vec2, Vec3};
-use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
 
-/// Reads all groups of an OBJ file as one mesh; polygons become fans of triangles.
+/// Reads all groups of an OBJ file as one mesh.
+///
+/// # Errors
+/// `Missing`, `Unreadable`, `Malformed` or `NonFinite`, with the line.
 pub fn read(path: &Path) -> Result<SourceMesh> {
     let bytes = std::fs::read(path).map_err(|source| Error::reading(path, source))?;
-    // Names of groups and materials may be in any encoding; nothing but names is lost here.
-    let text = String::from_utf8_lossy(&bytes);
-    let scan = scan(&text, path)?;
-    let shifted = scan.shift().map(|origin| (origin, shift_vertices(&text, origin)));
-    let (origin, text) = match &shifted {
-        Some((origin, text)) => (*origin, text.as_str()),
-        None => (DVec3::ZERO, text.as_ref()),
-    };
-    let mut mesh = load(text, path)?;
-    for position in &mut mesh.positions {
-        *position += origin;
-    }
-    if scan.materials.len() > 1 && !mesh.uvs.is_empty() {
-        mesh.findings.push(
-            Finding::new(
-                Severity::Note,
-                "mesh-uvs-dropped",
-                format!("the texture coordinates refer to {} textures and are not kept", scan.materials.len()),
-            )
-            .at(Place::File(path.into()))
-            .remedy("nothing is lost: the fit makes its own atlas"),
+    let mut elements = Elements::read(&text::decode(bytes, path)?, path)?;
+    let triangles = elements.triangles(path)?;
+    let mut findings = elements.findings(path);
+    let with_uvs = keep(&triangles, 1, &elements.uvs, "texture coordinates", &mut findings, path);
+    let with_normals = keep(&triangles, 2, &elements.normals, "normals", &mut findings, path);
+    let with_uvs = with_uvs && elements.materials.len() < 2;
+    if elements.materials.len() > 1 && !elements.uvs.is_empty() {
+        let message =
+            format!("the texture coordinates refer to {} textures and are not kept", elements.materials.len());
+        findings.push(
+            Finding::new(Severity::Note, "mesh-uvs-dropped", message)
+                .at(Place::File(path.into()))
+                .remedy("nothing is lost: the fit makes its own atlas"),
         );
-        mesh.uvs.clear();
     }
+    let origin = elements.origin(&triangles);
+    let plain = plain_text(&elements, &triangles, origin, with_uvs, with_normals);
+    let mut mesh = join(&plain, path)?;
+    if mesh.triangles.len() != triangles.len() {
+        let message = format!("{} triangles were read of {} in the file", mesh.triangles.len(), triangles.len());
+        return Err(Error::new(ErrorKind::Internal, message).at(Place::File(path.into())));
+    }
+    mesh.positions.iter_mut().for_each(|position| *position += origin);
+    mesh.findings = findings;
     Ok(mesh)
 }
 
-fn load(text: &str, path: &Path) -> Result<SourceMesh> {
-    let options = tobj::LoadOptions { triangulate: true, single_index: true, ignore_points: true, ignore_lines: true };
-    // Materials are not read: an empty library keeps `tobj` from splitting groups by material.
+/// Whether every corner has a good attribute of a kind (1 texture coordinate, 2 normal), so that the mesh can keep them.
+/// Where some have one, what is dropped is told.
+fn keep<T>(
+    triangles: &[[[u32; 3]; 3]],
+    kind: usize,
+    values: &[Option<T>],
+    what: &str,
+    findings: &mut Vec<Finding>,
+    path: &Path,
+) -> bool {
+    let is_good = |index: u32| values.get(index as usize).is_some_and(Option::is_some);
+    let corners = || triangles.iter().flatten().map(|corner| corner[kind]);
+    let (named, good) = (corners().filter(|&index| index != NONE).count(), corners().filter(|&i| is_good(i)).count());
+    let all = 3 * triangles.len();
+    if named > 0 && good < all {
+        let message = format!("{} of {all} corners have no {what} that can be used: none are kept", all - good);
+        let code = if kind == 1 { "mesh-uvs-dropped" } else { "mesh-normals-dropped" };
+        let remedy = if kind == 1 {
+            "nothing is lost: the fit makes its own atlas"
+        } else {
+            "normals are computed from the triangles; export the mesh again for its own"
+        };
+        findings.push(Finding::new(Severity::Note, code, message).at(Place::File(path.into())).remedy(remedy));
+    }
+    good == all
+}
+
+/// The triangles as a text that every reader of OBJ reads alike.
+fn plain_text(
+    elements: &Elements,
+    triangles: &[[[u32; 3]; 3]],
+    origin: DVec3,
+    with_uvs: bool,
+    with_normals: bool,
+) -> String {
+    let mut plain = String::with_capacity(40 * elements.positions.len() + 30 * triangles.len());
+    // Writing to a string cannot fail.
+    for position in &elements.positions {
+        // No triangle uses what is not finite; its place is kept, since corners count.
+        let DVec3 { x, y, z } = if position.is_finite() { *position - origin } else { DVec3::ZERO };
+        let _ = writeln!(plain, "v {x} {y} {z}");
+    }
+    for uv in elements.uvs.iter().filter(|_| with_uvs) {
+        let [u, v] = uv.unwrap_or_default();
+        let _ = writeln!(plain, "vt {u} {v}");
+    }
+    for normal in elements.normals.iter().filter(|_| with_normals) {
+        let [x, y, z] = normal.unwrap_or_default();
+        let _ = writeln!(plain, "vn {x} {y} {z}");
+    }
+    for triangle in triangles {
+        plain.push('f');
+        for corner in triangle {
+            let [vertex, uv, normal] = corner.map(|index| u64::from(index) + 1);
+            let _ = match (with_uvs, with_normals) {
+                (false, false) => write!(plain, " {vertex}"),
+                (true, false) => write!(plain, " {vertex}/{uv}"),
+                (false, true) => write!(plain, " {vertex}//{normal}"),
+                (true, true) => write!(plain, " {vertex}/{uv}/{normal}"),
+            };
+        }
+        plain.push('\n');
+    }
+    plain
+}
+
+/// One vertex for each corner that differs, by `tobj`.
+fn join(plain: &str, path: &Path) -> Result<SourceMesh> {
+    let options = tobj::LoadOptions { triangulate: true, single_index: true, ..Default::default() };
     let (models, _) =
-        tobj::load_obj_buf(&mut text.as_bytes(), &options, |_| Ok(Default::default())).map_err(|error| {
-            Error::new(ErrorKind::Malformed, format!("the OBJ file cannot be read: {error}"))
+        tobj::load_obj_buf(&mut plain.as_bytes(), &options, |_| Ok(Default::default())).map_err(|error| {
+            Error::new(ErrorKind::Internal, format!("the triangles cannot be joined: {error}"))
                 .at(Place::File(path.into()))
-                .remedy("export the mesh again; a group may only use vertices listed before its end")
         })?;
-    // Where only some corners of a group have an attribute, `tobj` lists it for those alone: it cannot be assigned.
-    let complete = |length: fn(&tobj::Mesh) -> usize| {
-        models.iter().all(|model| length(&model.mesh) == model.mesh.positions.len() / 3)
-    };
-    let with_normals = complete(|mesh| mesh.normals.len() / 3);
-    let with_uvs = complete(|mesh| mesh.texcoords.len() / 2);
     let mut result = SourceMesh::default();
     for tobj::Model { mesh, .. } in &models {
         let first = super::mesh_file::vertex_index(result.positions.len(), path)?;
-        super::mesh_file::vertex_index(result.positions.len() + mesh.positions.len() / 3, path)?;
-        result.positions.extend(
-            mesh.positions.chunks_exact(3).map(|p| DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))),
-        );
-        if with_normals {
-            result.normals.extend(mesh.normals.chunks_exact(3).map(Vec3::from_slice));
-        }
-        if with_uvs {
-            result.uvs.extend(mesh.texcoords.chunks_exact(2).map(Vec2::from_slice));
-        }
+        let points = mesh.positions.chunks_exact(3).map(|p| Vec3::from_slice(p).as_dvec3());
+        result.positions.extend(points);
+        result.normals.extend(mesh.normals.chunks_exact(3).map(Vec3::from_slice));
+        result.uvs.extend(mesh.texcoords.chunks_exact(2).map(Vec2::from_slice));
         result.triangles.extend(mesh.indices.chunks_exact(3).map(|t| [first + t[0], first + t[1], first + t[2]]));
     }
     Ok(result)
-}
-
-/// What the scan found.
-#[derive(Default)]
-struct Scan {
-    bounds: Option<(DVec3, DVec3)>,
-    materials: BTreeSet<String>,
-}
-
-impl Scan {
-    /// The point to subtract when `f32` would lose the shape: the bounding box is small and far from the origin.
-    fn shift(&self) -> Option<DVec3> {
-        let (low, high) = self.bounds?;
-        super::world::far_origin(low, high)
-    }
-}
-
-fn scan(text: &str, path: &Path) -> Result<Scan> {
-    let mut counts = [0i64; 3];
-    for line in text.lines() {
-        match line.split_whitespace().next() {
-            Some("v") => counts[0] += 1,
-            Some("vt") => counts[1] += 1,
-            Some("vn") => counts[2] += 1,
-            _ => {}
-        }
-    }
-    let mut scan = Scan::default();
-    let mut seen = [0i64; 3];
-    let mut faces = 0usize;
-    for (number, line) in text.lines().enumerate() {
-        let malformed = |message: String, remedy: &str| {
-            Error::new(ErrorKind::Malformed, message).at(Place::Line(path.into(), number + 1)).remedy(remedy)
-        };
-        let mut words = line.split_whitespace();
-        match words.next() {
-            Some("v") => {
-                seen[0] += 1;
-                let point = DVec3::from_array(numbers(words, &malformed)?);
-                if !point.is_finite() || point.abs().max_element() > 1e30 {
-                    return Err(Error::new(ErrorKind::NonFinite, format!("vertex {} is at {point}", seen[0]))
-                        .at(Place::Line(path.into(), number + 1))
-                        .remedy("remove the vertex or export the mesh again"));
-                }
-                scan.bounds = Some(scan.bounds.map_or((point, point), |(low, high)| (low.min(point), high.max(point))));
-            }
-            Some("vt") => {
-                seen[1] += 1;
-                numbers::<2>(words, &malformed)?;
-            }
-            Some("vn") => {
-                seen[2] += 1;
-                numbers::<3>(words, &malformed)?;
-            }
-            Some("f") => {
-                faces += 1;
-                let mut corners = 0;
-                for corner in words {
-                    corners += 1;
-                    check_corner(corner, seen, counts).map_err(|message| {
-                        malformed(message, "indices count from 1, or backwards from -1: export the mesh again")
-                    })?;
-                }
-                if corners < 3 {
-                    return Err(malformed(
-                        format!("a face of {corners} corners"),
-                        "a face needs three corners or more",
-                    ));
-                }
-            }
-            Some("usemtl") => {
-                scan.materials.insert(words.collect::<Vec<_>>().join(" "));
-            }
-            _ => {}
-        }
-    }
-    if faces == 0 {
-        return Err(Error::new(ErrorKind::Malformed, "the OBJ file holds no faces")
-            .at(Place::File(path.into()))
-            .remedy("give a surface mesh; a point cloud must be meshed first"));
-    }
-    Ok(scan)
-}
-
-fn numbers<const COUNT: usize>(
-    mut words: std::str::SplitWhitespace<'_>,
-    malformed: &impl Fn(String, &str) -> Error,
-) -> Result<[f64; COUNT]> {
-    let mut values = [0.0; COUNT];
-    for value in &mut values {
-        let word = words.next().ok_or_else(|| {
-            malformed(format!("fewer than {COUNT} numbers"), "the file is cut short or damaged: export it again")
-        })?;
-        *value = word.parse().map_err(|_| malformed(format!("'{word}' is not a number"), "export the mesh again"))?;
-    }
-    Ok(values)
-}
-
-/// Checks one corner `v/vt/vn` of a face; `seen` counts what came before this line, `counts` the whole file.
-fn check_corner(corner: &str, seen: [i64; 3], counts: [i64; 3]) -> std::result::Result<(), String> {
-    const NAMES: [&str; 3] = ["vertex", "texture coordinate", "normal"];
-    let mut parts = 0;
-    for (kind, part) in corner.split('/').enumerate() {
-        parts += 1;
-        if kind > 2 {
-            return Err(format!("'{corner}' has too many slashes"));
-        }
-        if part.is_empty() && kind > 0 {
-            continue;
-        }
-        let index: i64 = part.parse().map_err(|_| format!("'{corner}' is not an index"))?;
-        let absolute = if index < 0 { seen[kind] + index + 1 } else { index };
-        if index == 0 {
-            return Err(format!("index 0 is not a {}", NAMES[kind]));
-        }
-        if absolute < 1 || absolute > counts[kind] {
-            return Err(format!("{} {index} of {}", NAMES[kind], counts[kind]));
-        }
-    }
-    if parts == 0 { Err("an empty corner".into()) } else { Ok(()) }
-}
-
-/// The text with every vertex moved by `-origin` in `f64`; weights are divided out, colours dropped.
-fn shift_vertices(text: &str, origin: DVec3) -> String {
-    let mut shifted = String::with_capacity(text.len());
-    for line in text.lines() {
-        let mut words = line.split_whitespace();
-        if words.next() == Some("v") {
-            let values: Vec<f64> = words.map_while(|word| word.parse().ok()).collect();
-            let weight = if values.len() == 4 && values[3] != 0.0 { values[3] } else { 1.0 };
-            let point = DVec3::new(values[0], values[1], values[2]) / weight - origin;
-            // Writing to a string cannot fail.
-            let _ = writeln!(shifted, "v {} {} {}", point.x, point.y, point.z);
-        } else {
-            shifted.push_str(line);
-            shifted.push('\n');
-        }
-    }
-    shifted
 }

@@ -1,10 +1,11 @@
-//! Stanford PLY, ascii and binary of both byte orders, by `ply-rs-bw`.
+//! Stanford PLY, ascii and binary of both byte orders, by `ply-rs-bw` (after `ply_header`).
 //!
 //! A header may claim any number of elements. The claim is checked against the size of the file before anything is
 //! read, so that a lying file of one kilobyte costs one kilobyte.
 
-use super::mesh_file::{SourceMesh, vertex_index};
-use crate::error::{Error, ErrorKind, Place, Result};
+use super::mesh_file::{SourceMesh, is_a_place, vertex_index};
+use super::{ply_header, polygon};
+use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use glam::{DVec3, Vec2, Vec3};
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{
@@ -13,42 +14,132 @@ use ply_rs_bw::ply::{
 use std::io::Cursor;
 use std::path::Path;
 
-/// Reads a PLY mesh; polygons become fans of triangles.
+/// Reads a PLY mesh; polygons are cut into triangles.
 pub fn read(path: &Path) -> Result<SourceMesh> {
     let bytes = std::fs::read(path).map_err(|source| Error::reading(path, source))?;
-    let mut reader = Reader::new(Cursor::new(bytes.as_slice()));
-    let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(|error| {
-        malformed(path, &error, 0, format!("the PLY header cannot be read: {}", first_line(&error)))
-    })?;
+    let readable = ply_header::readable(&bytes, path)?;
+    let mut source = Source { path, reader: Reader::new(Cursor::new(&readable.bytes)), grown: readable.grown };
+    let header = Parser::<Skipped>::new()
+        .read_header(&mut source.reader)
+        .map_err(|error| malformed(path, 0, format!("the PLY header cannot be read: {}", first_line(&error))))?;
     let mut mesh = SourceMesh::default();
-    for element in header.elements.values() {
-        check_claim(path, &header, element, &bytes, &reader)?;
+    let mut faces: Vec<Vec<u32>> = Vec::new();
+    let mut face_lines: &[u32] = &[];
+    let mut vertex_lines: &[u32] = &[];
+    for (index, element) in header.elements.values().enumerate() {
+        check_claim(&header, element, &readable.bytes, &source)?;
+        let lines = readable.lines.get(index).map_or(&[][..], Vec::as_slice);
         match element.name.as_str() {
-            "vertex" => read_vertices(path, &mut reader, &header, element, &mut mesh)?,
-            "face" => read_faces(path, &mut reader, &header, element, &mut mesh)?,
+            "vertex" => {
+                read_vertices(&mut source, &header, element, &mut mesh)?;
+                vertex_lines = lines;
+            }
+            "face" => {
+                faces = read_faces(&mut source, &header, element)?;
+                face_lines = lines;
+            }
             "tristrips" => {
                 return Err(Error::new(ErrorKind::Unsupported, "the PLY file holds triangle strips")
                     .at(Place::File(path.into()))
                     .remedy("export the mesh as a list of faces"));
             }
             _ => {
-                payload::<Skipped>(path, &mut reader, &header, element)?;
+                payload::<Skipped>(&mut source, &header, element)?;
             }
         }
     }
-    if mesh.triangles.is_empty() {
+    if faces.is_empty() {
         return Err(Error::new(ErrorKind::Malformed, "the PLY file holds no faces")
             .at(Place::File(path.into()))
             .remedy("give a surface mesh; a point cloud must be meshed first"));
     }
+    let place = |lines: &[u32], index: usize| match lines.get(index) {
+        Some(&line) => Place::Line(path.into(), line as usize),
+        None => Place::File(path.into()),
+    };
+    cut(&mut mesh, &faces, &|index| place(face_lines, index), &|index| place(vertex_lines, index))?;
     Ok(mesh)
+}
+
+/// Cuts the faces into triangles. Faces of fewer than three corners and vertices that are not finite and not used are
+/// left out, and told.
+fn cut(
+    mesh: &mut SourceMesh,
+    faces: &[Vec<u32>],
+    place_of_face: &dyn Fn(usize) -> Place,
+    place_of_vertex: &dyn Fn(usize) -> Place,
+) -> Result<()> {
+    let (mut small, mut first_small) = (0usize, 0);
+    for (index, corners) in faces.iter().enumerate() {
+        let mut points = Vec::with_capacity(corners.len());
+        for &corner in corners {
+            let Some(position) = mesh.positions.get(corner as usize) else {
+                let message = format!("face {index} names vertex {} of {}", corner as i32, mesh.positions.len());
+                return Err(Error::new(ErrorKind::Malformed, message)
+                    .at(place_of_face(index))
+                    .remedy("the file is damaged: export it again"));
+            };
+            if !is_a_place(*position) {
+                return Err(Error::new(
+                    ErrorKind::NonFinite,
+                    format!("vertex {corner} is at {position}, and a face uses it"),
+                )
+                .at(place_of_vertex(corner as usize))
+                .remedy("remove the vertex or export the mesh again"));
+            }
+            points.push(*position);
+        }
+        if corners.len() < 3 {
+            first_small = if small == 0 { index } else { first_small };
+            small += 1;
+        }
+        let triangles = polygon::triangulate(&points);
+        mesh.triangles.extend(triangles.into_iter().map(|triangle| triangle.map(|corner| corners[corner])));
+    }
+    if small > 0 {
+        let message = format!("{small} faces have fewer than three corners, this is the first: they are left out");
+        mesh.findings.push(
+            Finding::new(Severity::Warning, "mesh-faces-dropped", message)
+                .at(place_of_face(first_small))
+                .remedy("look at the exporter if they should be surface"),
+        );
+    }
+    if mesh.triangles.is_empty() {
+        return Err(Error::new(ErrorKind::Malformed, "no face of the PLY file has three corners")
+            .at(place_of_face(first_small))
+            .remedy("give a surface mesh; a face needs three corners or more"));
+    }
+    let bad: Vec<usize> = (0..mesh.positions.len()).filter(|&index| !is_a_place(mesh.positions[index])).collect();
+    if let Some(&first) = bad.first() {
+        // Their places are kept, since corners count.
+        bad.iter().for_each(|&index| mesh.positions[index] = DVec3::ZERO);
+        let message =
+            format!("{} vertices that no face uses are not finite, this is the first: they are left out", bad.len());
+        mesh.findings.push(Finding::new(Severity::Note, "mesh-vertices-dropped", message).at(place_of_vertex(first)));
+    }
+    Ok(())
+}
+
+/// The bytes that are read, and how far they are.
+struct Source<'a> {
+    path: &'a Path,
+    reader: ByteReader<'a>,
+    /// Bytes by which the header grew.
+    grown: i64,
+}
+
+impl Source<'_> {
+    /// The byte of the file that is read next.
+    fn byte(&self) -> u64 {
+        self.reader.get_ref().position().saturating_add_signed(-self.grown)
+    }
 }
 
 type ByteReader<'a> = Reader<Cursor<&'a [u8]>>;
 
 /// Refuses an element whose smallest possible size is larger than what is left of the file.
-fn check_claim(path: &Path, header: &Header, element: &ElementDef, bytes: &[u8], reader: &ByteReader) -> Result<()> {
-    let left = (bytes.len() as u64).saturating_sub(reader.get_ref().position());
+fn check_claim(header: &Header, element: &ElementDef, bytes: &[u8], source: &Source) -> Result<()> {
+    let left = (bytes.len() as u64).saturating_sub(source.reader.get_ref().position());
     let smallest: u64 = match header.encoding {
         // A digit and a separator for each number.
         Encoding::Ascii => 2 * element.properties.len() as u64,
@@ -71,7 +162,7 @@ fn check_claim(path: &Path, header: &Header, element: &ElementDef, bytes: &[u8],
                 smallest.max(1)
             ),
         )
-        .at(Place::Byte(path.into(), bytes.len() as u64))
+        .at(Place::Byte(source.path.into(), (bytes.len() as u64).saturating_add_signed(-source.grown)))
         .remedy("the file is cut short or damaged: copy it again"));
     }
     Ok(())
@@ -86,30 +177,22 @@ fn size_of_scalar(scalar: &ScalarType) -> u64 {
     }
 }
 
-fn payload<E: PropertyAccess>(
-    path: &Path,
-    reader: &mut ByteReader,
-    header: &Header,
-    element: &ElementDef,
-) -> Result<Vec<E>> {
-    let parsed = Parser::<E>::new().read_payload_for_element(reader, element, header);
+fn payload<E: PropertyAccess>(source: &mut Source, header: &Header, element: &ElementDef) -> Result<Vec<E>> {
+    let parsed = Parser::<E>::new().read_payload_for_element(&mut source.reader, element, header);
     parsed.map_err(|error| {
-        let byte = reader.get_ref().position();
         let message = if error.kind() == std::io::ErrorKind::UnexpectedEof {
             format!("the file ends within the {} elements '{}'", element.count, element.name)
         } else {
             format!("an element '{}' cannot be read: {}", element.name, first_line(&error))
         };
-        malformed(path, &error, byte, message)
+        malformed(source.path, source.byte(), message)
     })
 }
 
-fn malformed(path: &Path, error: &ParseError, byte: u64, message: String) -> Error {
-    let place = match error.line() {
-        Some(line) => Place::Line(path.into(), line),
-        None => Place::Byte(path.into(), byte),
-    };
-    Error::new(ErrorKind::Malformed, message).at(place).remedy("the file is cut short or damaged: copy it again")
+fn malformed(path: &Path, byte: u64, message: String) -> Error {
+    Error::new(ErrorKind::Malformed, message)
+        .at(Place::Byte(path.into(), byte))
+        .remedy("the file is cut short or damaged: copy it again")
 }
 
 /// The parser quotes the offending line below its message; one line is enough here.
@@ -117,36 +200,19 @@ fn first_line(error: &ParseError) -> String {
     error.to_string().lines().next().unwrap_or_default().to_owned()
 }
 
-fn read_vertices(
-    path: &Path,
-    reader: &mut ByteReader,
-    header: &Header,
-    element: &ElementDef,
-    mesh: &mut SourceMesh,
-) -> Result<()> {
+fn read_vertices(source: &mut Source, header: &Header, element: &ElementDef, mesh: &mut SourceMesh) -> Result<()> {
     let has = |names: &[&str]| names.iter().all(|name| element.properties.contains_key(*name));
     if !has(&["x", "y", "z"]) {
         return Err(Error::new(ErrorKind::Malformed, "the vertices have no x, y and z")
-            .at(Place::File(path.into()))
+            .at(Place::File(source.path.into()))
             .remedy("export the mesh again"));
     }
     let with_normals = has(&["nx", "ny", "nz"]);
     let with_uvs = has(&["s", "t"]) || has(&["u", "v"]) || has(&["texture_u", "texture_v"]);
-    let first_line = reader.line();
-    let vertices = payload::<Vertex>(path, reader, header, element)?;
-    vertex_index(vertices.len(), path)?;
-    for (index, Vertex(values)) in vertices.iter().enumerate() {
-        let position = DVec3::new(values[0], values[1], values[2]);
-        if !position.is_finite() || position.abs().max_element() > 1e30 {
-            let place = match header.encoding {
-                Encoding::Ascii => Place::Line(path.into(), first_line + index),
-                _ => Place::File(path.into()),
-            };
-            return Err(Error::new(ErrorKind::NonFinite, format!("vertex {index} is at {position}"))
-                .at(place)
-                .remedy("remove the vertex or export the mesh again"));
-        }
-        mesh.positions.push(position);
+    let vertices = payload::<Vertex>(source, header, element)?;
+    vertex_index(vertices.len(), source.path)?;
+    for Vertex(values) in &vertices {
+        mesh.positions.push(DVec3::new(values[0], values[1], values[2]));
         if with_normals {
             mesh.normals.push(Vec3::new(values[3] as f32, values[4] as f32, values[5] as f32));
         }
@@ -157,45 +223,13 @@ fn read_vertices(
     Ok(())
 }
 
-fn read_faces(
-    path: &Path,
-    reader: &mut ByteReader,
-    header: &Header,
-    element: &ElementDef,
-    mesh: &mut SourceMesh,
-) -> Result<()> {
-    let first_line = reader.line();
+fn read_faces(source: &mut Source, header: &Header, element: &ElementDef) -> Result<Vec<Vec<u32>>> {
     if !["vertex_indices", "vertex_index"].iter().any(|name| element.properties.contains_key(*name)) {
         return Err(Error::new(ErrorKind::Malformed, "the faces have no list vertex_indices")
-            .at(Place::File(path.into()))
+            .at(Place::File(source.path.into()))
             .remedy("export the mesh again"));
     }
-    let count = if mesh.positions.is_empty() {
-        header.elements.get("vertex").map_or(0, |vertices| vertices.count)
-    } else {
-        mesh.positions.len()
-    };
-    for (index, Face(corners)) in payload::<Face>(path, reader, header, element)?.iter().enumerate() {
-        let place = || match header.encoding {
-            Encoding::Ascii => Place::Line(path.into(), first_line + index),
-            _ => Place::File(path.into()),
-        };
-        if let Some(corner) = corners.iter().find(|&&corner| corner as usize >= count) {
-            return Err(Error::new(
-                ErrorKind::Malformed,
-                format!("face {index} names vertex {} of {count}", *corner as i32),
-            )
-            .at(place())
-            .remedy("the file is damaged: export it again"));
-        }
-        if corners.len() < 3 {
-            return Err(Error::new(ErrorKind::Malformed, format!("face {index} has {} corners", corners.len()))
-                .at(place())
-                .remedy("a face needs three corners or more"));
-        }
-        mesh.triangles.extend(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]));
-    }
-    Ok(())
+    Ok(payload::<Face>(source, header, element)?.into_iter().map(|Face(corners)| corners).collect())
 }
 
 /// Position, normal and texture coordinate.

@@ -60,7 +60,7 @@ impl Net {
     pub fn new(width: usize, height: usize, channels: usize) -> Result<Self> {
         let invalid = |message: String| {
             Err(Error::new(ErrorKind::InvalidSetting, message)
-                .at(Place::Setting("light-size".into()))
+                .at(Place::Setting("light-height".into()))
                 .remedy("ask for a map of 16, 32, 64 or 128 rows and twice as many columns, or for another prior"))
         };
         if height < 16 || width < 32 {

@@ -1,0 +1,98 @@
+//! STL, binary and ascii: loose triangles, whose corners are joined where they lie at one place.
+//!
+//! A binary file may begin with `solid` as an ascii one does: its length tells. Normals of facets are not taken up, they
+//! follow from the corners.
+
+use super::mesh_file::{SourceMesh, is_a_place, vertex_index};
+use super::text;
+use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use glam::{DVec3, Vec3};
+use std::path::Path;
+
+/// Bytes before the triangles: a header and their number.
+const FRONT: usize = 84;
+/// Bytes of a triangle: a normal, three corners, an attribute.
+const FACET: usize = 50;
+
+/// Reads an STL mesh.
+///
+/// # Errors
+/// `Malformed` or `NonFinite` with line or byte.
+pub fn read(path: &Path) -> Result<SourceMesh> {
+    let bytes = std::fs::read(path).map_err(|source| Error::reading(path, source))?;
+    let count = bytes.get(FRONT - 4..FRONT).map_or(0, |four| u32::from_le_bytes([four[0], four[1], four[2], four[3]]));
+    let length = FRONT as u64 + FACET as u64 * u64::from(count);
+    let (corners, findings) = if bytes.len() >= FRONT && bytes.len() as u64 == length {
+        (of_binary(&bytes[FRONT..], path)?, Vec::new())
+    } else if bytes.trim_ascii_start().starts_with(b"solid") || bytes.starts_with(b"\xef\xbb\xbf") {
+        of_ascii(bytes, path)?
+    } else {
+        let message = format!("{count} triangles take {length} bytes, the file has {}", bytes.len());
+        return Err(Error::new(ErrorKind::Malformed, message)
+            .at(Place::Byte(path.into(), bytes.len() as u64))
+            .remedy("the file is cut short or damaged: copy it again"));
+    };
+    if corners.is_empty() {
+        return Err(Error::new(ErrorKind::Malformed, "the STL file holds no triangles")
+            .at(Place::File(path.into()))
+            .remedy("export the mesh again"));
+    }
+    vertex_index(corners.len(), path)?;
+    let triangles = (0..corners.len() as u32 / 3).map(|index| [3 * index, 3 * index + 1, 3 * index + 2]).collect();
+    Ok(SourceMesh { positions: corners, triangles, findings, ..Default::default() })
+}
+
+fn of_binary(bytes: &[u8], path: &Path) -> Result<Vec<DVec3>> {
+    let mut corners = Vec::with_capacity(3 * (bytes.len() / FACET));
+    for (index, facet) in bytes.chunks_exact(FACET).enumerate() {
+        for corner in 0..3 {
+            let number = |axis: usize| {
+                let start = 12 + 12 * corner + 4 * axis;
+                f32::from_le_bytes([facet[start], facet[start + 1], facet[start + 2], facet[start + 3]])
+            };
+            let point = Vec3::new(number(0), number(1), number(2)).as_dvec3();
+            if !is_a_place(point) {
+                return Err(Error::new(ErrorKind::NonFinite, format!("a corner of triangle {index} is at {point}"))
+                    .at(Place::Byte(path.into(), (FRONT + FACET * index) as u64))
+                    .remedy("export the mesh again"));
+            }
+            corners.push(point);
+        }
+    }
+    Ok(corners)
+}
+
+fn of_ascii(bytes: Vec<u8>, path: &Path) -> Result<(Vec<DVec3>, Vec<Finding>)> {
+    let text = text::decode(bytes, path)?;
+    let mut corners = Vec::new();
+    let mut comma_line = None;
+    for statement in text::statements(&text) {
+        let mut words = statement.words();
+        if !words.next().is_some_and(|word| word.eq_ignore_ascii_case("vertex")) {
+            continue;
+        }
+        let comma = statement.has_decimal_commas();
+        let numbers: Vec<f64> = words.map_while(|word| text::number(word, comma)).collect();
+        let point = match numbers.as_slice() {
+            &[x, y, z] => DVec3::new(x, y, z),
+            _ => DVec3::NAN,
+        };
+        if !is_a_place(point) {
+            return Err(Error::new(ErrorKind::Malformed, "a vertex is not three finite numbers")
+                .at(Place::Line(path.into(), statement.line))
+                .remedy("the file is damaged: export the mesh again"));
+        }
+        comma_line = comma_line.or(comma.then_some(statement.line));
+        corners.push(point);
+    }
+    if corners.len() % 3 != 0 {
+        return Err(Error::new(ErrorKind::Malformed, "the file ends within a triangle")
+            .at(Place::Line(path.into(), text.lines().count()))
+            .remedy("the file is cut short: copy it again"));
+    }
+    let findings = comma_line.map(|line| {
+        Finding::new(Severity::Note, "decimal-commas", "numbers have decimal commas: they are read as points")
+            .at(Place::Line(path.into(), line))
+    });
+    Ok((corners, findings.into_iter().collect()))
+}

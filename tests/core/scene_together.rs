@@ -1,0 +1,135 @@
+//! Photos and cameras that do not belong together, and lights that are not one, are told by the photos alone.
+
+#![allow(clippy::unwrap_used, clippy::disallowed_methods)]
+
+use super::scene_fixture::*;
+use glam::{Vec2, Vec3};
+use patina::image::{Image, file};
+use patina::scene::doctor::lights::LightKind;
+use patina::scene::doctor::{Report, check};
+use patina::scene::{Photo, PixelState, ReadSettings, Scene, read, settings::PixelCentre};
+use patina::trace::Bvh;
+use patina::{Finding, Severity};
+
+/// The small scene without its masks.
+fn unmasked() -> Scene {
+    let mut scene = scene(8);
+    scene.views.iter_mut().for_each(|view| view.states.pixels_mut().fill(PixelState::Surface));
+    scene
+}
+
+fn finding<'a>(report: &'a Report, code: &str) -> &'a Finding {
+    let found = report.findings.iter().find(|finding| finding.code == code);
+    found.unwrap_or_else(|| {
+        panic!("{code} is not among {:#?}; {:?} {:?}", report.findings, report.agreement, report.light)
+    })
+}
+
+const ALL: [&str; 4] = ["photos-shifted", "photos-exchanged", "photo-turned", "photos-disagree"];
+
+#[test]
+fn photos_that_belong_agree() {
+    let report = check(&unmasked());
+    assert!(report.agreement.unwrap() > 0.65, "{:?}", report.agreement);
+    assert!(report.findings.iter().all(|finding| !ALL.contains(&finding.code)), "{:#?}", report.findings);
+    assert_eq!(report.light.unwrap().kind(), LightKind::One);
+}
+
+#[test]
+fn cameras_shifted_by_one_are_named_with_their_shift() {
+    for forwards in [true, false] {
+        let mut scene = unmasked();
+        let mut photos: Vec<Photo> = scene.views.iter().map(|view| view.photo.clone()).collect();
+        if forwards {
+            photos.rotate_right(1)
+        } else {
+            photos.rotate_left(1)
+        }
+        scene.views.iter_mut().zip(photos).for_each(|(view, photo)| view.photo = photo);
+        let report = check(&scene);
+        let shifted = finding(&report, "photos-shifted");
+        // A photo that lies one place further on in the list belongs to the camera before.
+        assert!(shifted.message.contains(if forwards { "after its own" } else { "before its own" }), "{shifted}");
+    }
+}
+
+#[test]
+fn two_exchanged_photos_and_a_turned_one_are_named() {
+    let mut exchanged = unmasked();
+    let photo = exchanged.views[2].photo.clone();
+    exchanged.views[2].photo = std::mem::replace(&mut exchanged.views[5].photo, photo);
+    let report = check(&exchanged);
+    let told = finding(&report, "photos-exchanged");
+    assert!(told.message.contains("00000002") && told.message.contains("00000005"), "{told}");
+
+    let mut turned = unmasked();
+    let Photo::Srgb8(bytes) = &turned.views[3].photo else { unreachable!() };
+    let half = Image::from_fn(SIZE.0, SIZE.1, |row, column| bytes[(SIZE.1 - 1 - row, SIZE.0 - 1 - column)]);
+    turned.views[3].photo = Photo::Srgb8(half);
+    let report = check(&turned);
+    let told = finding(&report, "photo-turned");
+    assert!(told.place.contains("00000003") && told.message.contains("180"), "{told}");
+
+    let mut foreign = unmasked();
+    let noise = Image::from_fn(SIZE.0, SIZE.1, |row, column| [(40 + (row / 9 * 37 + column / 7 * 101) % 180) as u8; 3]);
+    foreign.views[6].photo = Photo::Srgb8(noise);
+    let report = check(&foreign);
+    assert!(finding(&report, "photos-disagree").message.ends_with(": 00000006"), "{:#?}", report.findings);
+}
+
+/// Photos whose surface is lit by one more light, from a direction of each view's own.
+fn relit(light_of_view: impl Fn(usize, &Scene) -> Vec3) -> Scene {
+    let mut scene = unmasked();
+    let bvh = Bvh::build(&scene.mesh.positions, &scene.mesh.triangles).unwrap();
+    for index in 0..scene.views.len() {
+        let light = light_of_view(index, &scene);
+        let view = &scene.views[index];
+        let linear = Image::from_fn(SIZE.0, SIZE.1, |row, column| {
+            let hit = bvh.closest_hit(&view.camera.ray_through(Vec2::new(column as f32 + 0.5, row as f32 + 0.5)));
+            let normal =
+                hit.map_or(Vec3::ZERO, |hit| scene.mesh.area_vector(hit.triangle as usize).normalize_or_zero());
+            view.photo.radiance(row, column) * (0.15 + normal.dot(light).max(0.0))
+        });
+        scene.views[index].photo = Photo::Srgb8(bytes_of(&linear));
+    }
+    scene
+}
+
+#[test]
+fn a_light_that_turns_with_the_camera_and_two_lights_are_told() {
+    let report = check(&relit(|_, _| Vec3::new(0.6, 0.7, -0.3)));
+    assert_eq!(report.light.as_ref().unwrap().kind(), LightKind::One, "{:?}", report.light);
+
+    let from_left = |view: usize, scene: &Scene| {
+        scene.views[view].camera.rotation_camera_from_world.transpose() * Vec3::new(-0.8, -0.5, -0.3)
+    };
+    let report = check(&relit(from_left));
+    assert_eq!(finding(&report, "light-turns-with-camera").severity, Severity::Warning);
+
+    let report = check(&relit(|view, _| if view < 4 { Vec3::new(0.9, 0.4, 0.0) } else { Vec3::new(-0.7, 0.5, 0.5) }));
+    assert!(finding(&report, "light-in-groups").place.contains("00000004"), "{:?}", report.light);
+}
+
+#[test]
+fn photos_at_twice_the_calibrated_size_are_read_with_scaled_intrinsics() {
+    let (_keep, folder) = folder();
+    let written = scene(4);
+    write_blended_mvs(&folder, &written, &FolderStyle::default());
+    for part in ["blended_images", "masks"] {
+        for entry in std::fs::read_dir(folder.join(part)).unwrap() {
+            let path = entry.unwrap().path();
+            let photo = file::read_srgb8(&path).unwrap();
+            let large = Image::from_fn(2 * SIZE.0, 2 * SIZE.1, |row, column| photo[(row / 2, column / 2)]);
+            file::write_png_srgb8(&path, &large).unwrap();
+        }
+    }
+    let settings = ReadSettings { pixel_centre: PixelCentre::Integer, ..Default::default() };
+    let scene = read(&folder, &settings).unwrap();
+    let told = scene.findings.iter().find(|finding| finding.code == "intrinsics-scaled").unwrap();
+    assert!(told.message.contains("2 times"), "{told}");
+    for (read, written) in scene.views.iter().zip(&written.views) {
+        assert!((read.camera.focal_pixels - 2.0 * written.camera.focal_pixels).length() < 1e-2);
+        assert!((read.camera.centre_pixels - 2.0 * written.camera.centre_pixels).length() < 1e-2);
+    }
+    assert!(check(&scene).views.iter().all(|view| view.mask_overlap.unwrap() > 0.95));
+}
