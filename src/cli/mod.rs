@@ -2,13 +2,15 @@
 //!
 //! [`arguments`] is what can be typed, [`fit`] drives a job and shows its events, [`measure`] audits and benches,
 //! [`contest`] holds methods against each other, [`study`] runs studies, [`measured`] is for measured reflectance and
-//! [`neural`] for its neural model, [`object`] is object mode, [`gauge`] moves the scale of a run,
+//! [`neural`] for its neural model, [`object`] is object mode, [`gauge`] moves the scale of a run, [`export`]
+//! writes it for other programs,
 //! [`turntable`] belongs to `relight`, [`commands`] holds
 //! the rest. Whatever is asked here can be asked of the library in the same words.
 
 pub mod arguments;
 pub mod commands;
 pub mod contest;
+pub mod export;
 pub mod fit;
 pub mod gauge;
 pub mod measure;
@@ -45,6 +47,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Task::Resume(options)) => fit::resume(&options, json),
         Some(Task::Check(options)) => commands::check(&options, json),
         Some(Task::Relight(options)) => commands::relight(&options, json),
+        Some(Task::Export(options)) => export::export(&options, json),
         Some(Task::Gauge(options)) => gauge::gauge(&options, json),
         Some(Task::Render(options)) => commands::render(&options, json),
         Some(Task::Compare(options)) => commands::compare(&options, json),

@@ -11,7 +11,8 @@
 //! and makes tables, [`contest`] holds methods against each other by the clock, [`hard`] on cases that break fits;
 //! [`scale`] and [`tracer_speed`] time parts; [`rivals`] fits reflectance models to measured tables. [`preview`] draws for
 //! a window beside a fit. After a fit, [`gallery`] makes what a user shows, [`gauge`] moves its scale, [`entanglement`]
-//! tells how much light is baked into the maps, [`regions`] reads measured materials for parts of a surface.
+//! tells how much light is baked into the maps, [`regions`] reads measured materials for parts of a surface,
+//! [`export`] writes a run for other programs.
 //!
 //! [`object`] is the job of object mode, light and reflectance from photos of one object; [`materials`] its library of
 //! materials to look at.
@@ -21,6 +22,7 @@ pub mod background;
 pub mod contest;
 pub mod demo;
 pub mod entanglement;
+pub mod export;
 mod facts;
 pub mod gallery;
 pub mod gauge;
