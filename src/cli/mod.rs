@@ -1,7 +1,8 @@
 //! The command line; it holds no algorithm.
 //!
 //! [`arguments`] is what can be typed, [`fit`] drives a job and shows its events, [`measured`] is for measured
-//! reflectance, [`object`] is object mode, [`gauge`] moves the scale of a run, [`turntable`] belongs to `relight`,
+//! reflectance, [`object`] is object mode, [`gauge`] moves the scale of a run, [`export`] writes it for other
+//! programs, [`turntable`] belongs to `relight`,
 //! [`commands`] holds the rest; `say` writes lines where somebody listens, `threads` starts what everything works on.
 //! Whatever is asked here can be asked of the library in the same words.
 
@@ -17,6 +18,7 @@ macro_rules! eprintln {
 
 pub mod arguments;
 pub mod commands;
+pub mod export;
 pub mod fit;
 pub mod gauge;
 pub mod measured;
@@ -51,6 +53,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Task::Resume(options)) => fit::resume(&options, json),
         Some(Task::Check(options)) => commands::check(&options, json),
         Some(Task::Relight(options)) => commands::relight(&options, json),
+        Some(Task::Export(options)) => export::export(&options, json),
         Some(Task::Gauge(options)) => gauge::gauge(&options, json),
         Some(Task::Render(options)) => commands::render(&options, json),
         Some(Task::Compare(options)) => commands::compare(&options, json),

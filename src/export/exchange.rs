@@ -99,7 +99,8 @@ pub fn write(scene: &Scene, truth: &Truth, options: &ExchangeOptions<'_>, folder
     if let Some(covered) = options.covered {
         write_exr_grey(&folder.join("texel_covered.exr"), &flags(covered))?;
     }
-    let entries = scene.views.iter().enumerate().map(|(index, view)| entry_of(index, &view.camera, view.held_out));
+    let entries = scene.views.iter().enumerate();
+    let entries = entries.map(|(index, view)| entry_of(file_of_view(index), &view.camera, view.held_out));
     write_json(&CameraList { convention: "opencv", views: entries.collect() }, &folder.join("cameras.json"))?;
     if options.with_photos {
         for (index, view) in scene.views.iter().enumerate() {
@@ -128,7 +129,16 @@ fn file_of_view(index: usize) -> String {
     format!("views/{index:04}.exr")
 }
 
-fn entry_of(index: usize, camera: &Camera, held_out: bool) -> CameraEntry {
+/// Writes the cameras of a scene in the world of the run as `cameras.json` of an exchange folder; views by their names.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_cameras(scene: &Scene, path: &Path) -> Result<()> {
+    let entries = scene.views.iter().map(|view| entry_of(format!("{}.png", view.name), &view.camera, view.held_out));
+    write_json(&CameraList { convention: "opencv", views: entries.collect() }, path)
+}
+
+fn entry_of(file: String, camera: &Camera, held_out: bool) -> CameraEntry {
     let (focal, centre) = (camera.focal_pixels.as_dvec2(), camera.centre_pixels.as_dvec2());
     let rotation = camera.rotation_camera_from_world.as_dmat3();
     let translation = camera.translation_camera_from_world.as_dvec3();
@@ -137,7 +147,7 @@ fn entry_of(index: usize, camera: &Camera, held_out: bool) -> CameraEntry {
         [axis.x, axis.y, axis.z, translation[row]]
     };
     CameraEntry {
-        file: file_of_view(index),
+        file,
         width: camera.width,
         height: camera.height,
         intrinsics: [[focal.x, 0.0, centre.x], [0.0, focal.y, centre.y], [0.0, 0.0, 1.0]],

@@ -151,7 +151,25 @@ impl RunFolder {
 
     /// Reads the result. Before anything is read, all missing files are named in one error.
     pub fn read_result(&self) -> Result<RunResult> {
-        let missing: Vec<&str> = RESULT_FILES.into_iter().filter(|name| !self.file(name).is_file()).collect();
+        self.read_with(|folder| Ok(Environment { radiance: folder.read_rgb(LIGHT_FILE)? }), &RESULT_FILES)
+    }
+
+    /// Reads the result of a run whose light may be missing: a black one stands for it, and the second value is false.
+    ///
+    /// # Errors
+    /// As [`RunFolder::read_result`], but for a missing light.
+    pub fn read_result_with_or_without_light(&self) -> Result<(RunResult, bool)> {
+        if self.file(LIGHT_FILE).is_file() {
+            return Ok((self.read_result()?, true));
+        }
+        let needed: Vec<&str> = RESULT_FILES.into_iter().filter(|&name| name != LIGHT_FILE).collect();
+        let black = |_: &Self| Ok(Environment::constant(2, 1, glam::Vec3::ZERO));
+        Ok((self.read_with(black, &needed)?, false))
+    }
+
+    /// Reads the result, the light by the first argument; `needed` are the files that must be there.
+    fn read_with(&self, light: impl FnOnce(&Self) -> Result<Environment>, needed: &[&str]) -> Result<RunResult> {
+        let missing: Vec<&str> = needed.iter().copied().filter(|name| !self.file(name).is_file()).collect();
         if let Some(first) = missing.first() {
             let how = if self.checkpoint_path().is_file() {
                 "the fit has not ended: go on with `patina resume RUN`"
@@ -169,7 +187,7 @@ impl RunFolder {
                 specular: self.read_rgb("specular.exr")?,
                 roughness: self.read_grey("roughness.exr")?,
             },
-            environment: Environment { radiance: self.read_rgb("env.exr")? },
+            environment: light(self)?,
             mesh: obj::read(&self.file("mesh.obj"))?,
             times_seen: self.read_grey("seen.exr")?,
         };
@@ -248,7 +266,8 @@ impl RunFolder {
 pub const CAPTURE_FILE: &str = "capture.csv";
 /// The mark of a run folder: [`convention::SHEET`].
 const MARK_FILE: &str = "convention.txt";
-const RESULT_FILES: [&str; 6] = ["diffuse.exr", "specular.exr", "roughness.exr", "seen.exr", "env.exr", "mesh.obj"];
+const LIGHT_FILE: &str = "env.exr";
+const RESULT_FILES: [&str; 6] = ["diffuse.exr", "specular.exr", "roughness.exr", "seen.exr", LIGHT_FILE, "mesh.obj"];
 
 /// The same error with the command that makes the file as its remedy, where the file is missing or damaged.
 fn made_by(error: Error, command: &str) -> Error {

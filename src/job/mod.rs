@@ -7,8 +7,10 @@
 //!
 //! [`open`] opens scenes and runs, begins fits and takes them up; [`prepare`] turns a scene into a surface with an atlas,
 //! [`worker`] is the thread and [`handle`] what a watcher holds of it, `save` keeps the run folder whole while it runs,
-//! [`outcome`] renders, scores and writes the run folder, [`demo`] makes the built-in scene. [`preview`] draws for a window beside a fit. After a fit, [`gallery`] makes what a user shows, [`gauge`] moves its scale, [`entanglement`]
-//! tells how much light is baked into the maps, [`regions`] reads measured materials for parts of a surface, [`relight`](mod@relight) makes one picture.
+//! [`outcome`] renders, scores and writes the run folder, [`demo`] makes the built-in scene. [`preview`] draws for a window
+//! beside a fit. After a fit, [`gallery`] makes what a user shows, [`gauge`] moves its scale, [`entanglement`] tells how
+//! much light is baked into the maps, [`regions`] reads measured materials for parts of a surface,
+//! [`relight`](mod@relight) makes one picture, [`export`] writes a run for other programs.
 //!
 //! [`object`] is the job of object mode, light and reflectance from photos of one object; [`materials`] its library of
 //! materials to look at.
@@ -18,6 +20,7 @@ pub mod background;
 pub mod demo;
 pub mod entanglement;
 mod explained;
+pub mod export;
 mod facts;
 pub mod gallery;
 pub mod gauge;

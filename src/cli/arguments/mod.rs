@@ -43,6 +43,8 @@ pub enum Task {
     Object(Box<super::object::ObjectOptions>),
     /// Move a run along what photos leave open, reflectance against light, into a new run folder.
     Gauge(super::gauge::GaugeOptions),
+    /// Export a run to other renderers: GLB, USD, Mitsuba, Blender, MaterialX, texture sets, a page for browsers.
+    Export(super::export::ExportArguments),
     /// Render a run from a scene's cameras, as pictures or layers in linear EXR.
     Render(RenderOptions),
     /// Score a run against the photographs of a scene.

@@ -1,0 +1,353 @@
+//! A result made ready for other programs: maps filled past their charts, at the wanted size, in the numbers that others
+//! use. Every format writes from this.
+
+use super::lobe_fit::perceptual_roughness;
+use super::run_folder::RunResult;
+use super::sun::{Sun, sun_of};
+use crate::atlas::{covered_texels, dilate, nearest_covered};
+use crate::image::area::area_mean;
+use crate::image::resize::enlarge;
+use crate::image::{GreyImage, Image, RgbImage};
+use crate::light::Environment;
+use crate::material::MaterialMaps;
+use crate::scene::Mesh;
+use glam::Vec3;
+
+/// Everything a format may write.
+#[derive(Clone, Debug)]
+pub struct Asset {
+    /// Name of files and objects: letters, digits, `_` and `-`.
+    pub name: String,
+    /// The surface with texture coordinates and normals.
+    pub mesh: Mesh,
+    /// The maps as Patina means them, every texel filled.
+    pub maps: MaterialMaps,
+    /// Whether the surface has a specular lobe at all.
+    pub has_lobe: bool,
+    /// The light; `None` for a run without one.
+    pub light: Option<Light>,
+}
+
+/// The light of an asset.
+#[derive(Clone, Debug)]
+pub struct Light {
+    /// All of it.
+    pub whole: Environment,
+    /// Its sun, where it has one.
+    pub sun: Option<Sun>,
+}
+
+impl Asset {
+    /// Makes the asset of a result. `size` is the width of the written maps in texels; that of the result when `None`.
+    pub fn new(name: &str, result: RunResult, has_light: bool, has_lobe: bool, size: Option<usize>) -> Self {
+        let RunResult { maps, environment, mesh, .. } = result;
+        let (width, height) = (maps.diffuse.width(), maps.diffuse.height());
+        let nearest = nearest_covered(&covered_texels(&mesh, width, height));
+        let maps = MaterialMaps {
+            diffuse: dilate(&maps.diffuse, &nearest).map(|rgb| rgb.clamp(Vec3::ZERO, Vec3::ONE)),
+            specular: dilate(&maps.specular, &nearest).map(|rgb| rgb.clamp(Vec3::ZERO, Vec3::ONE)),
+            roughness: dilate(&maps.roughness, &nearest).map(|value| value.clamp(0.0, 1.0)),
+        };
+        drop(nearest);
+        let maps = match size.filter(|&size| size != width) {
+            Some(size) => resized(&maps, size, (size * height).div_ceil(width).max(1)),
+            None => maps,
+        };
+        let light = (has_light && environment.power().max_element() > 0.0).then(|| {
+            let sun = sun_of(&environment);
+            Light { whole: environment, sun }
+        });
+        Asset { name: file_name_of(name), mesh, maps, has_lobe, light }
+    }
+
+    /// Roughness of glTF, Disney, Blender: the square root of the width of the nearest GGX lobe.
+    pub fn perceptual_roughness(&self) -> GreyImage {
+        self.maps.roughness.map(|&roughness| perceptual_roughness(roughness))
+    }
+
+    /// Reflectance F0 as an index of refraction and a colour at most 1 that F0 of that index is multiplied by.
+    pub fn dielectric(&self) -> Dielectric {
+        let largest = self.maps.specular.pixels().iter().map(|f0| f0.max_element()).fold(0.0, f32::max);
+        let f0 = f64::from(largest).clamp(f64::from(LEAST_F0), 0.98);
+        let ior = (1.0 + f0.sqrt()) / (1.0 - f0.sqrt());
+        let scale = (1.0 / f0) as f32;
+        Dielectric { ior, colour: self.maps.specular.map(|specular| (*specular * scale).min(Vec3::ONE)) }
+    }
+
+    /// The index of refraction of the mean F0, for readers that take one for the whole surface; at least 1.
+    pub fn ior_of_mean(&self) -> f64 {
+        let count = self.maps.specular.pixels().len().max(1) as f64;
+        let sum: f64 = self.maps.specular.pixels().iter().map(|&f0| f64::from(crate::math::luminance(f0))).sum();
+        let root = (sum / count).clamp(0.0, 0.98).sqrt();
+        (1.0 + root) / (1.0 - root)
+    }
+
+    /// The diffuse map for a renderer that weighs its diffuse part by one minus a mean of Fresnel's factor: divided by
+    /// that. `grazing` is the mean of Schlick's `(1 - cos)^5` over the directions the renderer takes it at. The second
+    /// value is the share of texels that would exceed 1 and are held there.
+    pub fn diffuse_under_fresnel(&self, grazing: f32) -> (RgbImage, f64) {
+        if !self.has_lobe {
+            return (self.maps.diffuse.clone(), 0.0);
+        }
+        let mut held = 0usize;
+        let pixels = self.maps.diffuse.pixels().iter().zip(self.maps.specular.pixels());
+        let pixels: Vec<Vec3> = pixels
+            .map(|(diffuse, specular)| {
+                let f0 = specular.max_element();
+                let raised = *diffuse / (1.0 - (f0 + (1.0 - f0) * grazing)).max(0.02);
+                held += usize::from(raised.max_element() > 1.0);
+                raised.min(Vec3::ONE)
+            })
+            .collect();
+        let share = held as f64 / pixels.len().max(1) as f64;
+        (Image::from_pixels(self.maps.diffuse.width(), self.maps.diffuse.height(), pixels), share)
+    }
+}
+
+/// Mean of Schlick's `(1 - h.o)^5` over both directions by their cosines: what glTF weighs diffuse light by.
+pub const GRAZING_OF_HALF_VECTORS: f32 = 0.0037;
+/// Mean of `(1 - n.o)^5` over one direction by its cosine, 1/21: what layered models (Cycles, OpenPBR) weigh it by.
+pub const GRAZING_OF_VIEWS: f32 = 1.0 / 21.0;
+/// The least largest F0 that an index is chosen for: the default dielectric of every renderer.
+const LEAST_F0: f32 = 0.04;
+
+/// F0 above which a texel speaks for metals: no common dielectric but gems reflects so much.
+const METAL_F0: f32 = 0.16;
+
+impl MetalSplit {
+    /// Index of refraction of the largest F0 of what is no metal.
+    pub fn ior(&self) -> f64 {
+        let root = f64::from(self.dielectric_f0).sqrt();
+        (1.0 + root) / (1.0 - root)
+    }
+
+    /// The base colour for a renderer that weighs diffuse light by one minus a mean of Fresnel's factor, as
+    /// [`Asset::diffuse_under_fresnel`]; metals are left as they are. The second value is the share of texels held at 1.
+    pub fn base_colour_under_fresnel(&self, grazing: f32) -> (RgbImage, f64) {
+        let mut held = 0usize;
+        let texels = self.base_colour.pixels().iter().zip(self.metallic.pixels()).zip(self.specular_colour.pixels());
+        let pixels: Vec<Vec3> = texels
+            .map(|((base, metal), colour)| {
+                let f0 = colour.max_element() * self.dielectric_f0;
+                let factor = 1.0 / (1.0 - (f0 + (1.0 - f0) * grazing));
+                let raised = *base * (factor * (1.0 - metal) + metal);
+                held += usize::from(raised.max_element() > 1.0);
+                raised.min(Vec3::ONE)
+            })
+            .collect();
+        let share = held as f64 / pixels.len().max(1) as f64;
+        (Image::from_pixels(self.base_colour.width(), self.base_colour.height(), pixels), share)
+    }
+}
+
+/// F0 in the words of a dielectric.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dielectric {
+    /// Index of refraction, at least 1.5: that of the largest F0.
+    pub ior: f64,
+    /// `F0 / F0(ior)`, linear RGB in [0, 1].
+    pub colour: RgbImage,
+}
+
+/// Base colour and metalness in place of diffuse and specular reflectance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MetalSplit {
+    /// Diffuse reflectance of what is no metal, F0 of what is; linear RGB in [0, 1].
+    pub base_colour: RgbImage,
+    /// Share of metal in [0, 1].
+    pub metallic: GreyImage,
+    /// Luminance of the F0 of what is no metal over its largest, [`MetalSplit::dielectric_f0`], in [0, 1].
+    pub specular: GreyImage,
+    /// The same in colour.
+    pub specular_colour: RgbImage,
+    /// The largest F0 of what is no metal.
+    pub dielectric_f0: f32,
+    /// Root mean squared error of F0 over texels and channels.
+    pub error_f0: f64,
+    /// Root mean squared error of the diffuse reflectance.
+    pub error_diffuse: f64,
+}
+
+/// How the F0 of what is no metal may vary.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DielectricRange {
+    /// From 0 to this, by a map of its own.
+    UpTo(f32),
+    /// One F0 everywhere.
+    Always(f32),
+}
+
+impl Asset {
+    /// Diffuse and specular reflectance as base colour and metalness: with `u` the share that is no metal and `d` its
+    /// F0, luminances give `(1 - u) base + u d = F0` and `u base = diffuse`, a quadratic in `u` (as the conversion of
+    /// specular-glossiness of the glTF working group, with `d` for its 0.04).
+    pub fn metal_split(&self, range: DielectricRange) -> MetalSplit {
+        let (width, height) = (self.maps.diffuse.width(), self.maps.diffuse.height());
+        let count = width * height;
+        let mut base_colour = Vec::with_capacity(count);
+        let mut metallic = Vec::with_capacity(count);
+        let mut specular = Vec::with_capacity(count);
+        let mut specular_colour = Vec::with_capacity(count);
+        let (largest, varies) = match range {
+            DielectricRange::UpTo(most) => (most, true),
+            DielectricRange::Always(f0) => (f0, false),
+        };
+        let (mut squared_f0, mut squared_diffuse) = (0.0f64, 0.0f64);
+        for (&diffuse, &f0) in self.maps.diffuse.pixels().iter().zip(self.maps.specular.pixels()) {
+            let (bright_diffuse, bright_f0) = (crate::math::luminance(diffuse), crate::math::luminance(f0));
+            let (share, level) = if !self.has_lobe {
+                (1.0, 0.0)
+            } else if bright_f0 <= largest {
+                (1.0, if varies { bright_f0 / largest.max(1e-6) } else { 1.0 })
+            } else {
+                (dielectric_share(bright_diffuse, bright_f0, largest), 1.0)
+            };
+            let metal = 1.0 - share;
+            let from_diffuse = diffuse / share.max(1e-4);
+            let from_f0 = (f0 - Vec3::splat(share * level * largest)) / metal.max(1e-4);
+            let base = from_diffuse.lerp(from_f0, metal * metal).clamp(Vec3::ZERO, Vec3::ONE);
+            squared_diffuse += f64::from((base * share - diffuse).length_squared());
+            squared_f0 += f64::from((base * metal + Vec3::splat(share * level * largest) - f0).length_squared());
+            base_colour.push(base);
+            metallic.push(metal);
+            specular.push(level);
+            let whole = metal > 0.0 || !varies;
+            specular_colour.push(if whole { Vec3::splat(level) } else { (f0 / largest.max(1e-6)).min(Vec3::ONE) });
+        }
+        let root = |squared: f64| (squared / (3 * count.max(1)) as f64).sqrt();
+        MetalSplit {
+            base_colour: Image::from_pixels(width, height, base_colour),
+            metallic: Image::from_pixels(width, height, metallic),
+            specular: Image::from_pixels(width, height, specular),
+            specular_colour: Image::from_pixels(width, height, specular_colour),
+            dielectric_f0: largest,
+            error_f0: if self.has_lobe { root(squared_f0) } else { 0.0 },
+            error_diffuse: root(squared_diffuse),
+        }
+    }
+
+    /// Base colour and metalness for formats of the metalness workflow that take a colour of F0 as well: where the surface
+    /// has metals. An index of refraction that stands for a metal's F0 would spoil the rise towards grazing angles of all
+    /// that is no metal.
+    pub fn metals(&self) -> Option<MetalSplit> {
+        let brightest = || self.maps.specular.pixels().iter().filter(|f0| f0.max_element() > METAL_F0).count();
+        let has_metals = self.has_lobe && brightest() * 1000 > self.maps.specular.pixels().len();
+        has_metals.then(|| self.metal_split(DielectricRange::UpTo(super::texture_set::LARGEST_SPECULAR)))
+    }
+
+    /// A quantile of the luminance of F0, in [0, 1].
+    pub fn f0_quantile(&self, quantile: f64) -> f32 {
+        let step = (self.maps.specular.pixels().len() / 65_536).max(1);
+        let sampled = self.maps.specular.pixels().iter().step_by(step);
+        let values: Vec<f64> = sampled.map(|&f0| f64::from(crate::math::luminance(f0))).collect();
+        crate::math::statistics::quantile(&values, quantile) as f32
+    }
+}
+
+/// The share that is no metal: the smaller root of `d u^2 - (F0 + diffuse) u + diffuse = 0`, for `F0 > d`.
+fn dielectric_share(diffuse: f32, f0: f32, dielectric: f32) -> f32 {
+    let (diffuse, f0, dielectric) = (f64::from(diffuse), f64::from(f0), f64::from(dielectric));
+    let sum = diffuse + f0;
+    let root = (sum * sum - 4.0 * dielectric * diffuse).max(0.0).sqrt();
+    // 2 c / (b + root) keeps its digits for a small d.
+    (2.0 * diffuse / (sum + root).max(1e-9)).clamp(0.0, 1.0) as f32
+}
+
+fn resized(maps: &MaterialMaps, width: usize, height: usize) -> MaterialMaps {
+    if width < maps.diffuse.width() {
+        MaterialMaps {
+            diffuse: area_mean(&maps.diffuse, width, height),
+            specular: area_mean(&maps.specular, width, height),
+            roughness: area_mean(&maps.roughness, width, height),
+        }
+    } else {
+        MaterialMaps {
+            diffuse: enlarge(&maps.diffuse, width, height),
+            specular: enlarge(&maps.specular, width, height),
+            roughness: enlarge(&maps.roughness, width, height),
+        }
+    }
+}
+
+/// A name that every file system and every format takes.
+fn file_name_of(name: &str) -> String {
+    let kept: String = name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect();
+    match kept.chars().next() {
+        None => "patina".into(),
+        Some(first) if first.is_ascii_alphabetic() => kept,
+        Some(_) => format!("patina_{kept}"),
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use glam::Vec2;
+
+    /// Two triangles with a material that varies.
+    pub fn small_asset(has_lobe: bool) -> Asset {
+        let mesh = Mesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y],
+            normals: vec![Vec3::Z; 4],
+            uvs: vec![Vec2::new(0.1, 0.1), Vec2::new(0.9, 0.1), Vec2::new(0.9, 0.9), Vec2::new(0.1, 0.9)],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        };
+        let at = |row: usize, column: usize| (row as f32 / 15.0, column as f32 / 15.0);
+        let maps = MaterialMaps {
+            diffuse: Image::from_fn(16, 16, |row, column| Vec3::new(at(row, column).0, 0.3, at(row, column).1)),
+            specular: Image::from_fn(16, 16, |row, column| Vec3::new(0.04, 0.03, 0.05) * (1.0 + at(row, column).0)),
+            roughness: Image::from_fn(16, 16, |row, column| 0.05 + 0.9 * at(row, column).1),
+        };
+        let mut environment = Environment::constant(16, 8, Vec3::splat(0.2));
+        environment.radiance[(2, 3)] = Vec3::new(60.0, 55.0, 50.0);
+        let times_seen = Image::filled(16, 16, 1.0);
+        Asset::new("a run", RunResult { maps, environment, mesh, times_seen }, true, has_lobe, None)
+    }
+
+    #[test]
+    fn texels_outside_the_charts_take_the_nearest_inside() {
+        let asset = small_asset(true);
+        assert_eq!(asset.name, "a_run");
+        // The chart reaches from texel 1 to texel 14.
+        assert_eq!(asset.maps.diffuse[(0, 7)], asset.maps.diffuse[(1, 7)]);
+        assert_eq!(asset.maps.roughness[(9, 15)], asset.maps.roughness[(9, 14)]);
+        assert_ne!(asset.maps.diffuse[(1, 7)], asset.maps.diffuse[(2, 7)]);
+    }
+
+    #[test]
+    fn a_dielectric_says_the_same_f0() {
+        let asset = small_asset(true);
+        let Dielectric { ior, colour } = asset.dielectric();
+        let f0 = ((ior - 1.0) / (ior + 1.0)).powi(2) as f32;
+        for (colour, specular) in colour.pixels().iter().zip(asset.maps.specular.pixels()) {
+            assert!((*colour * f0 - *specular).abs().max_element() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn metals_and_paints_survive_the_split() {
+        let mut asset = small_asset(true);
+        asset.maps.diffuse = Image::from_pixels(3, 1, vec![Vec3::splat(0.5), Vec3::ZERO, Vec3::splat(0.3)]);
+        let gold = Vec3::new(0.9, 0.7, 0.3);
+        asset.maps.specular = Image::from_pixels(3, 1, vec![Vec3::splat(0.04), gold, Vec3::splat(0.3)]);
+        let split = asset.metal_split(DielectricRange::UpTo(0.08));
+        assert_eq!((split.metallic[(0, 0)], split.specular[(0, 0)]), (0.0, 0.5));
+        assert!((split.metallic[(0, 1)] - 1.0).abs() < 1e-6 && (split.base_colour[(0, 1)] - gold).length() < 1e-5);
+        assert!(split.metallic[(0, 2)] > 0.2 && split.metallic[(0, 2)] < 0.9);
+        assert!(split.error_f0 < 1e-4 && split.error_diffuse < 1e-4, "{split:?}");
+        // One F0 for all paints: what is below it is lost, and told.
+        let fixed = asset.metal_split(DielectricRange::Always(0.1));
+        assert!(fixed.error_f0 > 0.01);
+    }
+
+    #[test]
+    fn diffuse_light_is_raised_by_what_a_layer_takes() {
+        let (raised, held) = small_asset(true).diffuse_under_fresnel(GRAZING_OF_VIEWS);
+        let asset = small_asset(true);
+        let f0 = asset.maps.specular[(5, 5)].max_element();
+        let expected = asset.maps.diffuse[(5, 5)] / (1.0 - f0 - (1.0 - f0) / 21.0);
+        assert!((raised[(5, 5)] - expected).length() < 1e-6);
+        assert!(held > 0.0 && held < 0.2, "{held}");
+        assert_eq!(small_asset(false).diffuse_under_fresnel(0.1).1, 0.0);
+    }
+}

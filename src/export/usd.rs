@@ -1,0 +1,233 @@
+//! USD: a stage as text (`.usda`) beside its textures, and the same stage with everything inside (`.usdz`).
+//!
+//! The material is `UsdPreviewSurface` in its specular workflow, which takes diffuse reflectance, F0 and roughness as
+//! they are; `inputs:ior` is set too, for importers that know no specular workflow. Texture coordinates point up, as in
+//! Patina; the dome light's left border looks along -z, as in Patina.
+
+use super::asset::Asset;
+use super::environment_file::smooth;
+use super::texture::{Curve, Texture};
+use crate::error::{Error, ErrorKind, Result};
+use crate::files::{write_atomically, write_bytes};
+use crate::image::file::write_exr_rgb;
+use std::fmt::Write as _;
+use std::io::Write;
+use std::path::Path;
+
+/// Writes `NAME.usda`, its textures and `NAME.usdz` into a folder.
+///
+/// # Errors
+/// Files that cannot be written; `TooLarge` for a package beyond four gigabytes.
+pub fn write(asset: &Asset, folder: &Path, sixteen_bits: bool) -> Result<()> {
+    let mut files = vec![
+        ("textures/diffuse.png", Texture::Rgb(&asset.maps.diffuse).png(Curve::Srgb, sixteen_bits)?),
+        ("textures/roughness.png", Texture::Grey(&asset.perceptual_roughness()).png(Curve::Linear, sixteen_bits)?),
+    ];
+    if asset.has_lobe {
+        files.push(("textures/specular.png", Texture::Rgb(&asset.maps.specular).png(Curve::Srgb, sixteen_bits)?));
+    }
+    for (name, bytes) in &files {
+        write_bytes(&folder.join(name), bytes)?;
+    }
+    if let Some(light) = &asset.light {
+        let name = "textures/environment.exr";
+        write_exr_rgb(&folder.join(name), &smooth(&light.whole).radiance)?;
+        let path = folder.join(name);
+        files.push((name, std::fs::read(&path).map_err(|source| Error::reading(&path, source))?));
+    }
+    let stage = stage(asset).into_bytes();
+    let name = format!("{}.usda", asset.name);
+    write_bytes(&folder.join(&name), &stage)?;
+    let mut members: Vec<(&str, &[u8])> = vec![(&name, &stage)];
+    members.extend(files.iter().map(|(name, bytes)| (*name, bytes.as_slice())));
+    package(&folder.join(format!("{}.usdz", asset.name)), &members)
+}
+
+/// The stage as text.
+fn stage(asset: &Asset) -> String {
+    let name = &asset.name;
+    let mesh = &asset.mesh;
+    let mut text = format!(
+        "#usda 1.0\n(\n    defaultPrim = \"{name}\"\n    doc = \"Written by Patina; see convention.txt\"\n    \
+         metersPerUnit = 1\n    upAxis = \"Y\"\n)\n\ndef Xform \"{name}\" (\n    kind = \"component\"\n)\n{{\n"
+    );
+    let list = |values: &mut dyn Iterator<Item = String>| values.collect::<Vec<_>>().join(", ");
+    let vectors = |values: &[glam::Vec3]| list(&mut values.iter().map(|v| format!("({}, {}, {})", v.x, v.y, v.z)));
+    let (low, high) = mesh.bounds().unwrap_or_default();
+    let lines = [
+        "    def Mesh \"surface\" (\n        prepend apiSchemas = [\"MaterialBindingAPI\"]\n    )\n    {".to_string(),
+        "        uniform bool doubleSided = 1".into(),
+        format!("        float3[] extent = [{}]", vectors(&[low, high])),
+        format!("        int[] faceVertexCounts = [{}]", list(&mut mesh.triangles.iter().map(|_| "3".into()))),
+        format!(
+            "        int[] faceVertexIndices = [{}]",
+            list(&mut mesh.triangles.iter().flatten().map(u32::to_string))
+        ),
+        format!("        rel material:binding = </{name}/material>"),
+        format!(
+            "        normal3f[] normals = [{}] (\n            interpolation = \"vertex\"\n        )",
+            vectors(&mesh.normals)
+        ),
+        format!("        point3f[] points = [{}]", vectors(&mesh.positions)),
+        format!(
+            "        texCoord2f[] primvars:st = [{}] (\n            interpolation = \"vertex\"\n        )",
+            list(&mut mesh.uvs.iter().map(|uv| format!("({}, {})", uv.x, uv.y)))
+        ),
+        "        uniform token subdivisionScheme = \"none\"\n    }\n".into(),
+    ];
+    text.push_str(&lines.join("\n"));
+    text.push_str(&material(asset));
+    if asset.light.is_some() {
+        text.push_str(
+            "\n    def DomeLight \"environment\"\n    {\n        float inputs:intensity = 1\n        \
+             asset inputs:texture:file = @textures/environment.exr@\n        \
+             token inputs:texture:format = \"latlong\"\n    }\n",
+        );
+    }
+    text.push_str("}\n");
+    text
+}
+
+fn material(asset: &Asset) -> String {
+    let path = format!("/{}/material", asset.name);
+    let mut text = format!(
+        "\n    def Material \"material\"\n    {{\n        token outputs:surface.connect = <{path}/surface.outputs:surface>\n\n        \
+         def Shader \"surface\"\n        {{\n            uniform token info:id = \"UsdPreviewSurface\"\n            \
+         color3f inputs:diffuseColor.connect = <{path}/diffuse.outputs:rgb>\n            float inputs:ior = {}\n            \
+         float inputs:metallic = 0\n            float inputs:roughness.connect = <{path}/roughness.outputs:r>\n",
+        if asset.has_lobe { format!("{:.4}", asset.ior_of_mean()) } else { "1".into() }
+    );
+    if asset.has_lobe {
+        let _ = writeln!(text, "            color3f inputs:specularColor.connect = <{path}/specular.outputs:rgb>");
+    } else {
+        text.push_str("            color3f inputs:specularColor = (0, 0, 0)\n");
+    }
+    text.push_str(
+        "            int inputs:useSpecularWorkflow = 1\n            token outputs:surface\n        }\n\n        \
+         def Shader \"coordinates\"\n        {\n            uniform token info:id = \"UsdPrimvarReader_float2\"\n            \
+         string inputs:varname = \"st\"\n            float2 outputs:result\n        }\n",
+    );
+    let maps = [("diffuse", "sRGB", "float3 outputs:rgb"), ("roughness", "raw", "float outputs:r")];
+    let specular = asset.has_lobe.then_some(("specular", "sRGB", "float3 outputs:rgb"));
+    for (map, space, output) in maps.into_iter().chain(specular) {
+        let _ = write!(
+            text,
+            "\n        def Shader \"{map}\"\n        {{\n            uniform token info:id = \"UsdUVTexture\"\n            \
+             asset inputs:file = @textures/{map}.png@\n            token inputs:sourceColorSpace = \"{space}\"\n            \
+             float2 inputs:st.connect = <{path}/coordinates.outputs:result>\n            \
+             token inputs:wrapS = \"clamp\"\n            token inputs:wrapT = \"clamp\"\n            {output}\n        }}\n"
+        );
+    }
+    text.push_str("    }\n");
+    text
+}
+
+/// A zip file without compression whose members begin at multiples of 64 bytes, as USD asks of a package.
+fn package(path: &Path, members: &[(&str, &[u8])]) -> Result<()> {
+    const ALIGNMENT: usize = 64;
+    const LOCAL_HEADER: usize = 30;
+    let total: usize = members.iter().map(|(name, bytes)| bytes.len() + 2 * name.len() + 256).sum();
+    if u32::try_from(total).is_err() {
+        return Err(Error::new(ErrorKind::TooLarge, "the maps outgrow the four gigabytes of a package")
+            .remedy("write smaller maps with --size, or leave usd out of --to"));
+    }
+    let table = crc_table();
+    write_atomically(path, |writer| {
+        let mut directory = Vec::new();
+        let mut at = 0usize;
+        for (name, bytes) in members {
+            let crc = crc32(&table, bytes);
+            let padding = (ALIGNMENT - (at + LOCAL_HEADER + name.len() + 4) % ALIGNMENT) % ALIGNMENT;
+            // Version, flags, method (stored), time and date (1 January 1980), checksum, sizes, length of the name.
+            let mut common = Vec::new();
+            common.extend([20u16, 0, 0, 0, 0x21].into_iter().flat_map(u16::to_le_bytes));
+            common.extend([crc, bytes.len() as u32, bytes.len() as u32].into_iter().flat_map(u32::to_le_bytes));
+            common.extend((name.len() as u16).to_le_bytes());
+            writer.write_all(b"PK\x03\x04")?;
+            writer.write_all(&common)?;
+            writer.write_all(&(padding as u16 + 4).to_le_bytes())?;
+            writer.write_all(name.as_bytes())?;
+            // An extra field that only fills: an identifier of its own and its length.
+            writer.write_all(&0x1986u16.to_le_bytes())?;
+            writer.write_all(&(padding as u16).to_le_bytes())?;
+            writer.write_all(&vec![0; padding])?;
+            writer.write_all(bytes)?;
+            directory.extend(b"PK\x01\x02\x14\x00");
+            directory.extend(common);
+            directory.extend([0u8; 12]);
+            directory.extend((at as u32).to_le_bytes());
+            directory.extend(name.as_bytes());
+            at += LOCAL_HEADER + name.len() + 4 + padding + bytes.len();
+        }
+        writer.write_all(&directory)?;
+        writer.write_all(b"PK\x05\x06\0\0\0\0")?;
+        let count = (members.len() as u16).to_le_bytes();
+        writer.write_all(&[count, count].concat())?;
+        writer.write_all(&(directory.len() as u32).to_le_bytes())?;
+        writer.write_all(&(at as u32).to_le_bytes())?;
+        writer.write_all(&[0, 0])
+    })
+}
+
+/// The table of the checksum of zip: the polynomial 0xEDB88320, bits reversed.
+fn crc_table() -> [u32; 256] {
+    std::array::from_fn(|byte| {
+        (0..8).fold(byte as u32, |crc, _| if crc & 1 == 1 { (crc >> 1) ^ 0xEDB8_8320 } else { crc >> 1 })
+    })
+}
+
+fn crc32(table: &[u32; 256], bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(!0u32, |crc, &byte| table[((crc ^ u32::from(byte)) & 0xff) as usize] ^ (crc >> 8))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::asset::tests::small_asset;
+    use super::*;
+
+    #[test]
+    fn the_stage_names_every_texture_and_balances_its_braces() {
+        let folder = tempfile::tempdir().unwrap();
+        for has_lobe in [true, false] {
+            let asset = small_asset(has_lobe);
+            let text = stage(&asset);
+            assert_eq!(text.matches('{').count(), text.matches('}').count());
+            assert_eq!(text.matches('(').count(), text.matches(')').count());
+            assert!(text.contains("point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]"));
+            assert!(text.contains("primvars:st = [(0.1, 0.1), "));
+            assert!(text.contains("int inputs:useSpecularWorkflow = 1"));
+            assert_eq!(text.contains("specularColor.connect"), has_lobe);
+            assert_eq!(text.contains("specularColor = (0, 0, 0)"), !has_lobe);
+            let place = folder.path().join(format!("{has_lobe}"));
+            write(&asset, &place, true).unwrap();
+            for reference in text.split('@').skip(1).step_by(2) {
+                assert!(place.join(reference).is_file(), "{reference}");
+            }
+        }
+    }
+
+    #[test]
+    fn members_of_a_package_are_aligned_and_whole() {
+        assert_eq!(crc32(&crc_table(), b"123456789"), 0xCBF4_3926);
+        let folder = tempfile::tempdir().unwrap();
+        let asset = small_asset(true);
+        write(&asset, folder.path(), false).unwrap();
+        let bytes = std::fs::read(folder.path().join("a_run.usdz")).unwrap();
+        let word = |at: usize| usize::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
+        let long = |at: usize| word(at) + (word(at + 2) << 16);
+        let end = bytes.len() - 22;
+        assert_eq!(&bytes[end..end + 4], b"PK\x05\x06");
+        let (count, mut entry) = (word(end + 10), long(end + 16));
+        assert_eq!((entry + long(end + 12), count), (end, 5));
+        for _ in 0..count {
+            assert_eq!(&bytes[entry..entry + 4], b"PK\x01\x02");
+            let (size, name_length, local) = (long(entry + 24), word(entry + 28), long(entry + 42));
+            let name = std::str::from_utf8(&bytes[entry + 46..entry + 46 + name_length]).unwrap();
+            let data = local + 30 + word(local + 26) + word(local + 28);
+            assert_eq!(data % 64, 0, "{name}");
+            let on_disk = std::fs::read(folder.path().join(name)).unwrap();
+            assert_eq!(&bytes[data..data + size], on_disk, "{name}");
+            entry += 46 + name_length;
+        }
+    }
+}

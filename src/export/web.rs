@@ -1,0 +1,189 @@
+//! One HTML file that shows the result in any browser, with no network and no server.
+//!
+//! It holds the mesh, the maps and a few environments, already blurred by the fitted lobe for eight widths (split sum,
+//! Karis 2013), and a small viewer for WebGL 2. How much of the sky each vertex sees is baked with rays; shadows of
+//! the sun and light between surfaces are not shown, and the page says so.
+
+mod prefilter;
+
+use super::asset::Asset;
+use super::texture::{Curve, Texture};
+use crate::error::{Error, ErrorKind, Result};
+use crate::image::Image;
+use crate::light::Environment;
+use crate::math::frame::{Frame, sample_cosine_hemisphere};
+use crate::scene::{Camera, Mesh};
+use crate::trace::{Bvh, Ray};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use glam::Vec3;
+use rayon::prelude::*;
+use serde_json::{Value, json};
+
+const PAGE: &str = include_str!("web/page.html");
+const VIEWER: &str = include_str!("web/viewer.js");
+/// What a page may hold beyond its maps, in bytes.
+pub const LARGEST_BEYOND_MAPS: usize = 8_000_000;
+/// Rays from a vertex that find how much of the sky it sees.
+const OPENNESS_RAYS: usize = 64;
+
+/// A photograph to wipe against.
+#[derive(Clone, Debug)]
+pub struct PagePhoto {
+    /// Name of the view.
+    pub name: String,
+    /// Where it was taken, at the size of the picture.
+    pub camera: Camera,
+    /// The picture as a JPEG file.
+    pub jpeg: Vec<u8>,
+}
+
+/// A page and its parts in bytes.
+pub struct Page {
+    /// The file.
+    pub html: String,
+    /// Size of all but the maps, in bytes.
+    pub beyond_maps: usize,
+}
+
+/// Makes the page. `lights` are shown in this order under their names.
+///
+/// # Errors
+/// A mesh that rays cannot be traced in; maps without texels.
+pub fn page(asset: &Asset, lights: &[(String, Environment)], photos: &[PagePhoto]) -> Result<Page> {
+    let mesh = mesh_of(&asset.mesh)?;
+    let roughness = asset.maps.roughness.map(|&r| r.max(0.0).sqrt());
+    let maps = [
+        Texture::Rgb(&asset.maps.diffuse).png(Curve::Srgb, false)?,
+        Texture::Rgb(&asset.maps.specular).png(Curve::Srgb, false)?,
+        // The microfacet width itself: its square would spend the steps of a byte badly.
+        Texture::Grey(&roughness).png(Curve::Linear, false)?,
+    ];
+    let maps: Vec<String> = maps.iter().map(|png| format!("data:image/png;base64,{}", STANDARD.encode(png))).collect();
+    let maps_bytes: usize = maps.iter().map(String::len).sum();
+    let lights: Vec<Value> = lights.iter().map(|(name, light)| light_of(name, light)).collect();
+    let table = prefilter::reflectance_table();
+    let photos: Vec<Value> = photos.iter().map(photo_of).collect();
+    let document = json!({
+        "name": asset.name, "hasLobe": asset.has_lobe, "mesh": mesh, "maps": maps, "lights": lights,
+        "table": {"size": prefilter::TABLE_SIDE, "values": halves(table.into_iter().flatten())},
+        "levels": prefilter::LEVELS, "photos": photos,
+    });
+    // No text of a file may end the script.
+    let text = document.to_string().replace("</", "<\\/");
+    let html = PAGE.replace("@TITLE@", &asset.name).replace("@VIEWER@", VIEWER).replace("@DOCUMENT@", &text);
+    Ok(Page { beyond_maps: html.len() - maps_bytes, html })
+}
+
+/// Half floats as base64.
+fn halves(values: impl Iterator<Item = f32>) -> String {
+    let bytes: Vec<u8> = values.flat_map(|value| half::f16::from_f32(value.min(65_000.0)).to_le_bytes()).collect();
+    STANDARD.encode(bytes)
+}
+
+fn words(values: impl Iterator<Item = u16>) -> String {
+    STANDARD.encode(values.flat_map(u16::to_le_bytes).collect::<Vec<u8>>())
+}
+
+/// Positions on 65,536 steps of the bounding box, normals on 127, coordinates on 65,536, openness on 255.
+fn mesh_of(mesh: &Mesh) -> Result<Value> {
+    let (low, high) = mesh.bounds().ok_or_else(|| {
+        Error::new(ErrorKind::InvalidScene, "the mesh has no triangles")
+            .remedy("make the run again with `patina fit SCENE -o RUN`")
+    })?;
+    let extent = (high - low).max(Vec3::splat(1e-9));
+    let step = |share: f32| (share.clamp(0.0, 1.0) * 65_535.0 + 0.5) as u16;
+    let positions = mesh.positions.iter().flat_map(|&p| ((p - low) / extent).to_array().map(step));
+    let openness = openness_of(mesh)?;
+    let normals: Vec<u8> = mesh
+        .normals
+        .iter()
+        .zip(&openness)
+        .flat_map(|(normal, open)| {
+            let [x, y, z] = normal.to_array().map(|c| (c.clamp(-1.0, 1.0) * 127.0).round() as i8 as u8);
+            [x, y, z, (open.clamp(0.0, 1.0) * 127.0).round() as u8]
+        })
+        .collect();
+    let uvs = mesh.uvs.iter().flat_map(|uv| [step(uv.x), step(uv.y)]);
+    let indices: Vec<u8> = mesh.triangles.iter().flatten().flat_map(|index| index.to_le_bytes()).collect();
+    Ok(json!({
+        "low": low.to_array(), "extent": extent.to_array(), "positions": words(positions),
+        "normals": STANDARD.encode(normals), "uvs": words(uvs), "indices": STANDARD.encode(indices),
+    }))
+}
+
+/// Share of the sky, by the cosine, that each vertex sees.
+fn openness_of(mesh: &Mesh) -> Result<Vec<f32>> {
+    let bvh = Bvh::build(&mesh.positions, &mesh.triangles)?;
+    let (low, high) = bvh.bounds();
+    let lift = 1e-4 * (high - low).length();
+    let side = OPENNESS_RAYS.isqrt();
+    Ok(mesh
+        .positions
+        .par_iter()
+        .zip(&mesh.normals)
+        .map(|(&position, normal)| {
+            let normal = normal.try_normalize().unwrap_or(Vec3::Y);
+            let frame = Frame::around(normal);
+            let free = (0..side * side).filter(|index| {
+                let u = [(index / side) as f32 + 0.5, (index % side) as f32 + 0.5].map(|place| place / side as f32);
+                let direction = frame.outer_from_local(sample_cosine_hemisphere(u));
+                !bvh.is_occluded(&Ray { origin: position + normal * lift, direction, t_max: f32::INFINITY })
+            });
+            free.count() as f32 / (side * side) as f32
+        })
+        .collect())
+}
+
+fn light_of(name: &str, light: &Environment) -> Value {
+    let levels = prefilter::levels(light);
+    let pack = |image: &Image<Vec3>| halves(image.pixels().iter().flat_map(|rgb| [rgb.x, rgb.y, rgb.z, 1.0]));
+    let levels: Vec<Value> = levels
+        .iter()
+        .map(|image| json!({"width": image.width(), "height": image.height(), "values": pack(image)}))
+        .collect();
+    let irradiance = prefilter::irradiance(light);
+    let mean = crate::math::luminance(light.mean_radiance());
+    json!({
+        "name": name, "levels": levels, "mean": mean,
+        "irradiance": {"width": irradiance.width(), "height": irradiance.height(), "values": pack(&irradiance)},
+    })
+}
+
+fn photo_of(photo: &PagePhoto) -> Value {
+    let camera = &photo.camera;
+    let rotation = camera.rotation_camera_from_world;
+    json!({
+        "name": photo.name, "width": camera.width, "height": camera.height,
+        "focal": camera.focal_pixels.to_array(), "centre": camera.centre_pixels.to_array(),
+        "rotation": rotation.to_cols_array(), "translation": camera.translation_camera_from_world.to_array(),
+        "jpeg": format!("data:image/jpeg;base64,{}", STANDARD.encode(&photo.jpeg)),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::asset::tests::small_asset;
+    use super::*;
+
+    #[test]
+    fn the_page_stands_alone() {
+        let asset = small_asset(true);
+        let light = asset.light.as_ref().unwrap().whole.clone();
+        let page = page(&asset, &[("fitted </script> light".into(), light)], &[]).unwrap();
+        assert!(page.html.starts_with("<!doctype html>"));
+        for outside in ["http://", "https://", "src=\"/", "import(", "@VIEWER@", "@DOCUMENT@", "@TITLE@"] {
+            assert!(!page.html.contains(outside), "{outside}");
+        }
+        assert_eq!(page.html.matches("</script>").count(), 2, "the document ends no script");
+        assert!(page.beyond_maps < 1_000_000, "{}", page.beyond_maps);
+        let data = page.html.split("<script type=\"application/json\" id=\"document\">").nth(1).unwrap();
+        let data: Value = serde_json::from_str(data.split("</script>").next().unwrap()).unwrap();
+        assert_eq!(data["lights"][0]["name"], "fitted </script> light");
+        let indices = STANDARD.decode(data["mesh"]["indices"].as_str().unwrap()).unwrap();
+        assert_eq!(indices.len(), 4 * 6);
+        // A flat square sees the whole sky.
+        let normals = STANDARD.decode(data["mesh"]["normals"].as_str().unwrap()).unwrap();
+        assert_eq!(&normals[..4], &[0, 0, 127, 127]);
+    }
+}

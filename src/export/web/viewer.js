@@ -1,0 +1,370 @@
+"use strict";
+// A viewer of one fitted surface. Light is read from maps that were blurred by the lobe beforehand; see convention.txt.
+(() => {
+  const data = JSON.parse(document.getElementById("document").textContent);
+  const element = (name) => document.getElementById(name);
+  const canvas = element("canvas");
+  const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
+  const note = element("note");
+  if (!gl) {
+    note.textContent = "This browser has no WebGL 2: the surface cannot be shown.";
+    return;
+  }
+  const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  const words = (text) => new Uint16Array(bytes(text).buffer);
+
+  // ---- Shaders
+  const common = `#version 300 es
+    precision highp float;
+    precision highp sampler2D;
+    const float PI = 3.14159265358979;
+    uniform float rotation;
+    // The light turned about +y by the angle: what was at +z goes towards +x.
+    vec2 place(vec3 d) {
+      float phi = atan(d.x, -d.z) + rotation;
+      return vec2(phi / (2.0 * PI), acos(clamp(d.y, -1.0, 1.0)) / PI);
+    }
+    uniform float exposure;
+    uniform int curve;
+    vec3 shown(vec3 radiance) {
+      vec3 c = radiance * exposure;
+      if (curve == 1) c = c * (1.0 + c / 16.0) / (1.0 + c);
+      c = clamp(c, 0.0, 1.0);
+      return mix(1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, 12.92 * c, vec3(lessThanEqual(c, vec3(0.0031308))));
+    }
+    uniform sampler2D level0;`;
+  const surface_vertex = `#version 300 es
+    precision highp float;
+    in vec3 position; in vec4 normal; in vec2 uv;
+    uniform vec3 low, extent; uniform mat4 clip_from_world;
+    out vec3 world, direction; out vec2 coordinate; out float openness;
+    void main() {
+      world = low + extent * position;
+      direction = normal.xyz;
+      openness = normal.w;
+      coordinate = uv;
+      gl_Position = clip_from_world * vec4(world, 1.0);
+    }`;
+  const surface_fragment = `${common}
+    in vec3 world, direction; in vec2 coordinate; in float openness;
+    uniform vec3 eye;
+    uniform sampler2D diffuse_map, specular_map, width_map, table, irradiance_map;
+    uniform sampler2D levels;
+    uniform float level_count; uniform bool has_lobe;
+    out vec4 colour;
+    // All blurred levels lie in one texture, one above the other.
+    vec3 level(vec3 d, float index) {
+      vec2 at = place(d);
+      float rows = float(textureSize(levels, 0).y) / (level_count - 1.0);
+      float y = clamp(at.y * rows, 0.5, rows - 0.5) + (index - 1.0) * rows;
+      return texture(levels, vec2(at.x, y / float(textureSize(levels, 0).y))).rgb;
+    }
+    void main() {
+      vec3 n = normalize(direction), o = normalize(eye - world);
+      if (dot(n, o) < 0.0) n = normalize(n - 1.02 * dot(n, o) * o);
+      vec2 at = vec2(coordinate.x, 1.0 - coordinate.y);
+      float cosine = clamp(dot(n, o), 0.0, 1.0);
+      vec3 light = texture(diffuse_map, at).rgb * texture(irradiance_map, place(n)).rgb * openness;
+      if (has_lobe) {
+        vec3 f0 = texture(specular_map, at).rgb;
+        float width = texture(width_map, at).r;
+        vec2 ab = texture(table, vec2(cosine, width)).rg;
+        vec3 r = reflect(-o, n);
+        float index = sqrt(width) * (level_count - 1.0);
+        vec3 near = index < 1.0 ? texture(level0, place(r)).rgb : level(r, floor(index));
+        vec3 far = level(r, min(floor(index) + 1.0, level_count - 1.0));
+        // Lagarde and de Rousiers 2014: what a closed place hides of a lobe.
+        float open = clamp(pow(cosine + openness, exp2(-16.0 * width - 1.0)) - 1.0 + openness, 0.0, 1.0);
+        light += (f0 * ab.x + ab.y) * mix(near, far, fract(index)) * open;
+      }
+      colour = vec4(shown(light), 1.0);
+    }`;
+  const backdrop_vertex = `#version 300 es
+    out vec2 corner;
+    void main() {
+      corner = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
+      gl_Position = vec4(corner, 0.99999, 1.0);
+    }`;
+  const backdrop_fragment = `${common}
+    in vec2 corner; uniform mat4 world_from_clip; uniform bool visible; out vec4 colour;
+    void main() {
+      vec4 near = world_from_clip * vec4(corner, -1.0, 1.0), far = world_from_clip * vec4(corner, 1.0, 1.0);
+      vec3 d = normalize(far.xyz / far.w - near.xyz / near.w);
+      colour = vec4(visible ? shown(texture(level0, place(d)).rgb) : vec3(0.09), 1.0);
+    }`;
+  function program_of(vertex, fragment) {
+    const program = gl.createProgram();
+    for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+      const shader = gl.createShader(kind);
+      gl.shaderSource(shader, source);
+      gl.compileShader(shader);
+      if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
+      gl.attachShader(program, shader);
+    }
+    gl.linkProgram(program);
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
+    const uniforms = {};
+    for (let i = 0; i < gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); i++) {
+      const name = gl.getActiveUniform(program, i).name;
+      uniforms[name] = gl.getUniformLocation(program, name);
+    }
+    return { program, uniforms };
+  }
+  const surface = program_of(surface_vertex, surface_fragment);
+  const backdrop = program_of(backdrop_vertex, backdrop_fragment);
+
+  // ---- Mesh
+  const array = gl.createVertexArray();
+  gl.bindVertexArray(array);
+  const attribute = (name, values, size, type, normalised) => {
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
+    const place = gl.getAttribLocation(surface.program, name);
+    gl.enableVertexAttribArray(place);
+    gl.vertexAttribPointer(place, size, type, normalised, 0, 0);
+  };
+  attribute("position", words(data.mesh.positions), 3, gl.UNSIGNED_SHORT, true);
+  attribute("normal", new Int8Array(bytes(data.mesh.normals).buffer), 4, gl.BYTE, true);
+  attribute("uv", words(data.mesh.uvs), 2, gl.UNSIGNED_SHORT, true);
+  const indices = new Uint32Array(bytes(data.mesh.indices).buffer);
+  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+  gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
+  gl.bindVertexArray(null);
+
+  // ---- Textures
+  const wrapped = (texture, wrap) => {
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, wrap);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
+    return texture;
+  };
+  const floats = (width, height, values, internal, format, wrap) => {
+    const texture = wrapped(gl.createTexture(), wrap);
+    gl.texImage2D(gl.TEXTURE_2D, 0, internal, width, height, 0, format, gl.HALF_FLOAT, values);
+    return texture;
+  };
+  const table = floats(data.table.size, data.table.size, words(data.table.values), gl.RG16F, gl.RG, gl.CLAMP_TO_EDGE);
+  const lights = data.lights.map((light) => {
+    const rgba = (part) => floats(part.width, part.height, words(part.values), gl.RGBA16F, gl.RGBA, gl.REPEAT);
+    const blurred = light.levels.slice(1);
+    const stacked = new Uint16Array(blurred.reduce((sum, part) => sum + part.width * part.height * 4, 0));
+    let at = 0;
+    for (const part of blurred) {
+      const values = words(part.values);
+      stacked.set(values, at);
+      at += values.length;
+    }
+    const rows = blurred.reduce((sum, part) => sum + part.height, 0);
+    return {
+      name: light.name, mean: light.mean, sharp: rgba(light.levels[0]), irradiance: rgba(light.irradiance),
+      levels: floats(blurred[0].width, rows, stacked, gl.RGBA16F, gl.RGBA, gl.REPEAT),
+    };
+  });
+  const finer = gl.getExtension("EXT_texture_filter_anisotropic");
+  const map = async (source, is_colour) => {
+    const picture = new Image();
+    picture.src = source;
+    await picture.decode();
+    const texture = wrapped(gl.createTexture(), gl.CLAMP_TO_EDGE);
+    gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
+    gl.texImage2D(gl.TEXTURE_2D, 0, is_colour ? gl.SRGB8_ALPHA8 : gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, picture);
+    gl.generateMipmap(gl.TEXTURE_2D);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
+    if (finer) gl.texParameterf(gl.TEXTURE_2D, finer.TEXTURE_MAX_ANISOTROPY_EXT, 8);
+    return texture;
+  };
+
+  // ---- Camera: matrices are columns of four, as WebGL takes them.
+  const product = (a, b) => {
+    const c = new Array(16).fill(0);
+    for (let i = 0; i < 4; i++) for (let j = 0; j < 4; j++) for (let k = 0; k < 4; k++) c[4 * j + i] += a[4 * k + i] * b[4 * j + k];
+    return c;
+  };
+  const inverse = (m) => {
+    const a = [];
+    for (let i = 0; i < 4; i++) a.push([m[i], m[4 + i], m[8 + i], m[12 + i], ...[0, 1, 2, 3].map((j) => +(i === j))]);
+    for (let i = 0; i < 4; i++) {
+      let pivot = i;
+      for (let k = i; k < 4; k++) if (Math.abs(a[k][i]) > Math.abs(a[pivot][i])) pivot = k;
+      [a[i], a[pivot]] = [a[pivot], a[i]];
+      const scale = a[i][i];
+      a[i] = a[i].map((value) => value / scale);
+      for (let k = 0; k < 4; k++) if (k !== i) {
+        const factor = a[k][i];
+        a[k] = a[k].map((value, column) => value - factor * a[i][column]);
+      }
+    }
+    const result = [];
+    for (let j = 0; j < 4; j++) for (let i = 0; i < 4; i++) result.push(a[i][4 + j]);
+    return result;
+  };
+  const subtract = (a, b) => a.map((value, i) => value - b[i]);
+  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  const unit = (a) => a.map((value) => value / Math.hypot(...a));
+  const centre = data.mesh.low.map((value, i) => value + 0.5 * data.mesh.extent[i]);
+  const radius = 0.5 * Math.hypot(...data.mesh.extent);
+  const orbit = { yaw: 0.5, pitch: 0.35, distance: 2.6 * radius, target: centre.slice() };
+  const depths = [0.01 * radius, 30 * radius];
+  function orbit_camera(aspect) {
+    const { yaw, pitch, distance, target } = orbit;
+    const back = [Math.cos(pitch) * Math.sin(yaw), Math.sin(pitch), Math.cos(pitch) * Math.cos(yaw)];
+    const eye = target.map((value, i) => value + distance * back[i]);
+    const right = unit(cross([0, 1, 0], back)), up = cross(back, right);
+    const view = [right[0], up[0], back[0], 0, right[1], up[1], back[1], 0, right[2], up[2], back[2], 0,
+      -dot(right, eye), -dot(up, eye), -dot(back, eye), 1];
+    const f = 1 / Math.tan((20 * Math.PI) / 180), [near, far] = depths;
+    const projection = [f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, (far + near) / (near - far), -1, 0, 0, (2 * far * near) / (near - far), 0];
+    return { eye, clip: product(projection, view) };
+  }
+  // A photo's camera looks along +z with y down.
+  function photo_camera(photo) {
+    const { width, height, focal, centre: c, rotation: r, translation: t } = photo, [near, far] = depths;
+    const projection = [(2 * focal[0]) / width, 0, 0, 0, 0, (-2 * focal[1]) / height, 0, 0,
+      (2 * c[0]) / width - 1, 1 - (2 * c[1]) / height, (far + near) / (far - near), 1, 0, 0, (-2 * far * near) / (far - near), 0];
+    const view = [r[0], r[1], r[2], 0, r[3], r[4], r[5], 0, r[6], r[7], r[8], 0, t[0], t[1], t[2], 1];
+    const eye = [0, 1, 2].map((i) => -(r[3 * i] * t[0] + r[3 * i + 1] * t[1] + r[3 * i + 2] * t[2]));
+    return { eye, clip: product(projection, view) };
+  }
+
+  // ---- Controls
+  const chosen = { light: 0, view: -1 };
+  const option = (select, text, value) => select.add(new Option(text, value));
+  lights.forEach((light, i) => option(element("light"), light.name, i));
+  option(element("view"), "none", -1);
+  data.photos.forEach((photo, i) => option(element("view"), photo.name, i));
+  const remarks = ["Raster preview: shadows of single lamps and light between surfaces are not shown."];
+  if (!data.hasLobe) remarks.push("The surface was fitted without a specular lobe.");
+  if (!lights.length) remarks.push("The run has no environment.");
+  note.textContent = `${data.name} · ${remarks.join(" ")}`;
+  element("view").parentElement.style.display = data.photos.length ? "" : "none";
+  let maps = null, wanted = false;
+  const redraw = () => {
+    if (!wanted) {
+      wanted = true;
+      requestAnimationFrame(draw);
+    }
+  };
+  element("light").oninput = (event) => { chosen.light = +event.target.value; redraw(); };
+  element("view").oninput = (event) => { chosen.view = +event.target.value; redraw(); };
+  for (const name of ["rotation", "exposure", "curve", "backdrop", "wipe", "spin"]) element(name).oninput = redraw;
+  let pressed = null;
+  canvas.onpointerdown = (event) => {
+    pressed = [event.clientX, event.clientY];
+    canvas.setPointerCapture(event.pointerId);
+  };
+  canvas.onpointerup = () => { pressed = null; };
+  canvas.onpointermove = (event) => {
+    if (!pressed) return;
+    const [dx, dy] = [event.clientX - pressed[0], event.clientY - pressed[1]];
+    pressed = [event.clientX, event.clientY];
+    if (event.shiftKey) {
+      const slider = element("rotation");
+      slider.value = ((+slider.value + 0.4 * dx + 540) % 360) - 180;
+    } else if (event.ctrlKey || event.buttons & 4) {
+      const scale = orbit.distance / canvas.clientHeight, { yaw } = orbit;
+      orbit.target[0] -= scale * dx * Math.cos(yaw);
+      orbit.target[2] += scale * dx * Math.sin(yaw);
+      orbit.target[1] += scale * dy;
+    } else {
+      orbit.yaw -= 0.008 * dx;
+      orbit.pitch = Math.max(-1.5, Math.min(1.5, orbit.pitch + 0.008 * dy));
+    }
+    redraw();
+  };
+  canvas.onwheel = (event) => {
+    event.preventDefault();
+    orbit.distance = Math.max(0.05 * radius, Math.min(12 * radius, orbit.distance * Math.exp(0.001 * event.deltaY)));
+    redraw();
+  };
+  addEventListener("resize", redraw);
+
+  // ---- Drawing
+  function bind(unit_, name, texture, target) {
+    gl.activeTexture(gl.TEXTURE0 + unit_);
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.uniform1i(target.uniforms[name], unit_);
+  }
+  function draw() {
+    wanted = false;
+    const photo = data.photos[chosen.view];
+    // With a photo the picture keeps the photo's shape.
+    const stage = element("stage"), [full, tall] = [innerWidth, innerHeight];
+    const scale = photo ? Math.min(full / photo.width, tall / photo.height) : 0;
+    const [width, height] = photo ? [scale * photo.width, scale * photo.height] : [full, tall];
+    Object.assign(stage.style, { inset: "auto", left: `${(full - width) / 2}px`, top: `${(tall - height) / 2}px`, width: `${width}px`, height: `${height}px` });
+    const density = devicePixelRatio || 1;
+    canvas.width = Math.max(1, Math.round(width * density));
+    canvas.height = Math.max(1, Math.round(height * density));
+    element("wipe_label").style.display = photo ? "" : "none";
+    const picture = element("photo");
+    picture.style.display = photo ? "block" : "none";
+    if (photo) {
+      if (picture.alt !== photo.name) [picture.src, picture.alt] = [photo.jpeg, photo.name];
+      picture.style.clipPath = `inset(0 0 0 ${100 * +element("wipe").value}%)`;
+    }
+    if (element("spin").checked) {
+      const slider = element("rotation");
+      slider.value = +slider.value >= 180 ? -180 : +slider.value + 1;
+      redraw();
+    }
+    gl.viewport(0, 0, canvas.width, canvas.height);
+    gl.clearColor(0.09, 0.09, 0.09, 1);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    const light = lights[chosen.light];
+    if (!maps || !light) return;
+    const camera = photo ? photo_camera(photo) : orbit_camera(canvas.width / canvas.height);
+    const set = (target) => {
+      gl.useProgram(target.program);
+      gl.uniform1f(target.uniforms.rotation, (+element("rotation").value * Math.PI) / 180);
+      gl.uniform1f(target.uniforms.exposure, 2 ** +element("exposure").value);
+      gl.uniform1i(target.uniforms.curve, +element("curve").value);
+      bind(0, "level0", light.sharp, target);
+    };
+    set(surface);
+    gl.enable(gl.DEPTH_TEST);
+    gl.uniform3fv(surface.uniforms.low, data.mesh.low);
+    gl.uniform3fv(surface.uniforms.extent, data.mesh.extent);
+    gl.uniform3fv(surface.uniforms.eye, camera.eye);
+    gl.uniformMatrix4fv(surface.uniforms.clip_from_world, false, camera.clip);
+    gl.uniform1f(surface.uniforms.level_count, data.levels);
+    gl.uniform1i(surface.uniforms.has_lobe, data.hasLobe ? 1 : 0);
+    bind(1, "levels", light.levels, surface);
+    bind(2, "irradiance_map", light.irradiance, surface);
+    bind(3, "table", table, surface);
+    ["diffuse_map", "specular_map", "width_map"].forEach((name, i) => bind(4 + i, name, maps[i], surface));
+    gl.bindVertexArray(array);
+    gl.drawElements(gl.TRIANGLES, indices.length, gl.UNSIGNED_INT, 0);
+    set(backdrop);
+    gl.depthFunc(gl.LEQUAL);
+    gl.uniformMatrix4fv(backdrop.uniforms.world_from_clip, false, inverse(camera.clip));
+    gl.uniform1i(backdrop.uniforms.visible, element("backdrop").checked ? 1 : 0);
+    gl.bindVertexArray(null);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+  // #light=1&view=0&wipe=1&backdrop=0 opens the page so.
+  const asked = new URLSearchParams(location.hash.slice(1));
+  if (asked.has("camera")) {
+    // A camera of one's own, as those of photos: width, height, focal, centre, rotation (columns), translation.
+    const photo = { jpeg: "data:,", name: "camera", ...JSON.parse(asked.get("camera")) };
+    chosen.view = data.photos.push(photo) - 1;
+    option(element("view"), photo.name, chosen.view);
+    element("view").value = chosen.view;
+    element("wipe").value = 1;
+  }
+  for (const [name, value] of asked) {
+    const control = element(name);
+    if (!control) continue;
+    if (control.type === "checkbox") control.checked = value !== "0";
+    else control.value = value;
+    if (name in chosen) chosen[name] = +value;
+  }
+  if (asked.has("bare")) for (const name of ["bar", "note"]) element(name).style.display = "none";
+  Promise.all(data.maps.map((source, i) => map(source, i < 2))).then((loaded) => {
+    maps = loaded;
+    redraw();
+  }).catch((error) => { note.textContent = `The maps cannot be read: ${error.message}`; });
+  redraw();
+})();
