@@ -1,6 +1,6 @@
 //! What a fit is given: mesh, cameras, photographs; their readers and the pre-flight check.
 //!
-//! [`mesh`] and [`camera`] hold the geometry, [`photo`] the pixels, [`view`](View) joins them. [`read()`] makes a scene
+//! [`mesh`] and [`camera`] hold the geometry, [`photo`] the pixels, [`view`](View) joins them; [`lens`] undoes distortion. [`read()`] makes a scene
 //! of a folder, [`doctor`] says whether a fit can work on it. [`demo`], [`study`] and [`hard`] are scenes made in code, out of what
 //! [`synthetic`] holds. Nothing here fits or renders.
 
@@ -8,6 +8,7 @@ pub mod camera;
 pub mod demo;
 pub mod doctor;
 pub mod hard;
+pub mod lens;
 pub mod mesh;
 pub mod photo;
 pub mod read;

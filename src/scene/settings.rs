@@ -3,6 +3,7 @@
 use crate::error::{Error, ErrorKind, Place, Result};
 use glam::DVec3;
 use std::fmt;
+use std::path::PathBuf;
 use std::str::FromStr;
 
 /// How a scene is read. The defaults suit a folder as downloaded.
@@ -23,6 +24,12 @@ pub struct ReadSettings {
     pub background: BackgroundChoice,
     /// How the numbers of the photos are encoded; `auto` goes by the file: 8 bits are sRGB, floats are linear.
     pub encoding: ColourEncoding,
+    /// The mesh, where the source names none or another is meant.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<PathBuf>,
+    /// The chunk of a Metashape project, by label or number; none takes the one whose photos are here.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chunk: Option<String>,
     /// Photos are averaged over squares of this many pixels, in linear radiance; 1 keeps them.
     pub shrink: usize,
 }
@@ -37,6 +44,8 @@ impl Default for ReadSettings {
             masks: MaskUse::Use,
             background: BackgroundChoice::Auto,
             encoding: ColourEncoding::Auto,
+            mesh: None,
+            chunk: None,
             shrink: 1,
         }
     }

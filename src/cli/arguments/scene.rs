@@ -50,6 +50,12 @@ pub struct ReadOptions {
     /// How the numbers of the photographs are encoded: auto, srgb or linear.
     #[arg(long)]
     pub encoding: Option<ColourEncoding>,
+    /// The mesh, where the scene's folder holds none or another is meant.
+    #[arg(long, value_name = "FILE")]
+    pub mesh: Option<PathBuf>,
+    /// The chunk of a Metashape project, by label or number.
+    #[arg(long, value_name = "NAME")]
+    pub chunk: Option<String>,
 }
 
 impl ReadOptions {
@@ -84,6 +90,13 @@ impl ReadOptions {
         if let Some(encoding) = self.encoding {
             settings.encoding = encoding;
         }
+        if let Some(mesh) = &self.mesh {
+            // A run is resumed from other folders too.
+            settings.mesh = Some(std::path::absolute(mesh).unwrap_or_else(|_| mesh.clone()));
+        }
+        if let Some(chunk) = &self.chunk {
+            settings.chunk = Some(chunk.clone());
+        }
         settings
     }
 }
@@ -91,7 +104,8 @@ impl ReadOptions {
 /// Options of `patina check`.
 #[derive(Debug, Args)]
 pub struct CheckOptions {
-    /// The scene: a BlendedMVS folder, an exchange folder, or a `scene.toml`.
+    /// The scene: a folder with photos, cameras and a mesh (COLMAP, transforms.json, Metashape, BlendedMVS, exchange) or a
+    /// `scene.toml`.
     pub scene: PathBuf,
     /// Folder for the pictures with outlines; none are made without it.
     #[arg(short, long)]
@@ -104,7 +118,8 @@ pub struct CheckOptions {
 /// Options of `patina fit`.
 #[derive(Debug, Args)]
 pub struct FitOptions {
-    /// The scene: a BlendedMVS folder, an exchange folder, or a `scene.toml`.
+    /// The scene: a folder with photos, cameras and a mesh (COLMAP, transforms.json, Metashape, BlendedMVS, exchange) or a
+    /// `scene.toml`.
     pub scene: PathBuf,
     /// The run folder.
     #[arg(short, long)]

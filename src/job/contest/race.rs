@@ -301,7 +301,7 @@ pub fn read_arguments(read: &ReadSettings) -> Vec<String> {
     fn word<T: clap::ValueEnum>(value: &T) -> String {
         value.to_possible_value().map(|value| value.get_name().to_string()).unwrap_or_default()
     }
-    vec![
+    let mut arguments = vec![
         format!("--up={}", read.up),
         format!("--pixel-centre={}", read.pixel_centre),
         format!("--hold-out-every={}", read.hold_out_every),
@@ -310,7 +310,10 @@ pub fn read_arguments(read: &ReadSettings) -> Vec<String> {
         format!("--scene-background={}", word(&read.background)),
         format!("--encoding={}", word(&read.encoding)),
         format!("--shrink={}", read.shrink),
-    ]
+    ];
+    arguments.extend(read.mesh.iter().map(|mesh| format!("--mesh={}", mesh.display())));
+    arguments.extend(read.chunk.iter().map(|chunk| format!("--chunk={chunk}")));
+    arguments
 }
 
 /// Runs a process to its end; says what went wrong, if anything.

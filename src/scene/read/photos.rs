@@ -3,6 +3,7 @@
 use super::source::SourceView;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::{GreyImage, Image, RgbImage, file};
+use crate::scene::lens::{Undistorted, undistort};
 use crate::scene::settings::{ColourEncoding, MaskUse, ReadSettings};
 use crate::scene::{Photo, PixelState};
 use glam::Vec3;
@@ -25,6 +26,8 @@ pub struct LoadedPhoto {
     pub states: Image<PixelState>,
     /// Width and height of the file, before shrinking.
     pub file_size: (usize, usize),
+    /// What undoing the distortion of its lens did; `None` for a pinhole.
+    pub undistorted: Option<Undistorted>,
     /// What was noticed.
     pub findings: Vec<Finding>,
 }
@@ -38,6 +41,21 @@ pub fn load_all(views: &[SourceView], encoding: ColourEncoding, settings: &ReadS
     let loaded: Vec<Result<LoadedPhoto>> =
         views.par_iter().map(|view| load(view, encoding, settings, as_half)).collect();
     loaded.into_iter().collect()
+}
+
+/// What undoing the distortion of lenses did, over all photos.
+pub fn told_of_lenses(loaded: &[LoadedPhoto]) -> Option<Finding> {
+    let done: Vec<Undistorted> = loaded.iter().filter_map(|photo| photo.undistorted).collect();
+    let shift = done.iter().map(|own| own.largest_shift_pixels).fold(0.0, f64::max);
+    let outside = done.iter().map(|own| own.share_outside).fold(0.0, f64::max);
+    let message = format!(
+        "the distortion of the lens is undone in {} of {} photos: pixels move by up to {shift:.1}, and up to {:.1} % of a photo \
+         lies outside what was taken and is not seen",
+        done.len(),
+        loaded.len(),
+        100.0 * outside
+    );
+    (!done.is_empty()).then(|| Finding::new(Severity::Note, "lens-undone", message))
 }
 
 fn check_size(view: &SourceView) -> Result<(usize, usize)> {
@@ -66,11 +84,21 @@ fn load(view: &SourceView, encoding: ColourEncoding, settings: &ReadSettings, as
     if let (Some(mask), true) = (&view.mask, settings.masks == MaskUse::Use) {
         apply_mask(mask, view, &photo, &mut states, &mut findings)?;
     }
+    // Before anything is averaged: a pixel is resampled once.
+    let mut undistorted = None;
+    let (photo, states) = match &view.lens {
+        None => (photo, states),
+        Some(lens) => {
+            let (photo, states, done) = undistort(&photo, &states, lens, &view.camera.pinhole());
+            undistorted = Some(done);
+            (photo, states)
+        }
+    };
     let (photo, states) = match settings.shrink {
         1 => (photo, states),
         factor => shrink(&photo, &states, factor),
     };
-    Ok(LoadedPhoto { photo, states, file_size, findings })
+    Ok(LoadedPhoto { photo, states, file_size, undistorted, findings })
 }
 
 fn from_bytes(bytes: Image<[u8; 3]>, encoding: ColourEncoding) -> (Photo, Image<PixelState>) {
