@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// Extensions of meshes, the better first.
 const EXTENSIONS: [&str; 5] = ["obj", "ply", "glb", "gltf", "stl"];
-/// Folders a mesh may lie in, and the beginnings of names that say so, the better first.
+/// Folders a mesh may lie in, the better first.
 const FOLDERS: [&str; 13] = [
     "",
     "mesh",
@@ -22,7 +22,9 @@ const FOLDERS: [&str; 13] = [
     "undistorted",
     "texturing",
 ];
-const NAMES: [&str; 6] = ["mesh", "textured", "model", "scene_dense_mesh", "meshed-poisson", "meshed-delaunay"];
+/// Names a mesh may have, whole or as a beginning, the better first.
+const NAMES: [&str; 3] = ["mesh", "textured", "model"];
+const BEGINNINGS: [&str; 6] = ["textured", "meshed-poisson", "meshed-delaunay", "scene_dense_mesh", "mesh", "model"];
 
 /// The mesh of a scene's folder; empty when there is none. Point clouds are passed over.
 pub fn find(folders: &[PathBuf], findings: &mut Vec<Finding>) -> Vec<PathBuf> {
@@ -37,7 +39,9 @@ pub fn find(folders: &[PathBuf], findings: &mut Vec<Finding>) -> Vec<PathBuf> {
                 if !path.is_file() || name.starts_with('.') || (extension == "ply" && !has_faces(&path)) {
                     continue;
                 }
-                let by_name = NAMES.iter().position(|known| name.starts_with(known)).unwrap_or(NAMES.len());
+                let whole = NAMES.iter().position(|known| name == *known);
+                let begins = || BEGINNINGS.iter().position(|known| name.starts_with(known)).unwrap_or(BEGINNINGS.len());
+                let by_name = whole.unwrap_or_else(|| NAMES.len() + begins());
                 let rank = (depth * FOLDERS.len() + order, by_name, kind);
                 if !found.iter().any(|(_, other)| *other == path) {
                     found.push((rank, path));

@@ -8,29 +8,39 @@ use glam::{DMat3, DMat4, DVec3};
 
 /// Points of the mesh that are looked at.
 const POINTS: usize = 400;
-/// Cameras that see so much less of the mesh than of the best frame stand in another one.
-const CLEAR_FACTOR: f64 = 3.0;
-/// A frame in which the cameras see this share of the mesh, on the mean, fits.
-const FITTING_SHARE: f64 = 0.25;
-/// Below this the frame as it is does not fit.
-const FAILING_SHARE: f64 = 0.1;
+/// A frame in which this share of the views looks at the mesh fits, one in which less than the other does fails.
+const FITTING_SHARE: f64 = 0.8;
+const FAILING_SHARE: f64 = 0.5;
 
-/// The mean over views of the share of points that fall into the picture, in [0, 1].
-fn share_seen(points: &[DVec3], views: &[SourceView], frame: &DMat4) -> f64 {
-    let seen = |view: &SourceView| {
+/// How the cameras see the mesh in a frame.
+#[derive(Clone, Copy, PartialEq)]
+struct Seen {
+    /// Share of the views that have some of it in their picture.
+    views: f64,
+    /// Share of its points that some view has in its picture.
+    points: f64,
+}
+
+fn seen(points: &[DVec3], views: &[SourceView], frame: &DMat4) -> Seen {
+    let mut is_seen = vec![false; points.len()];
+    let mut looking = 0usize;
+    for view in views {
         let intrinsics = &view.camera.intrinsics;
-        let (width, height) =
-            view.size.map_or((2.0 * intrinsics.z_axis.x, 2.0 * intrinsics.z_axis.y), |(width, height)| {
-                (width as f64, height as f64)
-            });
-        let inside = points.iter().filter(|point| {
-            let point = view.camera.rotation * frame.transform_point3(**point) + view.camera.translation;
+        let middle = (2.0 * intrinsics.z_axis.x, 2.0 * intrinsics.z_axis.y);
+        let (width, height) = view.size.map_or(middle, |(width, height)| (width as f64, height as f64));
+        let mut any = false;
+        for (point, is_seen) in points.iter().zip(&mut is_seen) {
+            let point = view.camera.rotation * frame.transform_point3(*point) + view.camera.translation;
             let place = *intrinsics * (point / point.z);
-            point.z > 0.0 && place.x >= 0.0 && place.y >= 0.0 && place.x < width && place.y < height
-        });
-        inside.count() as f64 / points.len().max(1) as f64
-    };
-    views.iter().map(seen).sum::<f64>() / views.len().max(1) as f64
+            if point.z > 0.0 && place.x >= 0.0 && place.y >= 0.0 && place.x < width && place.y < height {
+                *is_seen = true;
+                any = true;
+            }
+        }
+        looking += usize::from(any);
+    }
+    let count = is_seen.iter().filter(|seen| **seen).count();
+    Seen { views: looking as f64 / views.len().max(1) as f64, points: count as f64 / points.len().max(1) as f64 }
 }
 
 /// Transforms that tools leave between a mesh and its cameras.
@@ -56,30 +66,30 @@ pub fn put_right(mesh: &mut SourceMesh, views: &[SourceView], own: &[MeshFrame],
     let step = (corners / POINTS).max(1);
     let points: Vec<DVec3> =
         mesh.triangles.iter().flatten().step_by(step).map(|&corner| mesh.positions[corner as usize]).collect();
-    let as_it_is = share_seen(&points, views, &DMat4::IDENTITY);
-    if as_it_is >= FAILING_SHARE {
+    let as_it_is = seen(&points, views, &DMat4::IDENTITY);
+    if as_it_is.views >= FAILING_SHARE {
         return;
     }
     let mut frames = own.to_vec();
     frames.extend(known());
-    let rated = frames.into_iter().map(|frame| (share_seen(&points, views, &frame.source_from_mesh), frame));
-    let mut rated: Vec<(f64, MeshFrame)> = rated.collect();
-    rated.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let rated = frames.into_iter().map(|frame| (seen(&points, views, &frame.source_from_mesh), frame));
+    let mut rated: Vec<(Seen, MeshFrame)> = rated.filter(|(seen, _)| seen.views >= FITTING_SHARE).collect();
+    // What the source knows comes first among equals: the sort is stable.
+    rated.sort_by(|a, b| (b.0.views * b.0.points).total_cmp(&(a.0.views * a.0.points)));
     let percent = |share: f64| (100.0 * share).round();
     match rated.first() {
-        Some((share, frame)) if *share >= FITTING_SHARE && *share > CLEAR_FACTOR * as_it_is => {
-            let also = rated.get(1).filter(|(other, _)| *other > 0.7 * share);
-            let doubt = also.map_or(String::new(), |(other, frame)| {
-                format!("; {} would show {} %: look at the outlines", frame.name, percent(*other))
+        Some((share, frame)) => {
+            let doubt = rated.get(1).map_or(String::new(), |(other, frame)| {
+                format!("; after {} it would be {} %: look at the outlines", frame.name, percent(other.views))
             });
             findings.push(
                 Finding::new(
                     Severity::Warning,
                     "mesh-frame-changed",
                     format!(
-                        "the cameras see {} % of the mesh as it is, {} % after {}: the mesh is turned so{doubt}",
-                        percent(as_it_is),
-                        percent(*share),
+                        "{} % of the views look at the mesh as it is, {} % after {}: the mesh is turned so{doubt}",
+                        percent(as_it_is.views),
+                        percent(share.views),
                         frame.name
                     ),
                 )
@@ -92,13 +102,13 @@ pub fn put_right(mesh: &mut SourceMesh, views: &[SourceView], own: &[MeshFrame],
                 *normal = (normal_turn * normal.as_dvec3()).normalize_or_zero().as_vec3();
             }
         }
-        _ => findings.push(
+        None => findings.push(
             Finding::new(
                 Severity::Warning,
                 "mesh-frame-unknown",
                 format!(
-                    "the cameras see {} % of the mesh: it may stand in another frame than they do",
-                    percent(as_it_is)
+                    "{} % of the views look at the mesh: it may stand in another frame than they do",
+                    percent(as_it_is.views)
                 ),
             )
             .remedy("export mesh and cameras from the same project in the same coordinate system"),

@@ -83,7 +83,8 @@ pub fn read_neus(file: &Path) -> Result<SourceScene> {
         let (intrinsics, rotation) = decomposed(DMat3::from_mat4(*projection))
             .ok_or_else(|| wrong(file, &format!("world_mat_{index} is not a camera's")))?;
         // K t is the last column over the scale that was divided out.
-        let scale = DMat3::from_mat4(*projection).row(2).length();
+        let linear = DMat3::from_mat4(*projection);
+        let scale = linear.row(2).length().copysign(linear.determinant());
         let translation = intrinsics.inverse() * (projection.w_axis.truncate() / scale);
         let (camera, _) = SourceCamera::new(intrinsics, rotation, translation, &place)?;
         posed.push(Posed { listed, camera, lens: Lens::default(), size: None, mask: None, place });

@@ -47,7 +47,7 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Array> {
     if !bytes.starts_with(b"\x93NUMPY") || bytes.len() < 12 {
         return Err(malformed("is not one of numpy"));
     }
-    let (start, length) = match bytes[6] {
+    let (start, length): (usize, usize) = match bytes[6] {
         1 => (10, usize::from(u16::from_le_bytes([bytes[8], bytes[9]]))),
         _ => (12, u32::from_le_bytes([bytes[8], bytes[9], bytes[10], bytes[11]]) as usize),
     };
