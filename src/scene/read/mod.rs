@@ -2,7 +2,7 @@
 //!
 //! [`read`] is the door. [`detect`] finds out the kind of the scene ([`manifest`], [`exchange`], [`blended_mvs`], [`colmap`],
 //! [`transforms`], [`metashape`], and the others of [`Format`]); each kind only lists files and reads cameras into a [`source::SourceScene`]. What follows is
-//! the same for all: true sizes of photos (`calibrated_size`), mesh ([`mesh_file`], with `obj` and `ply`) and its frame
+//! the same for all: true sizes of photos (`photo_size`), mesh ([`mesh_file`], with `obj` and `ply`) and its frame
 //! (`mesh_frame`), up axis and origin ([`world`]), photos, masks and lenses ([`photos`]), pixel centres. [`understood`] says on
 //! a page what was made of it all.
 //!
@@ -13,7 +13,6 @@ mod alicevision;
 pub mod blended_mvs;
 mod bundler;
 mod bytes;
-mod calibrated_size;
 pub mod camera_file;
 pub mod colmap;
 pub mod colmap_lens;
@@ -31,6 +30,7 @@ mod obj;
 mod openmvs;
 mod opensfm;
 mod photo_index;
+mod photo_size;
 pub mod photos;
 mod ply;
 mod realitycapture;
@@ -70,7 +70,7 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
     let SourceScene { name, folder, mesh, views, mut findings, .. } = source;
     let mut views = choose_views(views, settings.max_views, &folder)?;
     if source.is_of_a_tool {
-        calibrated_size::fit_to_photos(&mut views, &mut findings)?;
+        photo_size::fit_to_photos(&mut views, &mut findings)?;
     }
     let mesh = settings.mesh.as_ref().map_or(mesh, |chosen| vec![chosen.clone()]);
     if mesh.is_empty() {
