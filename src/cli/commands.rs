@@ -39,18 +39,21 @@ pub fn check(options: &CheckOptions, json: bool) -> Result<()> {
     if let Some(output) = &options.output {
         refuse_folder_of_photos(output, &options.scene)?;
     }
-    let scene = crate::scene::read(&options.scene, &options.read.settings())?;
+    let settings = options.read.settings();
+    let scene = crate::scene::read(&options.scene, &settings)?;
+    let understood = crate::scene::read::understand(&options.scene, &settings, &scene)?;
     let bvh = Bvh::build(&scene.mesh.positions, &scene.mesh.triangles)?;
     let report = doctor::check_with(&scene, &bvh);
     if json {
         println!(
             "{}",
-            serde_json::json!({"event": "check", "findings": report.findings, "views": report.views,
-            "texels_resolved": report.texels_resolved, "surface": report.surface, "agreement": report.agreement,
-            "light": report.light})
+            serde_json::json!({"event": "check", "understood": understood, "findings": report.findings,
+            "views": report.views, "texels_resolved": report.texels_resolved, "surface": report.surface,
+            "agreement": report.agreement, "light": report.light})
         );
     } else {
         println!("{}: {} triangles, {} views", scene.name, scene.mesh.triangles.len(), scene.views.len());
+        println!("{understood}");
         if let Some(texels) = report.texels_resolved {
             let size = Suited::to(&scene, &report).map_size.unwrap_or_default();
             let texels = number::whole(texels as u64);

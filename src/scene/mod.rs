@@ -1,12 +1,14 @@
 //! What a fit is given: mesh, cameras, photographs; their readers and the pre-flight check.
 //!
-//! [`mesh`] and [`camera`] hold the geometry, [`photo`] the pixels, [`view`](View) joins them. [`read()`] makes a scene
-//! of a folder, [`doctor`] says whether a fit can work on it. [`demo`] is a scene made in code, out of what
+//! [`mesh`] and [`camera`] hold the geometry, [`photo`] the pixels, [`view`](View) joins them; [`lens`] undoes distortion.
+//! [`read()`] makes a scene of a folder, [`doctor`] says whether a fit can work on it. [`demo`] is a scene made in code, out
+//! of what
 //! [`synthetic`] holds. Nothing here fits or renders.
 
 pub mod camera;
 pub mod demo;
 pub mod doctor;
+pub mod lens;
 pub mod mesh;
 pub mod photo;
 pub mod read;

@@ -3,6 +3,7 @@
 use crate::error::{Error, ErrorKind, Place, Result};
 use glam::DVec3;
 use std::fmt;
+use std::path::PathBuf;
 use std::str::FromStr;
 
 /// How a scene is read. The defaults suit a folder as downloaded.
@@ -27,6 +28,12 @@ pub struct ReadSettings {
     /// The layer of OpenEXR photos by its name, or the last part of it; none takes the layer of radiance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub layer: Option<String>,
+    /// The mesh, where the source names none or another is meant.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<PathBuf>,
+    /// The chunk of a Metashape project, by label or number; none takes the one whose photos are here.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chunk: Option<String>,
     /// Photos are averaged over squares of this many pixels, in linear radiance; 1 keeps them.
     pub shrink: usize,
 }
@@ -42,6 +49,8 @@ impl Default for ReadSettings {
             background: BackgroundChoice::Auto,
             encoding: ColourEncoding::Auto,
             layer: None,
+            mesh: None,
+            chunk: None,
             shrink: 1,
         }
     }

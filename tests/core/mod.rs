@@ -42,6 +42,7 @@ mod photo_formats;
 mod photo_fuzz;
 mod photo_scenes;
 pub mod program;
+mod reader_projects;
 mod regions_read;
 mod render_audit;
 mod render_closed_scenes;

@@ -54,6 +54,12 @@ pub struct ReadOptions {
     /// given.
     #[arg(long, value_name = "NAME")]
     pub layer: Option<String>,
+    /// The mesh, where the scene's folder holds none or another is meant.
+    #[arg(long, value_name = "FILE")]
+    pub mesh: Option<PathBuf>,
+    /// The chunk of a Metashape project, by label or number.
+    #[arg(long, value_name = "NAME")]
+    pub chunk: Option<String>,
 }
 
 impl ReadOptions {
@@ -91,6 +97,13 @@ impl ReadOptions {
         if let Some(layer) = &self.layer {
             settings.layer = Some(layer.clone());
         }
+        if let Some(mesh) = &self.mesh {
+            // A run is resumed from other folders too.
+            settings.mesh = Some(std::path::absolute(mesh).unwrap_or_else(|_| mesh.clone()));
+        }
+        if let Some(chunk) = &self.chunk {
+            settings.chunk = Some(chunk.clone());
+        }
         settings
     }
 }
@@ -98,7 +111,8 @@ impl ReadOptions {
 /// Options of `patina check`.
 #[derive(Debug, Args)]
 pub struct CheckOptions {
-    /// The scene: a BlendedMVS folder, an exchange folder, or a `scene.toml`.
+    /// The scene: a folder with photos, cameras and a mesh (COLMAP, transforms.json, Metashape, BlendedMVS, exchange) or a
+    /// `scene.toml`.
     pub scene: PathBuf,
     /// Folder for the pictures with outlines; none are made without it.
     #[arg(short, long)]
@@ -111,7 +125,8 @@ pub struct CheckOptions {
 /// Options of `patina fit`.
 #[derive(Debug, Args)]
 pub struct FitOptions {
-    /// The scene: a BlendedMVS folder, an exchange folder, or a `scene.toml`.
+    /// The scene: a folder with photos, cameras and a mesh (COLMAP, transforms.json, Metashape, BlendedMVS, exchange) or a
+    /// `scene.toml`.
     pub scene: PathBuf,
     /// The run folder.
     #[arg(short, long)]

@@ -305,6 +305,8 @@ mod tests {
             encoding: ColourEncoding::Linear,
             layer: Some("View Layer.Combined".into()),
             shrink: 2,
+            mesh: Some("/meshes/vase.obj".into()),
+            chunk: Some("Chunk 2".into()),
         };
         for read in [read, ReadSettings::default()] {
             let line = std::iter::once("entry".to_string()).chain(read_arguments(&read));

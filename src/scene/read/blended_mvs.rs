@@ -65,6 +65,8 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
         held_out: None,
         has_truth: false,
         flip_winding: false,
+        is_of_a_tool: false,
+        mesh_frames: Vec::new(),
         findings,
     })
 }
@@ -194,7 +196,7 @@ pub fn views(
         let (camera, mut noticed) = camera_file::read_cam_txt(cam)?;
         findings.append(&mut noticed);
         let mask = mask_files.get(&name).or_else(|| twins.get(&name)).cloned();
-        views.push(SourceView { name, photo, mask, camera, size: None, place: Place::File(cam.clone()) });
+        views.push(SourceView { name, photo, mask, camera, lens: None, size: None, place: Place::File(cam.clone()) });
     }
     if views.is_empty() {
         return Err(Error::new(ErrorKind::Missing, "no photo has a camera")

@@ -1,13 +1,13 @@
 //! Intrinsics that are for photos of another size than the ones that are there.
 //!
 //! Photos are often calibrated at one size and delivered at another. Where the source says the size its cameras are for,
-//! the factor is known. Where it does not, the principal point tells: it lies in the middle of a picture within a few
+//! `photo_size` scales them. Where it does not, the principal point tells: it lies in the middle of a picture within a few
 //! percent, and for photos twice as large it lies at a quarter, in both directions and in every view. A crop does not move
 //! it so in both directions by the same factor.
 
 use super::photos::LoadedPhoto;
 use super::source::SourceView;
-use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::error::{Finding, Severity};
 use crate::math::statistics::quantile;
 use glam::{DMat3, DVec3};
 
@@ -21,39 +21,8 @@ const OFF_WHOLE: f64 = 0.08;
 /// Scales the intrinsics of views to the size of their photos, where they are clearly for another one, and tells.
 ///
 /// `centre_shift` is what is added to the source's principal points to count from the corner of the first pixel.
-///
-/// # Errors
-/// `InvalidScene` for a photo whose sides are not those of its camera times one factor.
-pub fn fit(
-    views: &mut [SourceView],
-    loaded: &[LoadedPhoto],
-    centre_shift: f64,
-    findings: &mut Vec<Finding>,
-) -> Result<()> {
-    let mut scaled = Vec::new();
-    for (view, photo) in views.iter_mut().zip(loaded) {
-        let Some(claimed) = view.size.filter(|claimed| *claimed != photo.file_size) else { continue };
-        let factor = factor_of_sizes(claimed, photo.file_size).ok_or_else(|| {
-            let (width, height) = photo.file_size;
-            let message =
-                format!("the photo is {width} x {height} but its camera is for {} x {}", claimed.0, claimed.1);
-            Error::new(ErrorKind::InvalidScene, message)
-                .at(Place::File(view.photo.clone()))
-                .remedy("use the photos the cameras were made for, or scale the intrinsics with them")
-        })?;
-        scale(view, factor, centre_shift);
-        scaled.push((view.name.clone(), factor));
-    }
-    if let Some((first, factor)) = scaled.first() {
-        let message = format!(
-            "{} of {} cameras are for photos of another size: their intrinsics are scaled, the first by {factor:.4}",
-            scaled.len(),
-            views.len()
-        );
-        findings.push(Finding::new(Severity::Note, "intrinsics-scaled", message).at(Place::View(first.clone())));
-        return Ok(());
-    }
-    let Some(factor) = common_factor(views, loaded, centre_shift) else { return Ok(()) };
+pub fn fit(views: &mut [SourceView], loaded: &[LoadedPhoto], centre_shift: f64, findings: &mut Vec<Finding>) {
+    let Some(factor) = common_factor(views, loaded, centre_shift) else { return };
     let whole = if factor > 1.0 { factor.round() } else { 1.0 / (1.0 / factor).round() };
     if (factor / whole - 1.0).abs() > OFF_WHOLE {
         findings.push(
@@ -64,7 +33,7 @@ pub fn fit(
             )
             .remedy("scale the intrinsics with the photos, or use the photos the cameras were made for"),
         );
-        return Ok(());
+        return;
     }
     views.iter_mut().for_each(|view| scale(view, whole, centre_shift));
     findings.push(
@@ -75,21 +44,15 @@ pub fn fit(
         )
         .remedy("look at the outlines over the photos (check -o FOLDER); if the photos were cropped, correct the intrinsics"),
     );
-    Ok(())
-}
-
-/// The factor between two sizes of one picture; `None` where the sides have different ones.
-fn factor_of_sizes(from: (usize, usize), to: (usize, usize)) -> Option<f64> {
-    let [across, down] = [to.0 as f64 / from.0 as f64, to.1 as f64 / from.1 as f64];
-    // Each side was rounded to whole pixels.
-    let slack = 1.0 / to.0.min(to.1).max(1) as f64 + 1.0 / from.0.min(from.1).max(1) as f64;
-    (across > 0.0 && down > 0.0 && (across / down - 1.0).abs() <= slack).then(|| (across * down).sqrt())
 }
 
 /// How much larger the photos are than their principal points say, where all views agree that they are.
 fn common_factor(views: &[SourceView], loaded: &[LoadedPhoto], centre_shift: f64) -> Option<f64> {
     let mut factors = Vec::with_capacity(views.len());
     for (view, photo) in views.iter().zip(loaded) {
+        if view.size.is_some() {
+            return None;
+        }
         let (cx, cy) = (view.camera.intrinsics.row(0).z, view.camera.intrinsics.row(1).z);
         let across = photo.file_size.0 as f64 / (2.0 * (cx + centre_shift));
         let down = photo.file_size.1 as f64 / (2.0 * (cy + centre_shift));
@@ -111,17 +74,4 @@ fn scale(view: &mut SourceView, factor: f64, centre_shift: f64) {
     let scaled = DMat3::from_diagonal(DVec3::new(factor, factor, 1.0)) * about_corner;
     *intrinsics = DMat3::from_cols(scaled.x_axis, scaled.y_axis, scaled.z_axis - shift);
     view.size = None;
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sizes_of_one_picture_have_a_factor_and_crops_have_none() {
-        assert_eq!(factor_of_sizes((1000, 500), (500, 250)), Some(0.5));
-        assert!((factor_of_sizes((1001, 667), (250, 167)).unwrap() - 0.25).abs() < 1e-3);
-        assert_eq!(factor_of_sizes((1000, 500), (500, 300)), None);
-        assert_eq!(factor_of_sizes((1000, 500), (500, 1000)), None);
-    }
 }

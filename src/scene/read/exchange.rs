@@ -89,6 +89,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
                 photo: folder.join(&view.file),
                 mask: coverage.is_file().then_some(coverage),
                 camera: view.camera,
+                lens: None,
                 size: view.size,
                 place: view.place,
                 name,
@@ -108,6 +109,8 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
         held_out: (!marked.is_empty()).then_some(marked),
         has_truth: true,
         flip_winding: false,
+        is_of_a_tool: false,
+        mesh_frames: Vec::new(),
         findings,
     })
 }

@@ -128,6 +128,8 @@ pub fn read(path: &Path) -> Result<SourceScene> {
         held_out: manifest.held_out,
         has_truth: false,
         flip_winding: manifest.flip_winding,
+        is_of_a_tool: false,
+        mesh_frames: Vec::new(),
         findings,
     })
 }
@@ -168,6 +170,7 @@ fn views_of_json(
             photo: photo.clone(),
             mask,
             camera: entry.camera,
+            lens: None,
             size: entry.size,
             place: entry.place,
             name,

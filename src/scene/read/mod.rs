@@ -1,35 +1,59 @@
 //! Readers: from a folder or a manifest to a [`Scene`].
 //!
-//! [`read`] is the door. It finds out the kind of the scene ([`exchange`], [`blended_mvs`], [`manifest`]); each kind
-//! only lists files and reads cameras into a [`source::SourceScene`]. What follows is the same for all: mesh
-//! ([`mesh_file`], with `obj`, `ply`, `gltf` and `stl`), up axis and origin ([`world`]), photos and masks ([`photos`]), pixel centres.
+//! [`read`] is the door. [`detect`] finds out the kind of the scene ([`manifest`], [`exchange`], [`blended_mvs`], [`colmap`],
+//! [`transforms`], [`metashape`], and the others of [`Format`]); each kind only lists files and reads cameras into a
+//! [`source::SourceScene`]. What follows is the same for all: true sizes of photos (`photo_size`, `calibrated_size`), mesh
+//! ([`mesh_file`], with `obj`, `ply`, `gltf` and `stl`) and its frame (`mesh_frame`), up axis and origin ([`world`]), photos,
+//! masks and lenses ([`photos`]), pixel centres. [`understood`] says on a page what was made of it all.
 //!
 //! What it refuses to do: guess. What is missing or contradictory is an error with place and remedy, or a finding; what
 //! was assumed is a finding. Whether the parts fit together is judged by [`doctor`](crate::scene::doctor), not here.
 
+mod alicevision;
 pub mod blended_mvs;
+mod bundler;
+mod bytes;
 mod calibrated_size;
 pub mod camera_file;
+pub mod colmap;
+pub mod colmap_lens;
+pub mod detect;
 pub mod exchange;
 mod gltf;
 pub mod manifest;
 mod mask_names;
 mod matte;
+mod mesh_choice;
 pub mod mesh_file;
+mod mesh_frame;
+pub mod metashape;
+mod metashape_project;
+mod neural_scenes;
+mod numpy;
 mod obj;
 mod obj_elements;
+mod openmvs;
+mod opensfm;
 mod orientation;
 pub mod outliers;
+mod photo_index;
+mod photo_size;
 pub mod photos;
 mod ply;
 mod ply_header;
 pub mod polygon;
+mod realitycapture;
 pub mod source;
 mod stl;
 pub mod text;
+pub mod transforms;
+pub mod understood;
 pub mod world;
+mod zip;
 
+pub use detect::{Format, Located, locate};
 pub use mesh_file::read_mesh;
+pub use understood::{Understood, understand};
 
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::scene::doctor::pixel_centre;
@@ -37,108 +61,51 @@ use crate::scene::settings::{BackgroundChoice, ColourEncoding, MaskUse, PixelCen
 use crate::scene::{Background, Scene, View, WorldFromSource};
 use photos::LoadedPhoto;
 use source::{SourceScene, SourceView};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// With fewer views than this none is held out: each is needed.
 const FEWEST_VIEWS_TO_HOLD_OUT: usize = 4;
 
-/// Reads a scene: a folder with `scene.toml`, an exchange folder, a BlendedMVS folder, or a manifest file itself.
+/// Reads a scene of any [`Format`]: its folder, or a manifest or a project file itself.
 ///
 /// # Errors
 /// Anything missing, damaged or contradictory, with file, line or byte and a remedy. Geometry or photos that are valid
 /// but useless are not errors here: [`doctor::check`](crate::scene::doctor::check) names them.
 pub fn read(path: &Path, settings: &ReadSettings) -> Result<Scene> {
     settings.validate()?;
-    assemble(find(path)?, settings)
-}
-
-/// Where the files of a scene are listed, and in which form.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Located {
-    /// A manifest, `scene.toml`.
-    Manifest(PathBuf),
-    /// An exchange folder.
-    Exchange(PathBuf),
-    /// A BlendedMVS folder.
-    BlendedMvs(PathBuf),
-}
-
-/// Finds out the kind of the scene and lists it.
-fn find(path: &Path) -> Result<SourceScene> {
-    match locate(path)? {
-        Located::Manifest(file) => manifest::read(&file),
-        Located::Exchange(folder) => exchange::read(&folder),
-        Located::BlendedMvs(folder) => blended_mvs::read(&folder),
-    }
+    assemble(locate(path)?.list(settings)?, settings)
 }
 
 /// The folders that hold photos and masks of a scene, without decoding any.
 ///
 /// # Errors
 /// As of [`read`], as far as files are listed and cameras read.
-pub fn picture_folders(path: &Path) -> Result<std::collections::BTreeSet<PathBuf>> {
-    let views = find(path)?.views;
+pub fn picture_folders(path: &Path) -> Result<std::collections::BTreeSet<std::path::PathBuf>> {
+    let views = locate(path)?.list(&ReadSettings::default())?.views;
     let files = views.iter().flat_map(|view| std::iter::once(&view.photo).chain(&view.mask));
     Ok(files.filter_map(|file| file.parent().map(Path::to_path_buf)).collect())
-}
-
-/// Finds out whether a scene is at a path, and of which kind, by the names of files alone.
-///
-/// # Errors
-/// `Missing` or `Unsupported`, with what a scene must hold as the remedy.
-pub fn locate(path: &Path) -> Result<Located> {
-    if path.is_file() {
-        if path.extension().is_some_and(|extension| extension == "toml") {
-            return Ok(Located::Manifest(path.into()));
-        }
-        return Err(Error::new(ErrorKind::Unsupported, "a scene is a folder or a scene.toml")
-            .at(Place::File(path.into()))
-            .remedy("give the folder that holds the photos and the mesh"));
-    }
-    if !path.is_dir() {
-        return Err(Error::new(ErrorKind::Missing, "there is no such folder")
-            .at(Place::File(path.into()))
-            .remedy("check the path"));
-    }
-    // Downloads nest a project in folders of the same name: walk down while there is nothing but one folder.
-    let mut folder = path.to_path_buf();
-    for _ in 0..4 {
-        if folder.join(manifest::FILE_NAME).is_file() {
-            return Ok(Located::Manifest(folder.join(manifest::FILE_NAME)));
-        }
-        if exchange::is_folder_of_this_kind(&folder) {
-            return Ok(Located::Exchange(folder));
-        }
-        if blended_mvs::is_folder_of_this_kind(&folder) {
-            return Ok(Located::BlendedMvs(folder));
-        }
-        match only_subfolder(&folder)? {
-            Some(inner) => folder = inner,
-            None => break,
-        }
-    }
-    Err(Error::new(ErrorKind::Unsupported, "the folder is not a scene of a known kind")
-        .at(Place::File(path.into()))
-        .remedy("it must hold scene.toml, or cameras.json (exchange folder), or blended_images/, cams/ and textured_mesh/ (BlendedMVS)"))
-}
-
-fn only_subfolder(folder: &Path) -> Result<Option<PathBuf>> {
-    let entries = std::fs::read_dir(folder).map_err(|source| Error::reading(folder, source))?;
-    let mut folders: Vec<PathBuf> =
-        entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.is_dir()).collect();
-    Ok(if folders.len() == 1 { folders.pop() } else { None })
 }
 
 /// Turns, decodes and joins what a reader listed.
 fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
     let SourceScene { name, folder, mesh, views, mut findings, .. } = source;
     let mut views = choose_views(views, settings.max_views, &folder)?;
+    photo_size::fit_to_photos(&mut views, &mut findings)?;
+    let mesh = settings.mesh.as_ref().map_or(mesh, |chosen| vec![chosen.clone()]);
+    if mesh.is_empty() {
+        return Err(Error::new(ErrorKind::Missing, "no mesh lies with the photos and cameras")
+            .at(Place::File(folder))
+            .remedy("name it with --mesh FILE, in the frame of the cameras"));
+    }
 
     // The mesh, turned so that +y is up.
     let mut source_mesh = mesh_file::read_pieces(&mesh)?;
     if source.flip_winding {
         source_mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
         source_mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
+    }
+    if source.is_of_a_tool {
+        mesh_frame::put_right(&mut source_mesh, &views, &source.mesh_frames, &mut findings);
     }
     let cameras: Vec<_> = views.iter().map(|view| view.camera).collect();
     let asked_up = if settings.up == Up::Auto { source.up } else { settings.up };
@@ -152,6 +119,7 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
     // The photos.
     let encoding = if settings.encoding == ColourEncoding::Auto { source.encoding } else { settings.encoding };
     let mut loaded = photos::load_all(&views, encoding, settings)?;
+    findings.extend(photos::told_of_lenses(&loaded));
     let mut background = match settings.background {
         BackgroundChoice::Auto => source.background,
         BackgroundChoice::Environment => Background::Environment,
@@ -181,7 +149,7 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
     let asked_centre =
         if settings.pixel_centre == PixelCentre::Auto { source.pixel_centre } else { settings.pixel_centre };
     let assumed_centre = if asked_centre == PixelCentre::Auto { source.default_pixel_centre } else { asked_centre };
-    calibrated_size::fit(&mut views, &loaded, assumed_centre.shift_pixels(), &mut findings)?;
+    calibrated_size::fit(&mut views, &loaded, assumed_centre.shift_pixels(), &mut findings);
     let mut joined = Vec::with_capacity(views.len());
     for (view, photo) in views.iter().zip(loaded) {
         joined.push(join(view, photo, &world_from_source, assumed_centre, settings.shrink, &mut findings));

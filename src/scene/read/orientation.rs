@@ -78,7 +78,7 @@ mod tests {
             translation: DVec3::ZERO,
         };
         let place = Place::Nowhere;
-        SourceView { name: "a".into(), photo: "a.jpg".into(), mask: None, camera, size, place }
+        SourceView { name: "a".into(), photo: "a.jpg".into(), mask: None, camera, lens: None, size, place }
     }
 
     fn photo(width: usize, height: usize, orientation: u8) -> PhotoFile {

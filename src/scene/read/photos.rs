@@ -5,6 +5,7 @@ use super::source::SourceView;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::file::{self, Encoding, PhotoFile, PhotoOptions, PhotoPixels};
 use crate::image::{GreyImage, Image, RgbImage};
+use crate::scene::lens::{Undistorted, undistort};
 use crate::scene::settings::{ColourEncoding, MaskUse, ReadSettings};
 use crate::scene::{Photo, PixelState};
 use glam::Vec3;
@@ -29,6 +30,8 @@ pub struct LoadedPhoto {
     pub file_size: (usize, usize),
     /// By how many stops it is exposed more than the mean of the photos, as EXIF says; `None` where it does not.
     pub exposure_prior_stops: Option<f32>,
+    /// What undoing the distortion of its lens did; `None` for a pinhole.
+    pub undistorted: Option<Undistorted>,
     /// What was noticed of it alone.
     pub findings: Vec<Finding>,
     /// What was noticed without a place, which other photos may share.
@@ -39,7 +42,15 @@ impl LoadedPhoto {
     /// A photo with nothing noticed.
     pub fn new(photo: Photo, states: Image<PixelState>) -> Self {
         let file_size = (photo.width(), photo.height());
-        LoadedPhoto { photo, states, file_size, exposure_prior_stops: None, findings: Vec::new(), shared: Vec::new() }
+        LoadedPhoto {
+            photo,
+            states,
+            file_size,
+            exposure_prior_stops: None,
+            undistorted: None,
+            findings: Vec::new(),
+            shared: Vec::new(),
+        }
     }
 }
 
@@ -60,6 +71,21 @@ pub fn load_all(views: &[SourceView], encoding: ColourEncoding, settings: &ReadS
         first.findings.splice(0..0, gathered);
     }
     Ok(loaded)
+}
+
+/// What undoing the distortion of lenses did, over all photos.
+pub fn told_of_lenses(loaded: &[LoadedPhoto]) -> Option<Finding> {
+    let done: Vec<Undistorted> = loaded.iter().filter_map(|photo| photo.undistorted).collect();
+    let shift = done.iter().map(|own| own.largest_shift_pixels).fold(0.0, f64::max);
+    let outside = done.iter().map(|own| own.share_outside).fold(0.0, f64::max);
+    let message = format!(
+        "the distortion of the lens is undone in {} of {} photos: pixels move by up to {shift:.1}, and up to {:.1} % of a photo \
+         lies outside what was taken and is not seen",
+        done.len(),
+        loaded.len(),
+        100.0 * outside
+    );
+    (!done.is_empty()).then(|| Finding::new(Severity::Note, "lens-undone", message))
 }
 
 /// One finding of those that photos share, with the names of the photos.
@@ -141,11 +167,21 @@ fn load(view: &SourceView, encoding: ColourEncoding, settings: &ReadSettings, as
         }
     }
     mark(&mut states, is_inside.as_ref(), PixelState::Ignored, |is_inside| !is_inside);
+    // Before anything is averaged: a pixel is resampled once.
+    let mut undistorted = None;
+    let (photo, states) = match &view.lens {
+        None => (photo, states),
+        Some(lens) => {
+            let (photo, states, done) = undistort(&photo, &states, lens, &view.camera.pinhole());
+            undistorted = Some(done);
+            (photo, states)
+        }
+    };
     let (photo, states) = match settings.shrink {
         1 => (photo, states),
         factor => shrink(&photo, &states, factor),
     };
-    Ok(LoadedPhoto { photo, states, file_size, exposure_prior_stops: exposure_stops, findings, shared })
+    Ok(LoadedPhoto { photo, states, file_size, exposure_prior_stops: exposure_stops, undistorted, findings, shared })
 }
 
 /// Sets the state of the pixels that a map marks; ignored pixels stay so.

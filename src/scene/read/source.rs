@@ -1,10 +1,11 @@
 //! A scene as a reader finds it: paths and numbers of the source, before anything is turned or decoded.
 
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::scene::lens::{Lens, Pinhole};
 use crate::scene::settings::{ColourEncoding, PixelCentre, Up};
 use crate::scene::{Background, Camera, WorldFromSource};
-use glam::{DMat3, DVec3, Vec2};
-use std::path::PathBuf;
+use glam::{DMat3, DMat4, DVec2, DVec3, Vec2};
+use std::path::{Path, PathBuf};
 
 /// A camera of the source: OpenCV axes, its own world and pixel convention.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +29,9 @@ pub struct SourceView {
     pub mask: Option<PathBuf>,
     /// The camera.
     pub camera: SourceCamera,
+    /// The lens, unless it is a pinhole: the photo is resampled on loading. The intrinsics then put pixel centres at
+    /// (0.5, 0.5).
+    pub lens: Option<Lens>,
     /// Width and height the source claims for the photo.
     pub size: Option<(usize, usize)>,
     /// Where the camera is written down.
@@ -61,8 +65,47 @@ pub struct SourceScene {
     pub has_truth: bool,
     /// Turn every triangle over.
     pub flip_winding: bool,
+    /// Whether photos may have another size than their cameras claim, and the mesh another frame: so it is with what tools
+    /// export.
+    pub is_of_a_tool: bool,
+    /// Frames the mesh may stand in, as the source knows them.
+    pub mesh_frames: Vec<MeshFrame>,
     /// What the reader noticed.
     pub findings: Vec<Finding>,
+}
+
+/// A frame that a mesh may stand in.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshFrame {
+    /// What takes it to the frame of the cameras, in words after "after".
+    pub name: &'static str,
+    /// `source_from_mesh`, a similarity.
+    pub source_from_mesh: DMat4,
+}
+
+impl SourceScene {
+    /// A scene of photographs whose pixel centres are at (0.5, 0.5), with nothing said of its up axis: as most tools export.
+    pub fn of_photographs(folder: &Path, mesh: Vec<PathBuf>, views: Vec<SourceView>) -> Self {
+        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.into());
+        SourceScene {
+            name: whole.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            folder: folder.into(),
+            mesh,
+            views,
+            up: Up::Auto,
+            pixel_centre: PixelCentre::Half,
+            default_pixel_centre: PixelCentre::Half,
+            background: Background::Environment,
+            encoding: ColourEncoding::Auto,
+            held_out: None,
+            has_truth: false,
+            flip_winding: false,
+            is_of_a_tool: true,
+            mesh_frames: Vec::new(),
+            findings: Vec::new(),
+        }
+    }
 }
 
 /// A rotation this far from orthonormal is repaired in silence: four to five printed digits.
@@ -120,6 +163,15 @@ impl SourceCamera {
             );
         }
         Ok((SourceCamera { intrinsics, rotation: nearest_rotation(rotation), translation }, findings))
+    }
+
+    /// The pinhole that photos taken through a lens with these intrinsics are resampled to.
+    pub fn pinhole(&self) -> Pinhole {
+        let columns = self.intrinsics;
+        Pinhole {
+            focal_pixels: DVec2::new(columns.x_axis.x, columns.y_axis.y),
+            centre_pixels: columns.z_axis.truncate(),
+        }
     }
 
     /// The camera in the program's world and pixel convention. `centre_shift` is added to the principal point.

@@ -1,0 +1,181 @@
+//! AliceVision and Meshroom: `sfm.json`, `cameras.sfm` or any `.sfm` file.
+//!
+//! Numbers are stored as strings. The nine numbers of a rotation are the columns of camera from world, so row by row they are
+//! camera to world; `center` is where the camera stands. The principal point is an offset from the middle in pixels (files before
+//! 2021: absolute, told by its size).
+
+use super::blended_mvs::files_of;
+use super::camera_file::read_text;
+use super::colmap_lens::matrix;
+use super::mesh_choice;
+use super::photo_index::{PhotoIndex, Posed, views_of};
+use super::source::{SourceCamera, SourceScene};
+use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::scene::lens::{Base, Lens, Model, Polynomial};
+use glam::{DMat3, DVec3};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The file of a folder, if it holds one.
+pub fn file_of(folder: &Path) -> Option<PathBuf> {
+    let named = ["sfm.json", "cameras.json.sfm", "cameras.sfm"].map(|name| folder.join(name));
+    named.into_iter().find(|path| path.is_file()).or_else(|| files_of(folder, &["sfm"]).ok()?.into_iter().next())
+}
+
+/// A number, be it written as one or as a string.
+fn number(value: &Value) -> Option<f64> {
+    let number = value.as_f64().or_else(|| value.as_str()?.trim().parse().ok())?;
+    number.is_finite().then_some(number)
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().map_or_else(|| number(value).into_iter().collect(), |all| all.iter().filter_map(number).collect())
+}
+
+/// A name, be it written as one or as a number.
+fn name(value: Option<&Value>) -> Option<String> {
+    let value = value?;
+    value.as_str().map(str::to_owned).or_else(|| value.as_u64().map(|number| number.to_string()))
+}
+
+fn malformed(what: &str, place: &Place) -> Error {
+    Error::new(ErrorKind::Malformed, what).at(place.clone()).remedy("export the file again (ConvertSfMFormat)")
+}
+
+/// Size, intrinsics and lens of an entry of `intrinsics`.
+fn intrinsics_of(entry: &Value, place: &Place) -> Result<((usize, usize), DMat3, Lens)> {
+    let get = |key: &str| entry.get(key).and_then(number);
+    let (Some(width), Some(height)) = (get("width"), get("height")) else {
+        return Err(malformed("the intrinsics have no size", place));
+    };
+    let focal = match entry.get("pxFocalLength").map(numbers).unwrap_or_default().as_slice() {
+        [both] => [*both; 2],
+        [x, y] => [*x, *y],
+        _ => {
+            // In millimetres on a sensor of known width; pixelRatio is the height of a pixel over its width.
+            let (Some(millimetres), Some(sensor)) = (get("focalLength"), get("sensorWidth")) else {
+                return Err(malformed("the intrinsics have no focal length", place));
+            };
+            let x = millimetres / sensor * width;
+            [x, x * get("pixelRatio").filter(|ratio| *ratio > 0.0).unwrap_or(1.0)]
+        }
+    };
+    let offset = entry.get("principalPoint").map(numbers).unwrap_or_default();
+    let middle = [0.5 * width, 0.5 * height];
+    let centre = match offset.as_slice() {
+        [x, y] if x.abs() < 0.5 * middle[0] && y.abs() < 0.5 * middle[1] => [middle[0] + x, middle[1] + y],
+        [x, y] => [*x, *y],
+        _ => middle,
+    };
+    let kind = entry.get("distortionType").or_else(|| entry.get("type")).and_then(Value::as_str).unwrap_or("pinhole");
+    let k = entry.get("distortionParams").map(numbers).unwrap_or_default();
+    let radial = |values: &[f64]| {
+        let mut numerator = [0.0; 6];
+        let count = values.len().min(6);
+        numerator[..count].copy_from_slice(&values[..count]);
+        numerator
+    };
+    let polynomial = match (kind, k.as_slice()) {
+        (_, values) if values.iter().all(|value| *value == 0.0) && !kind.contains("fisheye") => Polynomial::default(),
+        ("pinhole" | "none", _) => Polynomial::default(),
+        ("radial1" | "radialk1" | "radial3" | "radialk3", values) => {
+            Polynomial { numerator: radial(values), ..Default::default() }
+        }
+        ("brown", [k1, k2, k3, t1, t2]) => {
+            Polynomial { numerator: radial(&[*k1, *k2, *k3]), tangential: [*t1, *t2], ..Default::default() }
+        }
+        ("fisheye" | "fisheye4", values) if values.len() <= 4 => {
+            Polynomial { base: Base::Angle, numerator: radial(values), ..Default::default() }
+        }
+        (other, _) => {
+            return Err(Error::new(ErrorKind::Unsupported, format!("the distortion {other} is not read"))
+                .at(place.clone())
+                .remedy("use a radial, brown or fisheye4 model, or undistort the photos (ExportColoredPointCloud, PrepareDenseScene)"));
+        }
+    };
+    Ok(((width as usize, height as usize), matrix(focal, centre), Lens::new(Model::Polynomial(polynomial))))
+}
+
+/// Lists an AliceVision scene and reads its cameras.
+pub fn read(path: &Path) -> Result<SourceScene> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let json: Value = serde_json::from_str(&read_text(path)?).map_err(|error| {
+        Error::new(ErrorKind::Malformed, format!("the file is not JSON: {error}"))
+            .at(Place::Line(path.into(), error.line().max(1)))
+            .remedy("export the file again as .sfm or .json (ConvertSfMFormat)")
+    })?;
+    let list = |key: &str| json.get(key).and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
+    let by_id = |entries: &'_ [Value], key: &str| -> BTreeMap<String, Value> {
+        entries.iter().filter_map(|entry| Some((name(entry.get(key))?, entry.clone()))).collect()
+    };
+    let poses = by_id(list("poses"), "poseId");
+    let intrinsics = by_id(list("intrinsics"), "intrinsicId");
+    let mut findings = Vec::new();
+    let (mut posed, mut unposed) = (Vec::new(), 0usize);
+    for view in list("views") {
+        let listed = view.get("path").and_then(Value::as_str).unwrap_or_default().to_owned();
+        let place = Place::View(format!("{listed} of {}", path.display()));
+        let pose = name(view.get("poseId")).and_then(|id| poses.get(&id)?.get("pose")?.get("transform"));
+        let entry = name(view.get("intrinsicId")).and_then(|id| intrinsics.get(&id));
+        let (Some(pose), Some(entry)) = (pose, entry) else {
+            unposed += 1;
+            continue;
+        };
+        let rotation: [f64; 9] = pose
+            .get("rotation")
+            .map(numbers)
+            .and_then(|values| values.try_into().ok())
+            .ok_or_else(|| malformed("the rotation is not nine numbers", &place))?;
+        let centre: [f64; 3] = pose
+            .get("center")
+            .map(numbers)
+            .and_then(|values| values.try_into().ok())
+            .ok_or_else(|| malformed("the centre is not three numbers", &place))?;
+        // Row by row camera to world: taken as columns it is camera from world.
+        let rotation = DMat3::from_cols_array(&rotation);
+        let (size, intrinsics, lens) = intrinsics_of(entry, &place)?;
+        let translation = -(rotation * DVec3::from_array(centre));
+        let (camera, mut noticed) = SourceCamera::new(intrinsics, rotation, translation, &place)?;
+        findings.append(&mut noticed);
+        posed.push(Posed { listed, camera, lens, size: Some(size), mask: None, place });
+    }
+    if unposed > 0 {
+        let message = format!("{unposed} views have no pose and take no part");
+        findings.push(Finding::new(Severity::Note, "camera-not-aligned", message).at(Place::File(path.into())));
+    }
+    let photos = PhotoIndex::of_folders(&[folder.join("images"), folder.into()].map(|path: PathBuf| path))?;
+    let views = views_of(posed, &photos, &[folder.join("masks"), folder.join("mask")], &mut findings)?;
+    let mesh = mesh_choice::find(&[folder.into()], &mut findings);
+    Ok(SourceScene { findings, ..SourceScene::of_photographs(folder, mesh, views) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::{Image, file};
+
+    #[test]
+    fn numbers_in_strings_and_both_kinds_of_focal_length_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        file::write_png_srgb8(&folder.path().join("a.png"), &Image::filled(40, 30, [9; 3])).unwrap();
+        let json = r#"{"views":[{"viewId":"1","poseId":"1","intrinsicId":"5","path":"/far/a.png"},{"viewId":"2","poseId":"2",
+            "intrinsicId":"5","path":"/far/b.png"}],"intrinsics":[{"intrinsicId":"5","width":"40","height":"30",
+            "pxFocalLength":["50","51"],"principalPoint":["0.5","-0.25"],"type":"radial3","distortionParams":["0.1","0","0.01"]}],
+            "poses":[{"poseId":"1","pose":{"transform":{"rotation":["0","1","0","-1","0","0","0","0","1"],"center":["1","2","3"]}}}]}"#;
+        let path = folder.path().join("sfm.json");
+        std::fs::write(&path, json).unwrap();
+        let scene = read(&file_of(folder.path()).unwrap()).unwrap();
+        let camera = &scene.views[0].camera;
+        assert_eq!(camera.pinhole().centre_pixels.to_array(), [20.5, 14.75]);
+        assert!((camera.rotation.transpose() * -camera.translation - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-12);
+        // Row by row camera to world: the camera's x axis is the first column, (0, -1, 0).
+        assert!((camera.rotation.transpose() * DVec3::X - DVec3::NEG_Y).length() < 1e-12);
+        assert_eq!(scene.findings[0].code, "camera-not-aligned");
+        let metric = json.replace(r#""pxFocalLength":["50","51"]"#, r#""focalLength":"45","sensorWidth":"36""#);
+        std::fs::write(&path, metric.replace("\"0.5\",\"-0.25\"", "\"21\",\"14\"")).unwrap();
+        let pinhole = read(&path).unwrap().views[0].camera.pinhole();
+        assert_eq!(pinhole.focal_pixels.to_array(), [50.0, 50.0]);
+        assert_eq!(pinhole.centre_pixels.to_array(), [21.0, 14.0], "an old file: absolute");
+    }
+}

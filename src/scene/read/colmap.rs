@@ -1,0 +1,222 @@
+//! A COLMAP model, text or binary, with its photos; also a dense workspace with its mesh.
+//!
+//! ```text
+//! sparse/0/ or sparse/ or the folder itself:   cameras, images (.bin preferred to .txt); rigs and frames are not needed
+//! images/                                      photos, in subfolders too; masks/ by the names of photos
+//! meshed-poisson.ply, textured/mesh.ply, ...   or any other mesh; dense/0/ is looked into
+//! ```
+//! World to camera, OpenCV axes, quaternions as w x y z, the first pixel's centre at (0.5, 0.5) (COLMAP, `doc/format.rst` and
+//! `sensor/models.h`).
+
+use super::bytes::Bytes;
+use super::camera_file::read_text;
+use super::colmap_lens::{lens_of, model_of_id, model_of_name};
+use super::mesh_choice;
+use super::photo_index::{PhotoIndex, Posed, views_of};
+use super::source::{SourceCamera, SourceScene};
+use crate::error::{Error, ErrorKind, Place, Result};
+use glam::{DMat3, DQuat, DVec3};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Folders the model may lie in.
+const MODEL_FOLDERS: [&str; 9] = [
+    "sparse/0",
+    "sparse",
+    "",
+    "colmap/sparse/0",
+    "colmap/sparse",
+    "dense/sparse",
+    "dense/0/sparse",
+    "0",
+    "undistorted/sparse",
+];
+
+/// A camera of `cameras`.
+struct ColmapCamera {
+    model: &'static str,
+    size: (usize, usize),
+    parameters: Vec<f64>,
+    place: Place,
+}
+
+/// An image of `images`.
+struct ColmapImage {
+    rotation: [f64; 4],
+    translation: DVec3,
+    camera: u32,
+    name: String,
+    place: Place,
+}
+
+/// The folder of the model under a scene's folder.
+pub fn model_folder(folder: &Path) -> Option<PathBuf> {
+    MODEL_FOLDERS.iter().map(|inner| folder.join(inner)).find(|inner| {
+        ["bin", "txt"].iter().any(|extension| {
+            ["cameras", "images"].iter().all(|name| inner.join(format!("{name}.{extension}")).is_file())
+        })
+    })
+}
+
+/// Lists a COLMAP scene and reads its cameras.
+pub fn read(folder: &Path) -> Result<SourceScene> {
+    let model = model_folder(folder).unwrap_or_else(|| folder.into());
+    let is_binary = model.join("cameras.bin").is_file() && model.join("images.bin").is_file();
+    let (cameras, images) = if is_binary {
+        (read_cameras_bin(&model.join("cameras.bin"))?, read_images_bin(&model.join("images.bin"))?)
+    } else {
+        (read_cameras_txt(&model.join("cameras.txt"))?, read_images_txt(&model.join("images.txt"))?)
+    };
+    let mut findings = Vec::new();
+    let mut posed = Vec::new();
+    for image in images {
+        let camera = cameras.get(&image.camera).ok_or_else(|| {
+            Error::new(
+                ErrorKind::Malformed,
+                format!("the image {} names camera {}, which is not there", image.name, image.camera),
+            )
+            .at(image.place.clone())
+            .remedy("export the model again: cameras and images do not belong together")
+        })?;
+        let (intrinsics, lens) = lens_of(camera.model, &camera.parameters, &camera.place)?;
+        let [w, x, y, z] = image.rotation;
+        let rotation = DQuat::from_xyzw(x, y, z, w);
+        if !(rotation.length() > 1e-6) {
+            return Err(Error::new(ErrorKind::Malformed, format!("the rotation of {} is not one", image.name))
+                .at(image.place)
+                .remedy("export the model again"));
+        }
+        let rotation = DMat3::from_quat(rotation.normalize());
+        let (camera_in_source, mut noticed) = SourceCamera::new(intrinsics, rotation, image.translation, &image.place)?;
+        findings.append(&mut noticed);
+        posed.push(Posed {
+            listed: image.name,
+            camera: camera_in_source,
+            lens,
+            size: Some(camera.size),
+            mask: None,
+            place: image.place,
+        });
+    }
+    // The photos of an undistorted workspace lie beside its model, not in the original folder.
+    let beside = model.ancestors().skip(1).take(2).filter(|parent| parent.starts_with(folder)).map(Path::to_path_buf);
+    let bases: Vec<PathBuf> = beside.chain([folder.to_path_buf()]).collect();
+    let named = |names: &[&str]| -> Vec<PathBuf> {
+        bases.iter().flat_map(|base| names.iter().map(move |name| base.join(name))).collect()
+    };
+    let mut roots = named(&["images", "image", "photos", "input"]);
+    roots.retain(|root| root.is_dir());
+    roots.push(folder.into());
+    roots.dedup();
+    let views = views_of(posed, &PhotoIndex::of_folders(&roots)?, &named(&["masks", "mask"]), &mut findings)?;
+    let mesh = mesh_choice::find(&[bases, vec![model.clone()]].concat(), &mut findings);
+    Ok(SourceScene { findings, ..SourceScene::of_photographs(folder, mesh, views) })
+}
+
+fn read_cameras_bin(path: &Path) -> Result<BTreeMap<u32, ColmapCamera>> {
+    let mut bytes = Bytes::open(path)?;
+    let count = bytes.count("the number of cameras", 24)?;
+    let mut cameras = BTreeMap::new();
+    for _ in 0..count {
+        let place = bytes.place();
+        let id = bytes.u32("the number of a camera")?;
+        let (model, parameter_count) = model_of_id(bytes.u32("the model of a camera")? as i32, &place)?;
+        let size = (bytes.u64("the width")? as usize, bytes.u64("the height")? as usize);
+        let parameters = (0..parameter_count).map(|_| bytes.f64("a parameter")).collect::<Result<_>>()?;
+        cameras.insert(id, ColmapCamera { model, size, parameters, place });
+    }
+    Ok(cameras)
+}
+
+fn read_images_bin(path: &Path) -> Result<Vec<ColmapImage>> {
+    let mut bytes = Bytes::open(path)?;
+    let count = bytes.count("the number of images", 73)?;
+    let mut images = Vec::new();
+    for _ in 0..count {
+        let place = bytes.place();
+        bytes.u32("the number of an image")?;
+        let mut pose = [0.0; 7];
+        for value in &mut pose {
+            *value = bytes.f64("a pose")?;
+        }
+        let camera = bytes.u32("the camera of an image")?;
+        let name = bytes.text_to_zero("the name of an image")?;
+        let points = bytes.count("the number of points", 24)?;
+        bytes.skip(points * 24, "the points of an image")?;
+        let rotation = [pose[0], pose[1], pose[2], pose[3]];
+        images.push(ColmapImage { rotation, translation: DVec3::new(pose[4], pose[5], pose[6]), camera, name, place });
+    }
+    Ok(images)
+}
+
+/// A word as a number, with its line where it is none.
+fn parsed<T: std::str::FromStr>(word: Option<&str>, what: &str, path: &Path, line: usize) -> Result<T> {
+    word.and_then(|word| word.parse().ok()).ok_or_else(|| {
+        Error::new(ErrorKind::Malformed, format!("'{}' is not {what}", word.unwrap_or_default()))
+            .at(Place::Line(path.into(), line))
+            .remedy("the file is cut short or damaged: export it again")
+    })
+}
+
+fn read_cameras_txt(path: &Path) -> Result<BTreeMap<u32, ColmapCamera>> {
+    let text = read_text(path)?;
+    let mut cameras = BTreeMap::new();
+    for (index, line) in text.lines().enumerate() {
+        if line.trim().is_empty() || line.trim_start().starts_with('#') {
+            continue;
+        }
+        let place = Place::Line(path.into(), index + 1);
+        let mut words = line.split_whitespace();
+        let id = parsed(words.next(), "the number of a camera", path, index + 1)?;
+        let (model, count) = model_of_name(words.next().unwrap_or_default(), &place)?;
+        let width = parsed(words.next(), "a width", path, index + 1)?;
+        let height = parsed(words.next(), "a height", path, index + 1)?;
+        let parameters: Vec<f64> =
+            words.map(|word| parsed(Some(word), "a parameter", path, index + 1)).collect::<Result<_>>()?;
+        if parameters.len() != count {
+            return Err(Error::new(
+                ErrorKind::Malformed,
+                format!("the model {model} has {count} parameters, not {}", parameters.len()),
+            )
+            .at(place)
+            .remedy("export the model again"));
+        }
+        cameras.insert(id, ColmapCamera { model, size: (width, height), parameters, place });
+    }
+    Ok(cameras)
+}
+
+fn read_images_txt(path: &Path) -> Result<Vec<ColmapImage>> {
+    let text = read_text(path)?;
+    let mut images = Vec::new();
+    let mut lines = text.lines().enumerate();
+    while let Some((index, line)) = lines.next() {
+        if line.trim().is_empty() || line.trim_start().starts_with('#') {
+            continue;
+        }
+        let mut pose = [0.0; 7];
+        let mut rest = line.trim_start();
+        let mut next = || {
+            let (word, after) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
+            rest = after.trim_start();
+            word
+        };
+        parsed::<u32>(Some(next()), "the number of an image", path, index + 1)?;
+        for value in &mut pose {
+            *value = parsed(Some(next()), "a number of a pose", path, index + 1)?;
+        }
+        let camera = parsed(Some(next()), "the number of a camera", path, index + 1)?;
+        let place = Place::Line(path.into(), index + 1);
+        let rotation = [pose[0], pose[1], pose[2], pose[3]];
+        let translation = DVec3::new(pose[4], pose[5], pose[6]);
+        // What is left is the name, spaces and all.
+        images.push(ColmapImage { rotation, translation, camera, name: rest.trim_end().to_owned(), place });
+        // The points of the image: a line that may be empty.
+        lines.next();
+    }
+    Ok(images)
+}
+
+#[cfg(test)]
+#[path = "colmap_tests.rs"]
+mod tests;

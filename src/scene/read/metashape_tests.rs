@@ -1,0 +1,98 @@
+use super::super::zip::packed;
+use super::*;
+use crate::image::{Image, file};
+use glam::DVec2;
+
+/// Exported cameras of two sensors, in the words of version 1.5: offsets, affinity, P1 and P2 in Agisoft's order.
+const EXPORT: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
+<document version="1.5.0"><chunk label="Chunk 1" enabled="1">
+ <sensors>
+  <sensor id="0" type="frame"><resolution width="40" height="30"/>
+   <calibration type="frame" class="adjusted"><resolution width="40" height="30"/>
+    <f>50</f><cx>0.5</cx><cy>-0.25</cy><b1>1</b1><b2>0.5</b2><k1>0.1</k1><p1>0.001</p1><p2>0.002</p2></calibration></sensor>
+  <sensor id="1" type="fisheye"><resolution width="40" height="30"/>
+   <calibration type="fisheye" class="adjusted"><f>20</f></calibration></sensor>
+ </sensors>
+ <cameras>
+  <camera id="0" sensor_id="0" label="a"><transform>1 0 0 1 0 -1 0 2 0 0 -1 3 0 0 0 1</transform></camera>
+  <group label="g"><camera id="1" sensor_id="1" label="b.png"><transform>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1</transform></camera></group>
+  <camera id="2" sensor_id="0" label="c"/>
+  <camera id="3" sensor_id="0" label="d" enabled="0"><transform>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1</transform></camera>
+ </cameras>
+ <transform><rotation>0 -1 0 1 0 0 0 0 1</rotation><translation>1 2 3</translation><scale>2</scale></transform>
+</chunk></document>"#;
+
+fn folder_with_photos(photos: &[&str]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for photo in photos {
+        file::write_png_srgb8(&folder.path().join(photo), &Image::filled(40, 30, [90, 100, 110])).unwrap();
+    }
+    folder
+}
+
+#[test]
+fn exported_cameras_follow_the_manual() {
+    let folder = folder_with_photos(&["a.png", "b.png"]);
+    std::fs::write(folder.path().join("cameras.xml"), EXPORT).unwrap();
+    let scene = read_export(&export_of(folder.path()).unwrap()).unwrap();
+    assert_eq!(scene.views.len(), 2);
+    let view = &scene.views[0];
+    // The manual's formulas by hand at x = 0.3, y = 0.4, r² = 0.25.
+    let (x, y) = (0.3, 0.4);
+    let radial = 1.0 + 0.1 * 0.25;
+    let u = x * radial + 0.001 * (0.25 + 2.0 * x * x) + 2.0 * 0.002 * x * y;
+    let v = y * radial + 0.002 * (0.25 + 2.0 * y * y) + 2.0 * 0.001 * x * y;
+    let expected = DVec2::new(20.0 + 0.5 + u * 50.0 + u * 1.0 + v * 0.5, 15.0 - 0.25 + v * 50.0);
+    let pinhole = view.camera.pinhole();
+    let place =
+        view.lens.as_ref().unwrap().project(DVec3::new(x, y, 1.0)) * pinhole.focal_pixels + pinhole.centre_pixels;
+    assert!((place - expected).length() < 1e-9, "{place} {expected}");
+    let position = view.camera.rotation.transpose() * -view.camera.translation;
+    assert!((position - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-12);
+    assert!(scene.views[1].lens.as_ref().unwrap().model.is_on_angles());
+    let codes: Vec<_> = scene.findings.iter().map(|finding| finding.code).collect();
+    assert!(codes.contains(&"camera-not-aligned") && codes.contains(&"camera-disabled"), "{codes:?}");
+    let frame = &scene.mesh_frames[0].source_from_mesh;
+    // 2 R (5, 6, 7) + (1, 2, 3) is taken back.
+    assert!((frame.transform_point3(DVec3::new(-11.0, 12.0, 17.0)) - DVec3::new(5.0, 6.0, 7.0)).length() < 1e-12);
+}
+
+#[test]
+fn the_chunk_whose_photos_are_here_is_read_unless_another_is_asked_for() {
+    let folder = folder_with_photos(&["a.png", "b.png"]);
+    let root = folder.path().join("p.files");
+    let chunk = |label: &str, label_photo: &str| {
+        format!(
+            r#"<chunk label="{label}"><sensors><sensor id="0" type="frame"><resolution width="40" height="30"/>
+            <calibration type="frame" class="adjusted"><fx>50</fx><fy>50</fy><cx>20</cx><cy>15</cy></calibration></sensor></sensors>
+            <cameras><camera id="7" label="{label_photo}" sensor_id="0"><transform>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1</transform></camera></cameras>
+            <frames><frame id="0" path="0/frame.zip"/></frames></chunk>"#
+        )
+    };
+    let frame = |path: &str| {
+        format!(r#"<frame><cameras><camera camera_id="7"><photo path="{path}"/></camera></cameras></frame>"#)
+    };
+    let write = |path: &str, text: &str| {
+        let path = root.join(path);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, packed(&[("doc.xml", text.as_bytes())])).unwrap();
+    };
+    write(
+        "project.zip",
+        r#"<document version="1.2.0"><chunks><chunk id="0" path="0/chunk.zip"/><chunk id="3" path="3/chunk.zip"/></chunks></document>"#,
+    );
+    write("0/chunk.zip", &chunk("Elsewhere", "x.png"));
+    write("0/0/frame.zip", &frame("../../far/x.png"));
+    write("3/chunk.zip", &chunk("Here", "renamed"));
+    write("3/0/frame.zip", &frame("../../far/b.png"));
+    let project = folder.path().join("p.psx");
+    std::fs::write(&project, r#"<document version="1.2.0" path="{projectname}.files/project.zip"/>"#).unwrap();
+    let scene = read_project(&project, None).unwrap();
+    assert_eq!((scene.views.len(), scene.views[0].name.as_str()), (1, "b"));
+    assert!(scene.findings[0].message.contains("Here"), "{}", scene.findings[0]);
+    assert_eq!(read_project(&project, Some("0")).unwrap_err().kind(), ErrorKind::Missing, "its photo is not here");
+    let error = read_project(&project, Some("no")).unwrap_err();
+    assert!(error.remedy_text().contains("--chunk") && error.remedy_text().contains("Elsewhere (0)"), "{error}");
+    write("project.zip", r#"<document><chunks><chunk id="0" path="../../outside.zip"/></chunks></document>"#);
+    assert_eq!(read_project(&project, None).unwrap_err().kind(), ErrorKind::Malformed);
+}

@@ -1,0 +1,122 @@
+//! Arrays of numpy: `.npy` (format 1 to 3, little-endian floats and integers, C order) and archives of them, `.npz`.
+
+use super::zip::Archive;
+use crate::error::{Error, ErrorKind, Place, Result};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// An array of numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Array {
+    /// Length of each dimension.
+    pub shape: Vec<usize>,
+    /// The values, the last dimension running fastest.
+    pub values: Vec<f64>,
+}
+
+/// The largest file that is read, in bytes.
+const LARGEST: u64 = 1 << 28;
+
+/// Reads an array from a file.
+pub fn read(path: &Path) -> Result<Array> {
+    let size = std::fs::metadata(path).map_err(|source| Error::reading(path, source))?.len();
+    if size > LARGEST {
+        return Err(Error::new(ErrorKind::TooLarge, format!("an array of {size} bytes"))
+            .at(Place::File(path.into()))
+            .remedy("this is not the file it should be: check the path"));
+    }
+    parse(&std::fs::read(path).map_err(|source| Error::reading(path, source))?, path)
+}
+
+/// Reads the arrays of an archive, by their names without `.npy`.
+pub fn read_archive(path: &Path) -> Result<BTreeMap<String, Array>> {
+    let archive = Archive::open(path)?;
+    let names: Vec<String> = archive.names().filter(|name| name.ends_with(".npy")).map(str::to_owned).collect();
+    names
+        .into_iter()
+        .map(|name| Ok((name.trim_end_matches(".npy").to_owned(), parse(&archive.read(&name)?, &path.join(&name))?)))
+        .collect()
+}
+
+fn parse(bytes: &[u8], path: &Path) -> Result<Array> {
+    let malformed = |what: &str| {
+        Error::new(ErrorKind::Malformed, format!("the array {what}"))
+            .at(Place::File(path.into()))
+            .remedy("save it again with numpy.save as float64")
+    };
+    if !bytes.starts_with(b"\x93NUMPY") || bytes.len() < 12 {
+        return Err(malformed("is not one of numpy"));
+    }
+    let (start, length): (usize, usize) = match bytes[6] {
+        1 => (10, usize::from(u16::from_le_bytes([bytes[8], bytes[9]]))),
+        _ => (12, u32::from_le_bytes([bytes[8], bytes[9], bytes[10], bytes[11]]) as usize),
+    };
+    let header =
+        start.checked_add(length).and_then(|end| bytes.get(start..end)).ok_or_else(|| malformed("is cut short"))?;
+    let header = String::from_utf8_lossy(header);
+    let after = |key: &str| header.split_once(&format!("'{key}':")).map(|(_, rest)| rest.trim_start());
+    let kind = after("descr").and_then(|rest| rest.strip_prefix('\'')?.split('\'').next()).unwrap_or_default();
+    let is_c_order = after("fortran_order").is_some_and(|rest| rest.starts_with("False"));
+    let shape = after("shape").and_then(|rest| rest.strip_prefix('(')?.split(')').next()).unwrap_or_default();
+    let shape: Option<Vec<usize>> =
+        shape.split(',').map(str::trim).filter(|word| !word.is_empty()).map(|word| word.parse().ok()).collect();
+    let shape = shape.ok_or_else(|| malformed("has no shape"))?;
+    let count = shape.iter().try_fold(1usize, |product, length| product.checked_mul(*length));
+    let data = &bytes[start + length..];
+    let size = match kind {
+        "<f8" | "<i8" => 8,
+        "<f4" | "<i4" => 4,
+        _ => return Err(malformed(&format!("holds '{kind}', not little-endian floats or integers"))),
+    };
+    let count = count.filter(|count| count.checked_mul(size) == Some(data.len()));
+    let is_ordered = is_c_order || shape.len() < 2;
+    if count.is_none() || !is_ordered {
+        return Err(malformed(if is_ordered { "is not as long as its shape says" } else { "is in Fortran order" }));
+    }
+    let value = |chunk: &[u8]| {
+        let mut eight = [0; 8];
+        eight[..size].copy_from_slice(chunk);
+        let four = [eight[0], eight[1], eight[2], eight[3]];
+        match kind {
+            "<f8" => f64::from_le_bytes(eight),
+            "<i8" => i64::from_le_bytes(eight) as f64,
+            "<f4" => f64::from(f32::from_le_bytes(four)),
+            _ => f64::from(i32::from_le_bytes(four)),
+        }
+    };
+    Ok(Array { shape, values: data.chunks_exact(size).map(value).collect() })
+}
+
+/// An array of doubles as a file; for tests of the readers.
+#[cfg(test)]
+pub fn written(shape: &[usize], values: &[f64]) -> Vec<u8> {
+    let shape: Vec<String> = shape.iter().map(|length| format!("{length},")).collect();
+    let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}), }}\n", shape.join(" "));
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.as_bytes());
+    values.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arrays_come_back_and_damage_is_an_error() {
+        let bytes = written(&[2, 3], &[1.0, 2.0, 3.0, 4.0, 5.0, 6.5]);
+        let array = parse(&bytes, Path::new("a.npy")).unwrap();
+        assert_eq!((array.shape.as_slice(), array.values[5]), (&[2usize, 3][..], 6.5));
+        for length in 0..bytes.len() {
+            assert!(parse(&bytes[..length], Path::new("a.npy")).is_err(), "cut to {length}");
+        }
+        let text = String::from_utf8_lossy(&bytes[10..60]).into_owned();
+        assert!(text.contains("fortran_order"));
+        let fortran: Vec<u8> = bytes.clone();
+        let at = fortran.windows(5).position(|window| window == b"False").unwrap();
+        let mut fortran = fortran;
+        fortran[at..at + 5].copy_from_slice(b"True ");
+        assert_eq!(parse(&fortran, Path::new("a.npy")).unwrap_err().kind(), ErrorKind::Malformed);
+    }
+}

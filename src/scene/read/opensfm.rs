@@ -1,0 +1,149 @@
+//! OpenSfM: `reconstruction.json` (documentation, `geometry.rst`).
+//!
+//! World to camera, OpenCV axes, rotation as axis times angle. Coordinates are in units of the longer side from the middle of the
+//! photo, so that in pixels whose first centre is at (0.5, 0.5) the middle is half of the size.
+
+use super::camera_file::read_text;
+use super::colmap_lens::matrix;
+use super::mesh_choice;
+use super::photo_index::{PhotoIndex, Posed, views_of};
+use super::source::{SourceCamera, SourceScene};
+use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::scene::lens::{Base, Lens, Model, Polynomial};
+use glam::{DMat3, DQuat, DVec3};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Name of the file.
+pub const FILE_NAME: &str = "reconstruction.json";
+
+#[derive(serde::Deserialize)]
+struct Reconstruction {
+    cameras: BTreeMap<String, Camera>,
+    shots: BTreeMap<String, Shot>,
+}
+
+#[derive(serde::Deserialize)]
+struct Camera {
+    projection_type: String,
+    width: usize,
+    height: usize,
+    focal: Option<f64>,
+    focal_x: Option<f64>,
+    focal_y: Option<f64>,
+    #[serde(default)]
+    c_x: f64,
+    #[serde(default)]
+    c_y: f64,
+    #[serde(default)]
+    k1: f64,
+    #[serde(default)]
+    k2: f64,
+    #[serde(default)]
+    k3: f64,
+    #[serde(default)]
+    k4: f64,
+    #[serde(default)]
+    p1: f64,
+    #[serde(default)]
+    p2: f64,
+}
+
+#[derive(serde::Deserialize)]
+struct Shot {
+    rotation: [f64; 3],
+    translation: [f64; 3],
+    camera: String,
+}
+
+impl Camera {
+    fn lens(&self, place: &Place) -> Result<(DMat3, Lens)> {
+        let base = match self.projection_type.as_str() {
+            "perspective" | "simple_radial" | "radial" | "brown" => Base::Plane,
+            "fisheye" | "fisheye_opencv" => Base::Angle,
+            other => {
+                return Err(Error::new(ErrorKind::Unsupported, format!("the projection {other} is not read"))
+                    .at(place.clone())
+                    .remedy("undistort the photos first (opensfm undistort)"));
+            }
+        };
+        let side = self.width.max(self.height) as f64;
+        let focal_x = self.focal_x.or(self.focal).ok_or_else(|| {
+            Error::new(ErrorKind::Malformed, "the camera has no focal length")
+                .at(place.clone())
+                .remedy("export the reconstruction again")
+        })?;
+        let focal_y = self.focal_y.unwrap_or(focal_x);
+        let centre = [0.5 * self.width as f64 + side * self.c_x, 0.5 * self.height as f64 + side * self.c_y];
+        let numerator = [self.k1, self.k2, self.k3, self.k4, 0.0, 0.0];
+        let polynomial = Polynomial { base, numerator, tangential: [self.p1, self.p2], ..Default::default() };
+        Ok((matrix([side * focal_x, side * focal_y], centre), Lens::new(Model::Polynomial(polynomial))))
+    }
+}
+
+/// Lists an OpenSfM scene and reads its cameras.
+pub fn read(folder: &Path) -> Result<SourceScene> {
+    let path = folder.join(FILE_NAME);
+    let reconstructions: Vec<Reconstruction> = serde_json::from_str(&read_text(&path)?).map_err(|error| {
+        Error::new(ErrorKind::Malformed, format!("not a list of reconstructions: {error}"))
+            .at(Place::Line(path.clone(), error.line().max(1)))
+            .remedy("export the reconstruction again")
+    })?;
+    let mut findings = Vec::new();
+    let count = reconstructions.len();
+    let largest = reconstructions.into_iter().max_by_key(|own| own.shots.len()).ok_or_else(|| {
+        Error::new(ErrorKind::InvalidScene, "the file holds no reconstruction")
+            .at(Place::File(path.clone()))
+            .remedy("run the reconstruction again")
+    })?;
+    if count > 1 {
+        let message =
+            format!("of {count} reconstructions the one with the most photos is read: {}", largest.shots.len());
+        findings.push(Finding::new(Severity::Warning, "reconstruction-chosen", message).at(Place::File(path.clone())));
+    }
+    let mut posed = Vec::new();
+    for (name, shot) in largest.shots {
+        let place = Place::View(format!("{name} of {}", path.display()));
+        let camera = largest.cameras.get(&shot.camera).ok_or_else(|| {
+            Error::new(ErrorKind::Malformed, format!("its camera '{}' is not there", shot.camera))
+                .at(place.clone())
+                .remedy("export the reconstruction again")
+        })?;
+        let (intrinsics, lens) = camera.lens(&place)?;
+        let rotation = DMat3::from_quat(DQuat::from_scaled_axis(DVec3::from_array(shot.rotation)));
+        let translation = DVec3::from_array(shot.translation);
+        let size = Some((camera.width, camera.height));
+        let (camera, mut noticed) = SourceCamera::new(intrinsics, rotation, translation, &place)?;
+        findings.append(&mut noticed);
+        posed.push(Posed { listed: name, camera, lens, size, mask: None, place });
+    }
+    let photos = PhotoIndex::of_folders(&[folder.join("images"), folder.into()].map(|path: PathBuf| path))?;
+    let views = views_of(posed, &photos, &[folder.join("masks"), folder.join("mask")], &mut findings)?;
+    let mesh = mesh_choice::find(&[folder.into(), folder.join("undistorted/depthmaps")], &mut findings);
+    Ok(SourceScene { findings, ..SourceScene::of_photographs(folder, mesh, views) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::{Image, file};
+
+    #[test]
+    fn normalised_coordinates_become_pixels() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("images")).unwrap();
+        file::write_png_srgb8(&folder.path().join("images/a.png"), &Image::filled(40, 30, [9; 3])).unwrap();
+        let json = r#"[{"cameras":{"c":{"projection_type":"brown","width":40,"height":30,"focal_x":0.9,"focal_y":0.91,
+            "c_x":0.01,"c_y":-0.02,"k1":0.1,"k2":0.02,"k3":0,"p1":0.001,"p2":0.002}},
+            "shots":{"a.png":{"rotation":[0,0,1.5707963267948966],"translation":[1,2,3],"camera":"c"}}},{"cameras":{},"shots":{}}]"#;
+        std::fs::write(folder.path().join(FILE_NAME), json).unwrap();
+        let scene = read(folder.path()).unwrap();
+        let pinhole = scene.views[0].camera.pinhole();
+        assert!((pinhole.focal_pixels - glam::DVec2::new(36.0, 36.4)).length() < 1e-9);
+        assert!((pinhole.centre_pixels - glam::DVec2::new(20.4, 14.2)).length() < 1e-9);
+        assert!((scene.views[0].camera.rotation * DVec3::X - DVec3::Y).length() < 1e-9);
+        assert_eq!(scene.findings[0].code, "reconstruction-chosen");
+        std::fs::write(folder.path().join(FILE_NAME), json.replace("brown", "spherical")).unwrap();
+        assert_eq!(read(folder.path()).unwrap_err().kind(), ErrorKind::Unsupported);
+    }
+}

@@ -1,0 +1,255 @@
+//! The photos that lie under a scene's folder, found by the names that cameras know them by.
+//!
+//! Projects are moved: paths in them lead to other machines. A photo is the file whose path agrees best from its end:
+//! first the whole listed path, then as many folders as possible, then the name without its extension.
+
+use super::source::{SourceCamera, SourceView};
+use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::scene::lens::Lens;
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+
+/// Extensions of photos.
+const EXTENSIONS: [&str; 8] = ["jpg", "jpeg", "png", "tif", "tiff", "exr", "hdr", "pfm"];
+/// Folders that hold pictures of other kinds, by the beginnings of their names.
+const NOT_PHOTOS: [&str; 9] =
+    ["__macosx", "mask", "depth", "normal", "stereo", "texture", "thumb", "rendered_depth", "segmentation"];
+/// How deep folders are searched, and how many files are looked at.
+const DEEPEST: usize = 6;
+const MOST_FILES: usize = 200_000;
+
+/// The photos under one or more folders.
+pub struct PhotoIndex {
+    roots: Vec<PathBuf>,
+    by_name: HashMap<String, Vec<PathBuf>>,
+    by_stem: HashMap<String, Vec<PathBuf>>,
+}
+
+/// A camera as a project lists it.
+pub struct Posed {
+    /// The photo's path or name as written.
+    pub listed: String,
+    /// Its camera.
+    pub camera: SourceCamera,
+    /// Its lens; the intrinsics of the camera put pixel centres at (0.5, 0.5).
+    pub lens: Lens,
+    /// Size the camera is calibrated for.
+    pub size: Option<(usize, usize)>,
+    /// The mask the project names.
+    pub mask: Option<PathBuf>,
+    /// Where it is written.
+    pub place: Place,
+}
+
+fn lower(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().to_lowercase()
+}
+
+fn lower_stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase()
+}
+
+impl PhotoIndex {
+    /// Looks under folders; what lies under the first of them is preferred.
+    ///
+    /// # Errors
+    /// A folder that cannot be read.
+    pub fn of_folders(roots: &[PathBuf]) -> Result<Self> {
+        let mut index = PhotoIndex { roots: roots.to_vec(), by_name: HashMap::new(), by_stem: HashMap::new() };
+        let mut files = Vec::new();
+        for root in roots.iter().filter(|root| root.is_dir()) {
+            collect(root, 0, &mut files)?;
+        }
+        for path in files {
+            index.by_name.entry(lower(&path)).or_default().push(path.clone());
+            index.by_stem.entry(lower_stem(&path)).or_default().push(path);
+        }
+        Ok(index)
+    }
+
+    /// The photo of a listed path; `None` when none or several fit equally well.
+    pub fn find(&self, listed: &str) -> Option<PathBuf> {
+        let listed = listed.replace('\\', "/");
+        let relative = Path::new(listed.trim_start_matches("./"));
+        if relative.is_relative() {
+            let exact = self.roots.iter().map(|root| root.join(relative)).find(|path| path.is_file());
+            if exact.is_some() {
+                return exact;
+            }
+        }
+        let best = |candidates: Option<&Vec<PathBuf>>| {
+            let agreement = |path: &Path| {
+                let own = path.components().rev().map(|part| part.as_os_str().to_string_lossy().to_lowercase());
+                let theirs = relative.components().rev().map(|part| part.as_os_str().to_string_lossy().to_lowercase());
+                own.zip(theirs).skip(1).take_while(|(a, b)| a == b).count()
+            };
+            let candidates = candidates?;
+            let most = candidates.iter().map(|path| agreement(path)).max()?;
+            let mut fitting = candidates.iter().filter(|path| agreement(path) == most);
+            let first = fitting.next()?;
+            // Of two that fit alike, the one under an earlier root is meant: images before images_2.
+            let root_of = |path: &Path| self.roots.iter().position(|root| path.starts_with(root));
+            fitting.all(|other| root_of(other) > root_of(first)).then(|| first.clone())
+        };
+        best(self.by_name.get(&lower(relative)))
+            .or_else(|| best(self.by_stem.get(&lower_stem(relative))))
+            .or_else(|| best(self.by_stem.get(&lower(relative))))
+    }
+
+    /// How many of some listed paths have a photo here.
+    pub fn count<'a>(&self, listed: impl Iterator<Item = &'a str>) -> usize {
+        listed.filter(|listed| self.find(listed).is_some()).count()
+    }
+}
+
+fn collect(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<()> {
+    let entries = std::fs::read_dir(folder).map_err(|source| Error::reading(folder, source))?;
+    let mut paths: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    paths.sort();
+    for path in paths {
+        let name = lower(&path);
+        if name.starts_with('.') || files.len() >= MOST_FILES {
+            continue;
+        }
+        if path.is_dir() {
+            if depth < DEEPEST && !NOT_PHOTOS.iter().any(|start| name.starts_with(start)) {
+                collect(&path, depth + 1, files)?;
+            }
+        } else if path
+            .extension()
+            .is_some_and(|extension| EXTENSIONS.contains(&extension.to_string_lossy().to_ascii_lowercase().as_str()))
+            && !files.contains(&path)
+        {
+            files.push(path);
+        }
+    }
+    Ok(())
+}
+
+/// The views of listed cameras whose photos are here; the others are told in one finding.
+///
+/// # Errors
+/// `Missing` when no photo is here.
+pub fn views_of(
+    posed: Vec<Posed>,
+    photos: &PhotoIndex,
+    masks: &[PathBuf],
+    findings: &mut Vec<Finding>,
+) -> Result<Vec<SourceView>> {
+    let masks = mask_files(masks);
+    let listed = posed.len();
+    let (mut views, mut missing) = (Vec::new(), Vec::new());
+    for own in posed {
+        let Some(photo) = photos.find(&own.listed) else {
+            missing.push(own.listed);
+            continue;
+        };
+        let mask = own.mask.or_else(|| {
+            masks.get(&lower(&photo)).or_else(|| masks.get(&lower_stem(&photo))).filter(|mask| **mask != photo).cloned()
+        });
+        views.push(SourceView {
+            name: String::new(),
+            photo,
+            mask,
+            camera: own.camera,
+            lens: (!own.lens.is_pinhole()).then_some(own.lens),
+            size: own.size,
+            place: own.place,
+        });
+    }
+    let folder = photos.roots.first().cloned().unwrap_or_default();
+    if views.is_empty() {
+        let example = missing.first().map(|name| format!(", such as {name}")).unwrap_or_default();
+        return Err(Error::new(
+            ErrorKind::Missing,
+            format!("none of the {listed} photos the cameras name is here{example}"),
+        )
+        .at(Place::File(folder))
+        .remedy("copy the photos into a folder images/ of the scene"));
+    }
+    if !missing.is_empty() {
+        findings.push(
+            Finding::new(
+                Severity::Warning,
+                "camera-without-photo",
+                format!(
+                    "{} of {listed} cameras have no photo here and are left out: {}",
+                    missing.len(),
+                    some_of(&missing)
+                ),
+            )
+            .at(Place::File(folder))
+            .remedy("copy their photos as well if they should take part"),
+        );
+    }
+    name_views(&mut views);
+    Ok(views)
+}
+
+/// The first names of a list, and how many more there are.
+pub fn some_of(names: &[String]) -> String {
+    const SHOWN: usize = 5;
+    let shown = names.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
+    if names.len() > SHOWN { format!("{shown} and {} more", names.len() - SHOWN) } else { shown }
+}
+
+/// Names views by the stems of their photos; where two are alike, with the folders in front that tell them apart.
+fn name_views(views: &mut [SourceView]) {
+    for depth in 0..DEEPEST {
+        let name = |path: &Path| {
+            let mut parts: Vec<String> =
+                path.iter().rev().skip(1).take(depth).map(|part| part.to_string_lossy().into_owned()).collect();
+            parts.reverse();
+            parts.push(path.file_stem().unwrap_or_default().to_string_lossy().into_owned());
+            parts.join("_")
+        };
+        views.iter_mut().for_each(|view| view.name = name(&view.photo));
+        let distinct: std::collections::HashSet<&str> = views.iter().map(|view| view.name.as_str()).collect();
+        if distinct.len() == views.len() {
+            return;
+        }
+    }
+}
+
+/// Masks by the name of what they belong to, without extension: `a.png`, `a.jpg.png` and `a_mask.png` are masks of `a.jpg`.
+fn mask_files(folders: &[PathBuf]) -> BTreeMap<String, PathBuf> {
+    let mut masks = BTreeMap::new();
+    for folder in folders.iter().filter(|folder| folder.is_dir()) {
+        let mut files = Vec::new();
+        if collect(folder, 0, &mut files).is_ok() {
+            for path in files {
+                let stem = lower_stem(&path);
+                let bare =
+                    stem.strip_suffix("_mask").or_else(|| stem.strip_suffix(".mask")).unwrap_or(&stem).to_owned();
+                masks.entry(bare).or_insert(path);
+            }
+        }
+    }
+    masks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn photos_are_found_by_the_end_of_their_path() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        for file in ["images/left/0001.JPG", "images/right/0001.JPG", "images/b.png", "images_2/b.png", "masks/b.png"] {
+            let path = root.join(file);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, b"").unwrap();
+        }
+        let index = PhotoIndex::of_folders(&[root.join("images"), root.to_path_buf()]).unwrap();
+        let found = |listed: &str| index.find(listed).map(|path| path.strip_prefix(root).unwrap().to_path_buf());
+        assert_eq!(found("left/0001.JPG").unwrap(), Path::new("images/left/0001.JPG"));
+        assert_eq!(found("C:\\work\\right\\0001.jpg").unwrap(), Path::new("images/right/0001.JPG"));
+        assert_eq!(found("0001.JPG"), None, "two fit equally well");
+        assert_eq!(found("../elsewhere/b.png").unwrap(), Path::new("images/b.png"));
+        assert_eq!(found("./b").unwrap(), Path::new("images/b.png"));
+        assert_eq!(found("c.png"), None);
+        let masks = mask_files(&[root.join("masks")]);
+        assert_eq!(masks["b"], root.join("masks/b.png"));
+    }
+}

@@ -1,0 +1,59 @@
+//! Photos of another size than their cameras were calibrated for: intrinsics follow the size of each file.
+
+use super::source::SourceView;
+use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::image::file;
+
+/// The sides of a photo may be rounded by so many pixels when it is made smaller.
+const ROUNDING_PIXELS: f64 = 1.0;
+
+/// Scales the intrinsics of views to the true size of their photos, by each side's own ratio. The first pixel's centre is at
+/// (0.5, 0.5), so that the picture's corner stays. A photo on its side is left to its orientation.
+///
+/// # Errors
+/// A photo that cannot be read, or whose sides were not scaled alike.
+pub fn fit_to_photos(views: &mut [SourceView], findings: &mut Vec<Finding>) -> Result<()> {
+    let mut scaled = 0usize;
+    let (mut least, mut most) = (f64::INFINITY, 0.0f64);
+    for view in views.iter_mut() {
+        let Some(claimed) = view.size else { continue };
+        let size = file::read_size(&view.photo)?;
+        if size == claimed || size == (claimed.1, claimed.0) || claimed.0 == 0 || claimed.1 == 0 {
+            continue;
+        }
+        let ratio = [size.0 as f64 / claimed.0 as f64, size.1 as f64 / claimed.1 as f64];
+        let mean = (ratio[0] * ratio[1]).sqrt();
+        let off = [(size.0, claimed.0), (size.1, claimed.1)].map(|(own, side)| (own as f64 - side as f64 * mean).abs());
+        if off[0].max(off[1]) > ROUNDING_PIXELS {
+            return Err(Error::new(
+                ErrorKind::InvalidScene,
+                format!(
+                    "the photo is {} x {} but its camera is for {} x {}, another shape",
+                    size.0, size.1, claimed.0, claimed.1
+                ),
+            )
+            .at(Place::File(view.photo.clone()))
+            .remedy("use the photos the cameras were made for: a crop needs its own calibration"));
+        }
+        let intrinsics = &mut view.camera.intrinsics;
+        intrinsics.x_axis.x *= ratio[0];
+        intrinsics.z_axis.x *= ratio[0];
+        intrinsics.y_axis.y *= ratio[1];
+        intrinsics.z_axis.y *= ratio[1];
+        view.size = Some(size);
+        scaled += 1;
+        (least, most) = (least.min(mean), most.max(mean));
+    }
+    if scaled > 0 {
+        let by = if most - least < 1e-3 { format!("{most:.4}") } else { format!("{least:.4} to {most:.4}") };
+        findings.push(Finding::new(
+            Severity::Note,
+            "intrinsics-scaled",
+            format!(
+                "{scaled} of {} photos are {by} times the size they were calibrated at: their intrinsics follow",
+                views.len()
+            ),
+        ));
+    }
+    Ok(())
+}
