@@ -52,7 +52,7 @@ wait_for_title() { # pattern of grep -E, seconds
     sleep 0.5
   done
   echo "the title never held '$1': $(title)"
-  act 'Panel: messages'; picture why_not
+  act 'Messages panel'; picture why_not
   cat "$work/log"; exit 1
 }
 
@@ -107,7 +107,7 @@ act 'Panel: relight'; picture 18_relight
 act 'Strip of lights'; sleep 12; picture 18_strip
 act 'Panel: texel'
 xdotool mousemove 800 540 click 1; sleep 8; picture 19_texel
-act 'Panel: messages'; picture 20_messages
+act 'Messages panel'; picture 20_messages
 act 'Panel: scores'; picture 21_scores
 act 'Panel: curves'; picture 21_curves
 act 'False colour'; picture 22_false_colour 6

@@ -49,6 +49,7 @@ pub fn show(ui: &mut Ui, settings: &mut FitSettings, live: bool, memory: &mut Fo
         let wanted = memory.filter.trim().to_lowercase();
         let matches = |setting: &&SettingDescription| {
             !is_first(setting)
+                && is_of_method(&setting.name, settings.method)
                 && setting.value_kind != ValueKind::Names
                 && (wanted.is_empty()
                     || setting.name.contains(&wanted)
@@ -56,7 +57,7 @@ pub fn show(ui: &mut Ui, settings: &mut FitSettings, live: bool, memory: &mut Fo
         };
         let rest: Vec<&SettingDescription> = described.iter().filter(matches).collect();
         if rest.is_empty() {
-            ui.label(RichText::new("No setting is called so").weak());
+            ui.label(RichText::new("No matching setting").weak());
         }
         grid(ui, "all settings", rest.into_iter(), settings, live, memory);
     }
@@ -83,7 +84,7 @@ fn grid<'a>(
                 memory.sought = None;
             }
             let enabled = !live || setting.changes_mid_run;
-            let why = "This cannot change while a fit runs";
+            let why = "Cannot be changed during a fit";
             ui.add_enabled_ui(enabled, |ui| field(ui, setting, settings, label.id, memory))
                 .response
                 .on_disabled_hover_text(why);
@@ -92,8 +93,41 @@ fn grid<'a>(
     });
 }
 
+/// Settings that only Adam's two steps read.
+const OF_ADAM: [&str; 11] = [
+    "steps",
+    "steps-diffuse",
+    "steps-all",
+    "views-per-step",
+    "pixels-per-step",
+    "consistency",
+    "levels",
+    "start",
+    "fixed-light",
+    "lobe-ramp",
+    "rate-light",
+];
+
+/// Whether a method reads a setting; one that a refinement by Adam reads is the solver's too.
+fn is_of_method(name: &str, method: Method) -> bool {
+    match method {
+        Method::Solver => !OF_ADAM.contains(&name),
+        Method::Paper => !name.starts_with("solver-"),
+    }
+}
+
 /// A setting's name in words: `map-size` becomes `Map size`.
 pub fn words(name: &str) -> String {
+    let named = [
+        ("solver-rounds", "Light iterations"),
+        ("solver-polish", "Refinement steps (Adam)"),
+        ("bounces", "Max bounces"),
+        ("exposure", "Per-photo exposure compensation"),
+        ("background", "Background pixels"),
+    ];
+    if let Some((_, words)) = named.iter().find(|(own, _)| *own == name) {
+        return (*words).into();
+    }
     crate::studio::model::log::capitalised(&name.replace('-', " "))
 }
 
@@ -103,7 +137,7 @@ fn help(setting: &SettingDescription, default: &FitSettings) -> String {
         text += &format!("\n{value}: {meaning}");
     }
     if let Ok(usual) = default.get_text(&setting.name) {
-        text += &format!("\nUsually {}", if usual.is_empty() { "none" } else { &usual });
+        text += &format!("\nDefault: {}", if usual.is_empty() { "none" } else { &usual });
     }
     text
 }
