@@ -66,7 +66,7 @@ fn everything(studio: &mut TestStudio) -> String {
     let model = studio.model();
     let open = model.project.as_ref().map(|project| (project.title.clone(), project.chosen_view, project.is_run));
     let fit = (&model.fit.status, model.fit.last_checkpoint, model.fit.losses.len());
-    let tasks: Vec<String> = model.tasks.progress().into_iter().map(|(title, ..)| title).collect();
+    let tasks: Vec<String> = model.tasks.progress().into_iter().map(|(kind, ..)| kind.words()).collect();
     format!(
         "{asked:?} {closes} {zoom} {visible:?} {open:?} {fit:?} {tasks:?} {:?} {:?} {:?} {:?} {:?} {:?}",
         model.workspace,
@@ -333,7 +333,9 @@ fn do_every_act(studio: &mut TestStudio) {
 
 /// Ends all that was begun, and waits for it.
 fn come_to_rest(studio: &mut TestStudio) {
-    studio.wait("the end of the start", |model| !model.start_is_queued && !model.is_preparing() && !model.tasks.is_running(&TaskKind::Starting));
+    studio.wait("the end of the start", |model| {
+        !model.start_is_queued && !model.is_preparing() && !model.tasks.is_running(&TaskKind::Starting)
+    });
     studio.model().tasks.stop_all();
     studio.model().fit.stop();
     studio.wait("the end", |model| !model.fit.status.is_live());

@@ -81,6 +81,7 @@ fn a_stopped_run_is_opened_again_and_goes_on_where_it_stopped() {
     studio.wait("the run", |model| model.project.is_some());
     assert!(studio.log().contains("Start resumes it from its checkpoint"), "{}", studio.log());
     assert_eq!(studio.steps_done(), stopped_at, "the curve is there before it goes on");
+    assert!(studio.says("Stopped") && !studio.says("Not started"), "one state, whatever tells it");
     studio.click("Resume from checkpoint");
     studio.wait_for_step(stopped_at + 2);
     assert!(studio.log().contains(&format!("resumed after step {stopped_at}")), "{}", studio.log());
@@ -124,15 +125,15 @@ fn a_setting_changes_while_the_fit_runs_and_what_cannot_change_is_grey() {
     for fixed in ["Map size", "Draft", "Standard", "High quality"] {
         assert!(studio.is_grey(fixed), "{fixed}");
     }
-    assert!(!studio.is_grey("Samples") && !studio.is_grey("Bounces"));
+    assert!(!studio.is_grey("Samples") && !studio.is_grey("Max bounces"));
     studio.type_number("Samples", "4");
     studio.wait_for_word("continues with the changed settings");
     assert!(studio.settings_on_disk().contains("samples = 4"), "{}", studio.settings_on_disk());
     assert_eq!(studio.number("Samples"), 4.0);
 
     // Out of range: not taken, the field shows what is in force.
-    studio.type_number("Bounces", "99");
-    assert_eq!((studio.number("Bounces"), studio.model().edits.fit.bounces), (2.0, 2));
+    studio.type_number("Max bounces", "99");
+    assert_eq!((studio.number("Max bounces"), studio.model().edits.fit.bounces), (2.0, 2));
 
     // In range but less than what is done: the worker refuses, the field goes back.
     studio.wait_for_step(10);

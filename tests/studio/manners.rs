@@ -50,7 +50,7 @@ fn undo_within_a_text_belongs_to_the_text() {
 fn the_palette_is_opened_typed_in_and_obeyed_by_keys() {
     let mut studio = TestStudio::with_finished_run();
     studio.press(Modifiers::COMMAND, Key::K);
-    studio.type_text("next li");
+    studio.type_text("next env");
     studio.press(Modifiers::NONE, Key::Enter);
     assert_eq!(studio.model().dialog, Dialog::None);
     assert_ne!(studio.model().edits.relight.first, LightName::Fitted);
@@ -62,10 +62,10 @@ fn the_palette_is_opened_typed_in_and_obeyed_by_keys() {
     assert_eq!(studio.model().dialog, Dialog::None);
     // By arrows: the second of those found.
     studio.press(Modifiers::COMMAND, Key::K);
-    studio.type_text("turn light");
+    studio.type_text("rotate env");
     studio.press(Modifiers::NONE, Key::ArrowDown);
     studio.press(Modifiers::NONE, Key::Enter);
-    assert_eq!(studio.model().edits.relight.turn_degrees, 345.0, "Turn light right is the second");
+    assert_eq!(studio.model().edits.relight.turn_degrees, 345.0, "the other way is the second");
 }
 
 #[test]

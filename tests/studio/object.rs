@@ -73,7 +73,7 @@ fn a_photo_of_a_sphere_becomes_light_and_reflectance_on_the_screen_and_on_disk()
     let mut studio = with_photo();
     studio.control("Remove ball.exr");
     assert!(studio.says("No photo yet") && studio.says("No reflectance yet") && studio.says("No environment yet"));
-    studio.click("Estimate");
+    studio.click("Start estimation");
     studio.wait("the photo", |model| !model.object.photos.is_empty());
     studio.control("Photo of the object");
     studio.wait("a row", |model| model.object.rows.iter().any(|row| row.round > 0));

@@ -152,7 +152,7 @@ fn an_object_with_a_mesh_and_a_camera_is_estimated_and_opened_again() {
         studio.model().dropped(folder.join(name));
     }
     studio.frames(2);
-    studio.click("Estimate");
+    studio.click("Start estimation");
     studio.wait("the end", |model| !model.object.status.is_live());
     let log = studio.log();
     assert_eq!(studio.model().object.status, ObjectStatus::Finished, "{log}");

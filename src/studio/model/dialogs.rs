@@ -128,21 +128,19 @@ impl Model {
             let dialog = rfd::FileDialog::new();
             let path = match purpose {
                 PickFor::Open => dialog.set_title("Open a scene or run folder").pick_folder(),
-                PickFor::RunsFolder => dialog.set_title("Folder for new runs").pick_folder(),
+                PickFor::RunsFolder => dialog.set_title("Output folder for new runs").pick_folder(),
                 PickFor::Light => dialog
-                    .set_title("Add an HDR map")
-                    .add_filter("HDR maps", &["hdr", "exr", "pfm", "png", "jpg"])
+                    .set_title("Import an HDRI")
+                    .add_filter("HDRIs", &["hdr", "exr", "pfm", "png", "jpg"])
                     .pick_file(),
-                PickFor::Save => dialog.set_title("Save picture").add_filter("Pictures", &["png", "exr"]).save_file(),
+                PickFor::Save => dialog.set_title("Render image").add_filter("Images", &["png", "exr"]).save_file(),
                 PickFor::ObjectPhoto => {
                     dialog.set_title("Photo of the object").add_filter("Photos", PHOTOS).pick_file()
                 }
                 PickFor::ObjectMask => dialog.set_title("Mask of the photo").add_filter("Masks", PHOTOS).pick_file(),
                 PickFor::ObjectMesh => dialog.set_title("Mesh").add_filter("Meshes", &["obj", "ply"]).pick_file(),
                 PickFor::ObjectCamera => dialog.set_title("Camera").add_filter("Cameras", &["json", "txt"]).pick_file(),
-                PickFor::ObjectLight => {
-                    dialog.set_title("Known environment").add_filter("HDR maps", PHOTOS).pick_file()
-                }
+                PickFor::ObjectLight => dialog.set_title("Known environment").add_filter("HDRIs", PHOTOS).pick_file(),
                 PickFor::Material => {
                     dialog.set_title("Measured material").add_filter("MERL tables", &["binary"]).pick_file()
                 }

@@ -22,8 +22,8 @@ pub enum Done {
     LightRead(Box<ShelfLight>, Vec<Finding>),
     /// A folder or file was chosen in the system's dialog; `None` when it was closed.
     Picked(PickFor, Option<PathBuf>),
-    /// Files were saved.
-    Saved(Vec<PathBuf>),
+    /// Files were saved, and the seconds that each of their paths took.
+    Saved(Vec<PathBuf>, f64),
     /// The error of the photos was spread over the surface, for these maps.
     Layers(Arc<crate::material::MaterialMaps>, Box<crate::insight::surface_layers::SurfaceLayers>),
     /// The stage's view under every light of the shelf.

@@ -291,7 +291,8 @@ impl Model {
             }
             Done::Picked(_, None) => {}
             Done::Picked(purpose, Some(path)) => self.picked(purpose, path),
-            Done::Saved(paths) => {
+            Done::Saved(paths, seconds_per_path) => {
+                self.preferences.seconds_per_path = Some(seconds_per_path).filter(|own| own.is_finite() && *own > 0.0);
                 let first = paths.first().map(|path| path.display().to_string()).unwrap_or_default();
                 self.log.note(match paths.len() {
                     0 | 1 => format!("Saved {first}"),

@@ -98,14 +98,14 @@ impl Model {
                 PathKind::Run => {
                     let folder = RunFolder::open(&path)?;
                     let run = open::view_run(&folder, None, &context.stop, &tell)?;
-                    context.tell("small pictures", 0.0);
+                    context.tell("thumbnails", 0.0);
                     Ok(Done::RunOpened(Box::new(RunRead::new(folder, run))))
                 }
                 PathKind::Scene => {
                     let opened = open::read_unchecked(&path, &settings.read, &context.stop, &tell)?;
                     let suited = Suited::to(&opened.scene, &opened.report);
                     settings.fit = suited.resolve(&settings.fit, &[]);
-                    context.tell("small pictures", 0.0);
+                    context.tell("thumbnails", 0.0);
                     let read = SceneRead::new(Some(path), settings, opened);
                     Ok(Done::SceneRead(Box::new(SceneRead { suited: Some(suited), ..read })))
                 }
@@ -220,10 +220,12 @@ impl Model {
         let Some(project) = &mut self.project else { return };
         let chosen = self.edits.fit.differences(&project.settings.fit);
         let chosen: Vec<String> = chosen.into_iter().map(|(name, ..)| name).collect();
-        let mut settings = project.settings.fit.clone();
-        checked.suited.apply(&mut settings, &[]);
+        let settings = checked.suited.resolve(&FitSettings::default(), &[]);
         project.settings.fit = settings.clone();
-        checked.suited.apply(&mut self.edits.fit, &chosen);
+        let suits = checked.suited.resolve(&FitSettings::default(), &chosen);
+        if let Ok(joined) = suits.with(&chosen, &self.edits.fit) {
+            self.edits.fit = joined;
+        }
         for line in checked.suited.told(&FitSettings::default(), &settings) {
             self.log.note(line);
         }

@@ -77,6 +77,8 @@ pub struct Preferences {
     pub follow: Follow,
     /// Seconds of finishing for a second of fitting on this machine, as learned from former runs.
     pub finishing_ratio: f64,
+    /// Seconds a path of a render took on this machine, as learned from former renders; `None` before the first.
+    pub seconds_per_path: Option<f64>,
     /// The run that was in progress when this was written; a later start finds it here after a crash.
     pub running: Option<PathBuf>,
 }
@@ -108,6 +110,7 @@ impl Default for Preferences {
             object_layout: String::new(),
             follow: Follow::Live,
             finishing_ratio: super::advance::FIRST_RATIO,
+            seconds_per_path: None,
             running: None,
         }
     }

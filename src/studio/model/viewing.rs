@@ -17,6 +17,7 @@ use crate::studio::layout::Panel;
 use crate::studio::stage::eye::{Eye, OrbitEye};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Width and height of a picture of the strip of lights in pixels.
 const STRIP_SIZE: (usize, usize) = (240, 160);
@@ -218,12 +219,12 @@ impl Model {
         let light = light.to_lowercase();
         let view = match (self.switches.looking_through, project.chosen_name()) {
             (true, Some(name)) => name.to_owned(),
-            _ => "stage".into(),
+            _ => "viewport".into(),
         };
         let path = match what {
-            SaveWhat::Picture => folder.join("pictures").join(format!("{view}_{light}.png")),
-            SaveWhat::Turntable => folder.join("pictures").join(format!("turntable_{light}")),
-            SaveWhat::Strip => folder.join("pictures").join(format!("{view}_lights")),
+            SaveWhat::Picture => folder.join("renders").join(format!("{view}_{light}.png")),
+            SaveWhat::Turntable => folder.join("renders").join(format!("turntable_{light}")),
+            SaveWhat::Strip => folder.join("renders").join(format!("{view}_lights")),
         };
         let (width, height) = match self.eye_in_force() {
             Eye::Photo(camera) => (camera.width, camera.height),
@@ -259,6 +260,7 @@ impl Model {
         self.tasks.spawn(TaskKind::Saving, move |context| {
             let tell = |share: f32| context.tell("rendering", share);
             let stop = &context.stop;
+            let began = Instant::now();
             let saved = match request.what {
                 SaveWhat::Picture => {
                     gallery::write_picture(&path, &surface, &own, &camera, &settings, &display, stop, &tell)?
@@ -278,7 +280,8 @@ impl Model {
                     gallery::write_strip(&path, &surface, &own, &camera, &lights, &settings, &display, stop, &tell)?
                 }
             };
-            Ok(Done::Saved(saved))
+            let paths = (request.width * request.height * request.samples * saved.len()) as f64;
+            Ok(Done::Saved(saved, began.elapsed().as_secs_f64() / paths.max(1.0)))
         });
     }
 

@@ -56,19 +56,21 @@ struct Series {
 }
 
 impl Series {
-    /// Points of every curve on the axis of errors.
-    fn points(&self) -> impl Iterator<Item = &[f64; 2]> {
-        [&self.all, &self.surface, &self.held_out].into_iter().flatten()
+    /// Points of the curves that are drawn on the axis of errors.
+    fn points(&self, details: bool) -> impl Iterator<Item = &[f64; 2]> {
+        let is_held_out = !self.held_out.is_empty();
+        let drawn = [(&self.all, details), (&self.surface, details || !is_held_out), (&self.held_out, true)];
+        drawn.into_iter().filter(|(_, is_drawn)| *is_drawn).flat_map(|(points, _)| points)
     }
 
-    /// The highest value of any curve.
-    fn top(&self) -> f64 {
-        self.points().map(|point| point[1]).fold(f64::NEG_INFINITY, f64::max).max(-300.0)
+    /// The highest value that is drawn.
+    fn top(&self, details: bool) -> f64 {
+        self.points(details).map(|point| point[1]).fold(f64::NEG_INFINITY, f64::max).max(-300.0)
     }
 
-    /// The lowest value of any curve.
-    fn bottom(&self) -> f64 {
-        self.points().map(|point| point[1]).fold(f64::INFINITY, f64::min).clamp(-300.0, self.top())
+    /// The lowest value that is drawn.
+    fn bottom(&self, details: bool) -> f64 {
+        self.points(details).map(|point| point[1]).fold(f64::INFINITY, f64::min).clamp(-300.0, self.top(details))
     }
 
     /// Where the first band begins.
@@ -78,7 +80,7 @@ impl Series {
 
     /// Where the last point lies.
     fn end(&self) -> f64 {
-        self.points().map(|point| point[0]).fold(self.begin(), f64::max)
+        self.points(true).map(|point| point[0]).fold(self.begin(), f64::max)
     }
 }
 
@@ -273,7 +275,7 @@ fn plot(ui: &mut Ui, memory: &CurvesMemory) {
         })
         .allow_scroll(false)
         .show(ui, |plot| {
-            let (top, bottom) = (memory.lines.top(), memory.lines.bottom());
+            let (top, bottom) = (memory.lines.top(memory.details), memory.lines.bottom(memory.details));
             let end = memory.lines.end();
             let many = memory.lines.borders.len() > MOST_NAMED_BANDS;
             for (index, (x, stage)) in memory.lines.borders.iter().enumerate() {
@@ -365,11 +367,12 @@ mod tests {
         assert_eq!(lines.all[0], [2.0, 0.2f64.log10()]);
         assert_eq!(lines.all.last(), Some(&[6.0, 0.5f64.log10()]), "the mean begins anew");
         assert_eq!(lines.surface.last(), Some(&[6.0, 0.0]), "errors of the surface are a curve of their own");
-        assert_eq!(lines.top(), 0.0);
+        assert_eq!(lines.top(true), 0.0);
+        assert_eq!(lines.top(false), 0.5f64.log10(), "what is not drawn needs no room");
         let below = series(&rows[1..2], true, true, None);
         assert_eq!(below.all.len(), 0, "a step below zero has no logarithm");
         assert_eq!(lines.held_out, [[6.0, 0.5f64.log10()]]);
         assert_eq!(series(&rows, false, false, Some("fine")).all, [[3.0, 0.5]]);
-        assert_eq!((lines.begin(), lines.end(), lines.top() > lines.bottom()), (2.0, 6.0, true));
+        assert_eq!((lines.begin(), lines.end(), lines.top(true) > lines.bottom(true)), (2.0, 6.0, true));
     }
 }

@@ -1,6 +1,7 @@
 //! Windows over the window: the palette of acts, help, a path, how to save.
 
 use super::act_line;
+use crate::insight::report::number;
 use crate::studio::act::{Act, ActInfo, Group, LIST};
 use crate::studio::model::{Dialog, Model, PickFor, SaveRequest, SaveWhat};
 use crate::studio::theme;
@@ -219,9 +220,14 @@ fn save(ui: &mut Ui, model: &mut Model, request: &mut SaveRequest) -> bool {
             ui.end_row();
         }
     });
-    let millions = (request.width * request.height * request.samples) as f64 * 1e-6;
-    let frames = if request.what == SaveWhat::Turntable { request.frames as f64 } else { 1.0 };
-    ui.label(RichText::new(format!("{:.0} million paths", millions * frames)).weak());
+    let images = if request.what == SaveWhat::Turntable { request.frames as f64 } else { 1.0 };
+    let paths = (request.width * request.height * request.samples) as f64 * images;
+    let seconds = model.preferences.seconds_per_path.map(|own| own * paths);
+    let told = seconds.map_or_else(
+        || format!("{:.0} million samples", paths * 1e-6),
+        |seconds| format!("About {} on this machine", number::duration(seconds)),
+    );
+    ui.label(RichText::new(told).weak());
     let mut done = false;
     ui.horizontal(|ui| {
         let colours = theme::palette(ui.visuals());

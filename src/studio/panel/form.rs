@@ -49,7 +49,7 @@ pub fn show(ui: &mut Ui, settings: &mut FitSettings, live: bool, memory: &mut Fo
         let wanted = memory.filter.trim().to_lowercase();
         let matches = |setting: &&SettingDescription| {
             !is_first(setting)
-                && is_of_method(&setting.name, settings.method)
+                && is_read(&setting.name, settings)
                 && setting.value_kind != ValueKind::Names
                 && (wanted.is_empty()
                     || setting.name.contains(&wanted)
@@ -93,26 +93,15 @@ fn grid<'a>(
     });
 }
 
-/// Settings that only Adam's two steps read.
-const OF_ADAM: [&str; 11] = [
-    "steps",
-    "steps-diffuse",
-    "steps-all",
-    "views-per-step",
-    "pixels-per-step",
-    "consistency",
-    "levels",
-    "start",
-    "fixed-light",
-    "lobe-ramp",
-    "rate-light",
-];
+/// Settings that only Adam's two steps read; the solver's refinement reads the other ones of Adam too.
+const OF_TWO_STEPS: [&str; 6] = ["steps", "steps-diffuse", "steps-all", "consistency", "levels", "lobe-ramp"];
 
-/// Whether a method reads a setting; one that a refinement by Adam reads is the solver's too.
-fn is_of_method(name: &str, method: Method) -> bool {
-    match method {
-        Method::Solver => !OF_ADAM.contains(&name),
-        Method::Paper => !name.starts_with("solver-"),
+/// Whether a fit with these settings reads the one of this name.
+fn is_read(name: &str, settings: &FitSettings) -> bool {
+    match settings.method {
+        Method::Adam => !name.starts_with("solver-"),
+        Method::Solver | Method::Automatic if settings.solver_polish > 0 => !OF_TWO_STEPS.contains(&name),
+        Method::Solver | Method::Automatic => !Method::means_adam(&[name.to_owned()]),
     }
 }
 

@@ -22,12 +22,13 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
                         line(ui, model, info, false);
                     }
                     if !panels.is_empty() {
-                        ui.menu_button("Panels", |ui| {
+                        let list = ui.menu_button("Panels", |ui| {
                             for info in panels {
                                 let is_on = Panel::of(info.act).is_some_and(|own| model.visible_panels.contains(&own));
                                 line(ui, model, info, is_on);
                             }
                         });
+                        list.response.accessible_name("Panels");
                     }
                 });
             }

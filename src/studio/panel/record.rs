@@ -170,9 +170,9 @@ fn body(ui: &mut Ui, model: &mut Model, record: &TexelRecord) {
         }
         line("View count", format!("{} photos", record.rows.len()), "Photos that see the texel");
         line("Texels per photo pixel", figure(record.footprint_texels, 2, "", UNSEEN), "Above 1, no photo resolves single texels here");
-        line("View spread", figure(record.view_spread_degrees, 0, " degrees", UNSEEN), "Small: specular and diffuse cannot be separated");
+        line("View spread", figure(record.view_spread_degrees, 0, "°", UNSEEN), "Small: specular and diffuse cannot be separated");
         let no_highlight = if record.rows.is_empty() { UNSEEN } else { "faces away from the environment" };
-        line("Closest half-angle to light", figure(record.highlight_degrees, 0, " degrees", no_highlight), "Angle between the normal and the nearest half vector of a view and the brightest direction: where it is small, roughness is constrained");
+        line("Closest half-angle to light", figure(record.highlight_degrees, 0, "°", no_highlight), "Angle between the normal and the nearest half vector of a view and the brightest direction: where it is small, roughness is constrained");
         line("Clipped", figure(100.0 * record.clipped_share, 0, " %", UNSEEN), "Share of these pixels that are clipped and no data");
     });
     heading(ui, "Observations");
@@ -268,7 +268,7 @@ mod tests {
 
     #[test]
     fn a_figure_that_is_none_says_why() {
-        assert_eq!(figure(12.345, 1, " degrees", UNSEEN), "12.3 degrees");
+        assert_eq!(figure(12.345, 1, "°", UNSEEN), "12.3 degrees");
         assert_eq!(figure(f32::NAN, 0, " %", UNSEEN), "no photo sees it");
     }
 }

@@ -35,8 +35,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ObjectLightMemory) {
     };
     if model.object.outcome.as_ref().is_some_and(|outcome| outcome.parts.estimate.light_seen.is_some()) {
         ui.horizontal(|ui| {
-            ui.selectable_value(&mut memory.shows_seen, false, "Radiance")
-                .on_hover_text("The light that was estimated");
+            ui.selectable_value(&mut memory.shows_seen, false, "Radiance").on_hover_text("The estimated environment");
             ui.selectable_value(&mut memory.shows_seen, true, "Sensitivity")
                 .on_hover_text("How much each direction matters to the photos; the rest follows the prior");
         });

@@ -64,7 +64,7 @@ fn run(ui: &mut Ui, model: &mut Model) {
         true => {
             act_button_named(ui, model, Act::ObjectStop, "Stop estimation");
         }
-        false => start(ui, model, "Estimate"),
+        false => start(ui, model, "Start estimation"),
     });
     match &model.object.status {
         ObjectStatus::Idle => {

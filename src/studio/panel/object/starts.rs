@@ -25,7 +25,7 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
                 let of = |what: &str, spread: Option<f64>| {
                     spread.map(|spread| format!("{spread:.2} in the logarithm of the {what}"))
                 };
-                let both = [of("light", spread.light), of("reflectance", spread.reflectance)];
+                let both = [of("environment", spread.light), of("reflectance", spread.reflectance)];
                 let both = both.into_iter().flatten().collect::<Vec<_>>().join(" and by ");
                 format!("{count} initializations explain the photo about equally well: they differ by {both}")
             }
@@ -48,7 +48,7 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
                 for start in &outcome.starts {
                     ui.label(&start.name);
                     ui.label(format!("{:.1}", start.nats_behind)).on_hover_text(
-                        "Difference of the logarithm of the evidence to the best: likelihood under any light",
+                        "Difference of the log-evidence to the best initialization, marginalized over the environment",
                     );
                     ui.label(format!("{:.4}", start.objective)).on_hover_text("At low resolution");
                     ui.label(match start.is_as_good {
