@@ -222,7 +222,8 @@ impl Model {
         let chosen: Vec<String> = chosen.into_iter().map(|(name, ..)| name).collect();
         let settings = checked.suited.resolve(&FitSettings::default(), &[]);
         project.settings.fit = settings.clone();
-        let suits = checked.suited.resolve(&FitSettings::default(), &chosen);
+        let asked = FitSettings { method: settings.method, ..FitSettings::default() };
+        let suits = checked.suited.resolve(&asked, &chosen);
         if let Ok(joined) = suits.with(&chosen, &self.edits.fit) {
             self.edits.fit = joined;
         }
