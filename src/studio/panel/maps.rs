@@ -81,9 +81,9 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut MapsMemory) {
             let button = egui::Button::selectable(memory.map == map, name);
             let response = ui.add_enabled(there, button).on_hover_text(help);
             let why = match map {
-                Map::TimesSeen => "Compute it first: View ▸ Compute residuals; a finished run includes it",
+                Map::TimesSeen => "Compute it first: View › Compute residuals; a finished run includes it",
                 Map::Told(_) => model.why_untold(),
-                _ => "Compute it first: View ▸ Compute residuals",
+                _ => "Compute it first: View › Compute residuals",
             };
             if response.on_disabled_hover_text(why).clicked() {
                 memory.map = map;

@@ -268,7 +268,7 @@ mod tests {
 
     #[test]
     fn a_figure_that_is_none_says_why() {
-        assert_eq!(figure(12.345, 1, "°", UNSEEN), "12.3 degrees");
+        assert_eq!(figure(12.345, 1, "°", UNSEEN), "12.3°");
         assert_eq!(figure(f32::NAN, 0, " %", UNSEEN), "no photo sees it");
     }
 }

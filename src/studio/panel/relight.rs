@@ -36,7 +36,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut RelightMemory) {
             act_button(ui, model, Act::SaveTurntable);
         });
         strip(ui, model, memory);
-        ui.label(RichText::new("←/→ switch environment · Shift-drag rotates it").weak());
+        ui.label(RichText::new("Arrow keys switch the environment · Shift-drag rotates it").weak());
     });
 }
 
@@ -46,7 +46,7 @@ fn controls(ui: &mut Ui, model: &mut Model) {
         let label = ui.label("Rotation");
         ui.add(Slider::new(&mut relight.turn_degrees, 0.0..=360.0).suffix("°").fixed_decimals(0))
             .labelled_by(label.id)
-            .on_hover_text("Rotate the environment about the up axis\nKeys: Shift+← and Shift+→");
+            .on_hover_text("Rotate the environment about the up axis\nKeys: Shift and the arrow keys");
         ui.end_row();
         let label = ui.label("Intensity (EV)");
         ui.add(Slider::new(&mut relight.strength_stops, -6.0..=6.0).suffix(" EV").fixed_decimals(1))

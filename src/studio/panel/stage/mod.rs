@@ -268,7 +268,7 @@ fn decorate(ui: &mut Ui, model: &Model, frame: &StageFrame, rect: Rect, traced: 
         _ if is_untold => model.why_untold(),
         _ if is_measured && frame.content.quantity.is_none() => match model.tasks.is_running(&TaskKind::Residuals) {
             true => "Computing residuals…",
-            false => "Not computed: View ▸ Compute residuals",
+            false => "Not computed: View › Compute residuals",
         },
         (_, true) if lit => "No materials yet. Press Start.",
         (true, _) if matches!(model.fit.status, FitStatus::Running | FitStatus::Pausing) => {
