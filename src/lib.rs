@@ -95,6 +95,7 @@ mod error;
 mod export;
 mod files;
 mod fit;
+mod guide;
 mod image;
 mod insight;
 mod job;

@@ -52,7 +52,7 @@ wait_for_title() { # pattern of grep -E, seconds
     sleep 0.5
   done
   echo "the title never held '$1': $(title)"
-  act 'Panel: messages'; picture why_not
+  act 'Messages panel'; picture why_not
   cat "$work/log"; exit 1
 }
 
@@ -77,50 +77,50 @@ sleep "$fit_seconds"
 picture 03_fitting
 act 'Diffuse'; picture 04_stage_diffuse
 act 'Roughness'; picture 05_stage_roughness
-act 'Lit'
-act 'Panel: light'; picture 06_light
-act 'Panel: photos'; picture 07_photos
-act 'Pause or go on'
+act 'Shaded'
+act 'Environment panel'; picture 06_light
+act 'Photos panel'; picture 07_photos
+act 'Pause'
 # A quick machine may have finished the demo by now.
 wait_for_title 'paused|Finished' 300
 picture 08_paused_and_traced 12
-act 'Next light'; picture 09_second_light 10
-act 'Next light'; picture 10_third_light 10
-act 'Next light'; picture 11_fourth_light 10
-act 'Previous light'; sleep 1
-act 'Two lights side by side'; picture 12_two_lights 20
-act 'Two lights side by side'
-act 'Fitted light'
+act 'Next environment'; picture 09_second_light 10
+act 'Next environment'; picture 10_third_light 10
+act 'Next environment'; picture 11_fourth_light 10
+act 'Previous environment'; sleep 1
+act 'Compare environments'; picture 12_two_lights 20
+act 'Compare environments'
+act 'Estimated environment'
 act "Look through the photo's camera"; picture 13_through_a_photo 10
-act 'Wipe photo against stage'; picture 14_photo_wiped 2
-act 'Wipe photo against stage'
-act 'Frame the scene'
-act 'Photos on the cameras'; picture 15_cameras 8
-act 'Panel: photo'; picture 16_photo 2
-act 'Panel: stage'
-act 'Measure photo error'
+act 'Photo / render wipe'; picture 14_photo_wiped 2
+act 'Photo / render wipe'
+act 'Frame all'
+act 'Show camera thumbnails'; picture 15_cameras 8
+act 'Photo panel'; picture 16_photo 2
+act 'Viewport panel'
+act 'Compute residuals'
 sleep 2
-act 'Panel: maps'
-act 'Chart borders'; picture 17_maps
-act 'Chart borders'
-act 'Panel: relight'; picture 18_relight
-act 'Strip of lights'; sleep 12; picture 18_strip
-act 'Panel: texel'
+act 'Maps panel'
+act 'Show UV islands'; picture 17_maps
+act 'Show UV islands'
+act 'Relight panel'; picture 18_relight
+act 'Lighting contact sheet'; sleep 12; picture 18_strip
+act 'Texel panel'
 xdotool mousemove 800 540 click 1; sleep 8; picture 19_texel
-act 'Panel: messages'; picture 20_messages
-act 'Panel: scores'; picture 21_scores
-act 'Panel: curves'; picture 21_curves
+act 'Messages panel'; picture 20_messages
+act 'Scores panel'; picture 21_scores
+act 'Curves panel'; picture 21_curves
 act 'False colour'; picture 22_false_colour 6
 act 'Reset display'
 keys ctrl+k; sleep 1; xdotool type --delay 60 'light'; picture 23_palette 2; keys Escape; sleep 1
 keys F1; picture 24_help 3; keys Escape; sleep 1
-act 'Save picture'; picture 25_save 3; keys Escape; sleep 1
-act 'Error of the photos'
+act 'Render image'; picture 25_save 3; keys Escape; sleep 1
+act 'Show residuals'
 picture 26_photo_error 30
-act 'Lit'
-for theme in 27 28 29; do act 'Next theme'; picture "${theme}_theme" 3; done
+act 'Shaded'
+for theme in 27 28 29; do act 'Cycle theme'; picture "${theme}_theme" 3; done
 if title | grep -q paused; then
-  act 'Pause or go on'; sleep 3
+  act 'Pause'; sleep 3
   act 'Stop fit'
 fi
 wait_for_title 'Stopped|Finished' 300

@@ -209,9 +209,9 @@ fn watch(job: JobHandle, folder: &RunFolder, stop: &AtomicBool, json: bool) -> R
             }
             Event::Finding(finding) if !json => say(finding.to_string()),
             Event::Refused(error) if !json => say(format!("refused: {error}")),
-            Event::Finishing(what) if !json => {
-                bar.set_prefix("writing");
-                bar.set_message(what);
+            Event::Finishing(stage) if !json => {
+                bar.set_prefix("finishing");
+                bar.set_message(stage.label());
             }
             Event::Finished(data) => break Ok(data),
             Event::Stopped { steps_done } => {
@@ -244,7 +244,7 @@ fn line_of(event: &Event) -> serde_json::Value {
         Event::Refused(error) => json!({"event": "refused", "message": error.to_string()}),
         Event::Paused => json!({"event": "paused"}),
         Event::Resumed => json!({"event": "resumed"}),
-        Event::Finishing(what) => json!({"event": "finishing", "what": what}),
+        Event::Finishing(stage) => json!({"event": "finishing", "what": stage.label()}),
         Event::Finished(data) => {
             json!({"event": "finished", "aggregates": data.aggregates, "truth": data.truth, "timings": data.timings})
         }

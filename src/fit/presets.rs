@@ -21,9 +21,9 @@ impl Preset {
     /// Its name on screen.
     pub fn label(self) -> &'static str {
         match self {
-            Preset::Quick => "Quick",
-            Preset::Balanced => "Balanced",
-            Preset::Careful => "Careful",
+            Preset::Quick => "Draft",
+            Preset::Balanced => "Standard",
+            Preset::Careful => "High quality",
         }
     }
 }

@@ -28,6 +28,19 @@ pub fn pool(name: &'static str) -> Option<ThreadPool> {
         .ok()
 }
 
+/// Runs work that a person waits for on a pool of its own, at the usual priority: the window paints on its own threads
+/// meanwhile, and opening takes as long as on the command line.
+pub fn run_beside<T: Send>(name: &'static str, work: impl FnOnce() -> T + Send) -> T {
+    let pool = ThreadPoolBuilder::new()
+        .num_threads(rayon::current_num_threads())
+        .thread_name(move |index| format!("{name}-{index}"))
+        .build();
+    match pool {
+        Ok(pool) => pool.install(work),
+        Err(_) => work(),
+    }
+}
+
 /// Runs work on a pool of its own, which gives way; on the usual threads where there is none to be had.
 pub fn run<T: Send>(name: &'static str, work: impl FnOnce() -> T + Send) -> T {
     match pool(name) {
@@ -59,6 +72,7 @@ mod tests {
             stat.rsplit_once(") ").unwrap().1.split(' ').nth(16).unwrap().parse::<i32>().unwrap()
         };
         let own = niceness();
+        assert_eq!(run_beside("patina-test", niceness), own);
         let beside = run("patina-test", niceness);
         assert!(beside > own || own > 9, "{beside} beside {own}");
         assert_eq!(niceness(), own);

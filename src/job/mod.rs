@@ -99,8 +99,8 @@ pub enum Event {
     Paused,
     /// The job goes on.
     Resumed,
-    /// The fit is done and its pictures and files are being made; what, in a word or two.
-    Finishing(String),
+    /// All steps are done; images and files are being made.
+    Finishing(FinishingStage),
     /// Everything is written.
     Finished(Box<crate::insight::report::ReportData>),
     /// The job ended early as asked, in its steps or while its report was made; the checkpoint holds its state.
@@ -110,6 +110,46 @@ pub enum Event {
     },
     /// The job ended with an error; the last checkpoint stays.
     Failed(Error),
+}
+
+/// What is made after the last step of a fit, in order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum FinishingStage {
+    /// The maps are written.
+    Maps,
+    /// Every view is rendered and scored.
+    Views,
+    /// The capture is checked.
+    Capture,
+    /// The result is relit.
+    Relighting,
+    /// The report is written.
+    Report,
+}
+
+impl FinishingStage {
+    /// In a few words, for a progress bar.
+    pub fn label(self) -> &'static str {
+        match self {
+            FinishingStage::Maps => "writing maps",
+            FinishingStage::Views => "rendering views",
+            FinishingStage::Capture => "checking the capture",
+            FinishingStage::Relighting => "relighting",
+            FinishingStage::Report => "writing the report",
+        }
+    }
+
+    /// Share of the finishing that is done when this stage begins, about as measured on photographs and on the demo, in
+    /// [0, 1].
+    pub fn share_before(self) -> f32 {
+        match self {
+            FinishingStage::Maps => 0.0,
+            FinishingStage::Views => 0.1,
+            FinishingStage::Capture => 0.6,
+            FinishingStage::Relighting => 0.7,
+            FinishingStage::Report => 0.9,
+        }
+    }
 }
 
 /// How far a fit is.

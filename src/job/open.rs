@@ -134,12 +134,28 @@ impl OpenedScene {
 /// # Errors
 /// Whatever keeps the scene from being read, with place and remedy; `Stopped` when the flag is raised.
 pub fn open_scene(path: &Path, settings: &ReadSettings, stop: &AtomicBool, tell: Tell) -> Result<OpenedScene> {
+    let mut opened = read_unchecked(path, settings, stop, tell)?;
+    opened.report = check(&opened.scene, &mut opened.timings, stop, tell)?;
+    Ok(opened)
+}
+
+/// Reads a scene without checking it, for whoever shows it at once: its report is empty until [`check`] has made one.
+///
+/// # Errors
+/// As of [`open_scene`].
+pub fn read_unchecked(path: &Path, settings: &ReadSettings, stop: &AtomicBool, tell: Tell) -> Result<OpenedScene> {
     let mut timings = Vec::new();
     let scene =
         told(OpenStage::Read, stop, tell, || timed(&mut timings, "read", || crate::scene::read(path, settings)))?;
-    let report =
-        told(OpenStage::Check, stop, tell, || timed(&mut timings, "check", || doctor::check_until(&scene, stop)))?;
-    Ok(OpenedScene { scene, report, timings })
+    Ok(OpenedScene { scene, report: doctor::Report::default(), timings })
+}
+
+/// The check of a scene that was read.
+///
+/// # Errors
+/// `Stopped` when the flag is raised.
+pub fn check(scene: &Scene, timings: &mut Vec<StageTime>, stop: &AtomicBool, tell: Tell) -> Result<doctor::Report> {
+    told(OpenStage::Check, stop, tell, || timed(timings, "check", || doctor::check_until(scene, stop)))
 }
 
 /// Builds and photographs the demo scene.

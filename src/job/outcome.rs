@@ -1,6 +1,5 @@
 //! What a finished fit leaves behind: maps, scores, pictures, report.
 
-use super::Event;
 use super::against_truth::truth_errors;
 use super::explained;
 use super::facts::describe;
@@ -8,6 +7,7 @@ use super::pictures::parameters;
 use super::prepare::{Prepared, RunSettings, covered, timed};
 use super::shown::{exposure_of, go_on, relit_strips, score_views};
 use super::solver_told::SolverTold;
+use super::{Event, FinishingStage};
 use crate::atlas::{dilate, nearest_covered};
 use crate::error::Result;
 use crate::export::{LossRow, RunFolder, RunResult};
@@ -49,13 +49,13 @@ pub fn write(
     stop: &AtomicBool,
     tell: &dyn Fn(Event),
 ) -> Result<ReportData> {
-    let finishing = |what: &str| tell(Event::Finishing(what.into()));
+    let finishing = |stage: FinishingStage| tell(Event::Finishing(stage));
     let scene = fitter.scene().as_ref();
     let surface = fitter.surface().as_ref();
     let mut timings = std::mem::take(&mut prepared.timings);
     // The clock of the job began after these, and after earlier sessions of a resumed fit.
     let before_job: f64 = timings.iter().filter(|time| time.stage != "fit").map(|time| time.seconds).sum();
-    finishing("maps");
+    finishing(FinishingStage::Maps);
     let training = views_of(fitter.view_uses(), ViewUse::Training);
     let times_seen =
         timed(&mut timings, "coverage", || coverage::times_seen_by(scene, surface, &training, settings.fit.map_size));
@@ -68,21 +68,21 @@ pub fn write(
     told.write(folder)?;
     folder.write_loss(&loss_rows(fitter.state()))?;
 
-    finishing("pictures of the views");
+    finishing(FinishingStage::Views);
     let own = parameters(&result.maps, &result.environment);
     let views = timed(&mut timings, "score views", || score_views(fitter, surface, &own, settings, stop))?;
     if let Some(finding) = explained::finding(&views) {
         tell(Event::Finding(finding.clone()));
         prepared.findings.push(finding);
     }
-    finishing("look at the capture");
+    finishing(FinishingStage::Capture);
     let capture = timed(&mut timings, "capture", || capture::check(fitter, stop));
     crate::files::write_bytes(&folder.file(capture::table::FILE), capture::table::to_csv(&capture.views).as_bytes())?;
     for finding in &capture.findings {
         tell(Event::Finding(finding.clone()));
     }
     prepared.findings.extend(capture.findings);
-    finishing("relit pictures");
+    finishing(FinishingStage::Relighting);
     let (relit, relit_errors) =
         timed(&mut timings, "relight", || relit_strips(fitter, surface, &own, &result, settings, stop))?;
     go_on(stop)?;
@@ -117,7 +117,7 @@ pub fn write(
     data.timings = timings;
     data.peak_memory_bytes = memory::peak_bytes();
 
-    finishing("report");
+    finishing(FinishingStage::Report);
     let truth = scene.truth.as_ref();
     let images = ReportImages {
         // What was left out is no evidence of how good the fit is: its scores are listed, its pictures are not shown.

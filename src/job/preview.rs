@@ -199,7 +199,7 @@ impl Worker {
             let message = text_of_panic(&*panic);
             let error =
                 Error::new(ErrorKind::Internal, format!("the path-traced picture ended unexpectedly: {message}"))
-                    .remedy("a defect of this program; other pictures can still be drawn");
+                    .remedy("internal error (please report); other pictures can still be drawn");
             self.failures.put(PreviewFailure { key, error });
             self.call_wake();
         }

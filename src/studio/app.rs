@@ -70,12 +70,12 @@ impl Studio {
             memory.stage.stage = Some(Stage::new(state));
             if model.software_adapter {
                 model.log.note(format!(
-                    "No graphics card is used: {} draws the stage on the processor. Everything works; turning the scene is slower",
+                    "No graphics card: {} renders the viewport on the CPU. Everything works; orbiting is slower",
                     info.name
                 ));
             }
         } else {
-            model.log.note("Nothing can draw in 3-D here: the stage stays empty, everything else works");
+            model.log.note("No 3-D rendering available: the viewport stays empty, everything else works");
         }
         let layout = Layout::from_text(&model.preferences.layout, Workspace::Scene);
         let object_layout = Layout::from_text(&model.preferences.object_layout, Workspace::Object);
@@ -175,6 +175,7 @@ impl Studio {
         }
         panel::banner::show(ui.ctx(), &mut self.model);
         panel::dialog::show(ui.ctx(), &mut self.model);
+        panel::guide::show(ui.ctx(), &mut self.model, &mut self.memory.guide);
         panel::welcome::drop_hint(ui.ctx());
     }
 
@@ -241,6 +242,15 @@ impl eframe::App for Studio {
         if matches!(self.model.dialog, super::model::Dialog::None) {
             self.model.acts.extend(keys::pressed(&context));
         }
+        // An error goes by Escape where no dialog takes the key.
+        let is_free = matches!(self.model.dialog, super::model::Dialog::None) && !context.text_edit_focused();
+        if is_free && self.model.log.banner().is_some() && context.input(|input| input.key_pressed(egui::Key::Escape)) {
+            self.model.log.dismiss();
+        }
+        self.model.visible_panels = match self.model.workspace {
+            Workspace::Scene => self.layout.visible(),
+            Workspace::Object => self.object_layout.visible(),
+        };
         self.model.peek_photo = context.input(|input| input.modifiers.shift);
         if context.input(|input| !input.events.is_empty() || input.pointer.any_down()) {
             self.touched = Instant::now();

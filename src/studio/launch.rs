@@ -64,8 +64,8 @@ fn no_window(why: &str) -> Error {
 fn check_display() -> Result<()> {
     let is_set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     if cfg!(target_os = "linux") && !is_set("DISPLAY") && !is_set("WAYLAND_DISPLAY") {
-        return Err(Error::new(ErrorKind::Unsupported, "there is no display to open a window on")
-            .remedy("without one, `patina demo` and `patina fit SCENE -o RUN` do the same work: see `patina --help`"));
+        return Err(Error::new(ErrorKind::Unsupported, "no display found")
+            .remedy("use the command line, e.g. `patina fit SCENE -o RUN` (see `patina --help`)"));
     }
     Ok(())
 }

@@ -6,7 +6,7 @@ use egui_kittest::kittest::NodeT;
 use patina::studio::act::availability::availability;
 use patina::studio::act::{Act, ActInfo, Group, LIST};
 use patina::studio::layout::Panel;
-use patina::studio::model::starting::TITLE as STARTING;
+use patina::studio::model::tasks::TaskKind;
 use patina::studio::model::{Dialog, FitStatus, LightName, Workspace};
 use patina::studio::stage::Layer;
 
@@ -18,6 +18,13 @@ fn menu_of(info: &ActInfo) -> &'static str {
 /// Opens a menu of the bar: the uppermost control of its title, since panels may be called alike.
 fn open_menu(studio: &mut TestStudio, title: &str) {
     studio.click_first(title);
+}
+
+/// Opens the list of panels within an open menu, where an act shows a panel.
+fn open_panels(studio: &mut TestStudio, info: &ActInfo) {
+    if Panel::of(info.act).is_some() && studio.controls("Panels").len() == 1 {
+        studio.click("Panels");
+    }
 }
 
 /// Brings about a state in which an act has something to do.
@@ -59,10 +66,15 @@ fn everything(studio: &mut TestStudio) -> String {
     let model = studio.model();
     let open = model.project.as_ref().map(|project| (project.title.clone(), project.chosen_view, project.is_run));
     let fit = (&model.fit.status, model.fit.last_checkpoint, model.fit.losses.len());
-    let tasks: Vec<String> = model.tasks.progress().into_iter().map(|(title, ..)| title).collect();
+    let tasks: Vec<String> = model.tasks.progress().into_iter().map(|(kind, ..)| kind.words()).collect();
     format!(
         "{asked:?} {closes} {zoom} {visible:?} {open:?} {fit:?} {tasks:?} {:?} {:?} {:?} {:?} {:?} {:?}",
-        model.workspace, model.edits, model.switches, model.dialog, model.preferences.theme, model.eye
+        model.workspace,
+        model.edits,
+        model.switches,
+        (&model.dialog, model.guide),
+        model.preferences.theme,
+        model.eye
     )
 }
 
@@ -84,6 +96,7 @@ fn ask_for(studio: &mut TestStudio, info: &ActInfo, way: Way) {
     match way {
         Way::Menu => {
             open_menu(studio, menu_of(info));
+            open_panels(studio, info);
             studio.line(info.name).click();
         }
         Way::Palette => {
@@ -129,6 +142,7 @@ fn every_act_does_something(way: Way) {
         let model = studio.model();
         model.tasks.stop_all();
         model.dialog = Dialog::None;
+        model.guide = false;
         model.switches.alone = false;
         model.switches.looking_through = false;
         studio.press(Modifiers::NONE, Key::Escape);
@@ -202,7 +216,13 @@ fn grey_ones_say_why(studio: &mut TestStudio) -> usize {
     let mut grey = 0;
     for (group, title) in Group::ALL {
         open_menu(studio, title);
-        for info in LIST.iter().filter(|info| info.group == group) {
+        // Panels stand in a list of their own, which is opened last.
+        let mut of_group: Vec<&ActInfo> = LIST.iter().filter(|info| info.group == group).collect();
+        of_group.sort_by_key(|info| Panel::of(info.act).is_some());
+        for info in of_group {
+            if Panel::of(info.act).is_some() && !studio.has_line(info.name) {
+                open_panels(studio, info);
+            }
             let refused = availability(info.act, studio.model()).err();
             assert_eq!(
                 studio.line(info.name).accesskit_node().is_disabled(),
@@ -254,16 +274,16 @@ fn every_panel_comes_by_its_tab_and_shows_what_is_its_own() {
     let mut studio = TestStudio::with_finished_run();
     let own_words = |panel| match panel {
         Panel::Fit => "All settings",
-        Panel::Views => "Leave out",
-        Panel::Stage => "Nothing can draw in 3-D here",
-        Panel::Photo => "Left-out pixels",
-        Panel::Maps => "Borders",
+        Panel::Views => "Exclude",
+        Panel::Stage => "No 3-D rendering available",
+        Panel::Photo => "Excluded pixels",
+        Panel::Maps => "UV seams",
         Panel::Light => "Mirror ball",
-        Panel::Relight => "Match brightness",
+        Panel::Relight => "Normalize intensity",
         Panel::Record => "No texel",
-        Panel::Curves => "Log axis",
-        Panel::Messages => "Nothing was noticed",
-        Panel::Scores => "Compare under other lights",
+        Panel::Curves => "Details",
+        Panel::Messages => "No issues",
+        Panel::Scores => "Compare under novel lighting",
         other => panic!("{other:?} is not of scene mode"),
     };
     studio.model().log.clear();
@@ -313,7 +333,9 @@ fn do_every_act(studio: &mut TestStudio) {
 
 /// Ends all that was begun, and waits for it.
 fn come_to_rest(studio: &mut TestStudio) {
-    studio.wait("the end of the start", |model| !model.tasks.is_running(STARTING));
+    studio.wait("the end of the start", |model| {
+        !model.start_is_queued && !model.is_preparing() && !model.tasks.is_running(&TaskKind::Starting)
+    });
     studio.model().tasks.stop_all();
     studio.model().fit.stop();
     studio.wait("the end", |model| !model.fit.status.is_live());

@@ -1,11 +1,10 @@
 //! What goes wrong while the window is open: it lives, says so with a remedy, and the last checkpoint stays.
 
-use super::support::{ENDLESS, TestStudio, small_scene, write_small_scene};
+use super::support::{ENDLESS, Role, TestStudio, small_scene, write_small_scene};
 use patina::files::{temporary_beside, write_bytes};
 use patina::studio::act::Act;
 use patina::studio::act::availability::availability;
 use patina::studio::model::FitStatus;
-use patina::studio::model::opening::PREPARING_TITLE;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -23,9 +22,10 @@ fn pause(studio: &mut TestStudio) {
 fn assert_lives(studio: &mut TestStudio) {
     studio.frames(3);
     studio.click("Photos");
-    studio.control("Leave out");
+    studio.control("Exclude");
     studio.click_first("Window");
-    studio.click("Panel: fit");
+    studio.click("Panels");
+    studio.click_role(Role::MenuItem, "Fit panel");
 }
 
 #[test]
@@ -41,18 +41,18 @@ fn a_worker_that_panics_is_told_and_the_fit_goes_on_from_its_checkpoint() {
     let kept = studio.steps_done();
     falls.store(true, Ordering::Relaxed);
     studio.wait("the fault", |model| matches!(model.fit.status, FitStatus::Failed(_)));
-    assert!(studio.says("a fault on purpose") && studio.says("What helps"), "{}", studio.log());
+    assert!(studio.says("a fault on purpose") && studio.says("Fix: "), "{}", studio.log());
     studio.click("Dismiss");
     assert!(studio.says("Failed: "), "the line at the bottom keeps it");
     assert_lives(&mut studio);
 
     falls.store(false, Ordering::Relaxed);
     // What helps is to go on: the button is there, and the steps before the checkpoint are not done again.
-    studio.click("Go on from the checkpoint");
-    studio.wait_for_word("The fit goes on after step");
+    studio.click("Resume from checkpoint");
+    studio.wait_for_word("Fit resumed after step");
     studio.wait_for_step(kept + 1);
     let log = studio.log();
-    let step: usize = log.split("goes on after step ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    let step: usize = log.split("resumed after step ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     assert!(step >= 3 && step <= kept + 1, "after step {step}, checkpoint at {kept}");
 }
 
@@ -71,8 +71,8 @@ fn a_run_folder_that_is_deleted_while_the_fit_runs_is_made_again() {
     assert_lives(&mut studio);
     studio.click("Stop");
     studio.wait("the end", |model| model.fit.status == FitStatus::Stopped);
-    studio.click("Go on from the checkpoint");
-    studio.wait_for_word("The fit goes on after step");
+    studio.click("Resume from checkpoint");
+    studio.wait_for_word("Fit resumed after step");
 }
 
 #[test]
@@ -87,9 +87,9 @@ fn a_run_folder_that_cannot_be_written_is_a_warning_and_is_tried_again() {
     studio.model().log.clear();
     studio.click("Checkpoint");
     studio.wait_for_word("the checkpoint was not written");
-    assert!(studio.says("to look at"));
+    assert!(studio.says("warning"));
     studio.click("Messages (1)");
-    assert!(studio.says("What helps"), "{}", studio.log());
+    assert!(studio.says("Fix: "), "{}", studio.log());
     assert_eq!(studio.model().fit.status, FitStatus::Paused, "the fit holds on");
     assert_lives(&mut studio);
 
@@ -109,7 +109,7 @@ fn a_disk_that_is_full_is_told_and_the_last_checkpoint_stays() {
     pause(&mut studio);
     let checkpoint = studio.run_folder().join("checkpoint");
     let before = std::fs::read(&checkpoint).unwrap();
-    studio.click("Step once");
+    studio.click("Single step");
     studio.wait("the step", |model| model.fit.status == FitStatus::Paused);
     studio.frames(20);
     // The next checkpoint is first written beside its place: there, every byte meets a full disk.
@@ -126,16 +126,16 @@ fn a_disk_that_is_full_is_told_and_the_last_checkpoint_stays() {
     assert!(std::fs::read(&checkpoint).unwrap() != before);
 
     // Full again when it stops: the steps since the last checkpoint are lost, which is an error, not a warning.
-    studio.click("Step once");
+    studio.click("Single step");
     studio.frames(20);
     #[cfg(unix)]
     std::os::unix::fs::symlink("/dev/full", temporary_beside(&checkpoint)).unwrap();
     studio.click("Stop");
     studio.wait("the error", |model| matches!(model.fit.status, FitStatus::Failed(_)));
-    assert!(studio.says("What helps") && studio.says("No space left"), "{}", studio.log());
+    assert!(studio.says("Fix: ") && studio.says("No space left"), "{}", studio.log());
     studio.click("Dismiss");
-    studio.click("Go on from the checkpoint");
-    studio.wait_for_word("The fit goes on after step");
+    studio.click("Resume from checkpoint");
+    studio.wait_for_word("Fit resumed after step");
 }
 
 #[test]
@@ -143,13 +143,13 @@ fn runs_that_cannot_be_written_at_all_are_told_before_anything_is_lost() {
     let mut studio = TestStudio::with_small_scene();
     let runs = studio.folder.path().join("runs");
     write_bytes(&runs, b"in the way").unwrap();
-    studio.click("Start fit");
+    studio.click("Start");
     studio.wait("the error", |model| model.log.banner().is_some());
-    assert!(studio.says("What helps"), "{}", studio.log());
+    assert!(studio.says("Fix: "), "{}", studio.log());
     studio.click("Dismiss");
     assert_eq!(studio.model().fit.status, FitStatus::Idle);
     std::fs::remove_file(&runs).unwrap();
-    studio.click("Start fit");
+    studio.click("Start");
     studio.wait("the end", |model| model.fit.status == FitStatus::Finished);
 }
 
@@ -168,9 +168,9 @@ fn a_scene_that_vanished_keeps_its_run_from_going_on_and_says_what_to_do() {
     studio.wait("the end", |model| model.fit.status == FitStatus::Stopped);
 
     // Going on reads the scene again.
-    studio.click("Go on from the checkpoint");
+    studio.click("Resume from checkpoint");
     studio.wait("the error", |model| model.log.banner().is_some());
-    assert!(studio.says("What helps"), "{}", studio.log());
+    assert!(studio.says("Fix: "), "{}", studio.log());
     studio.click("Dismiss");
     assert_eq!(studio.model().fit.status, FitStatus::Stopped);
     assert_lives(&mut studio);
@@ -180,17 +180,17 @@ fn a_scene_that_vanished_keeps_its_run_from_going_on_and_says_what_to_do() {
     studio.model().open(run);
     studio.wait("the run", |model| model.project.as_ref().is_some_and(|own| own.is_run && own.scene.is_none()));
     assert!(studio.model().project.as_ref().unwrap().maps.is_some());
-    assert!(studio.is_grey("Go on from the checkpoint"));
+    assert!(studio.is_grey("Resume from checkpoint"));
     studio.click("Photos");
-    assert!(studio.says("a run whose scene moved away"), "{}", studio.log());
+    assert!(studio.says("a run whose scene has moved"), "{}", studio.log());
 
     std::fs::rename(&away, &scene).unwrap();
     let run = studio.run_folder();
     studio.model().open(run);
     studio.wait("the run", |model| model.project.as_ref().is_some_and(|own| own.scene.is_some()));
     studio.click_tab("Fit");
-    studio.click("Go on from the checkpoint");
-    studio.wait_for_word("The fit goes on after step");
+    studio.click("Resume from checkpoint");
+    studio.wait_for_word("Fit resumed after step");
 }
 
 #[test]
@@ -199,15 +199,15 @@ fn a_checkpoint_that_is_damaged_is_told_and_a_new_fit_can_start() {
     studio.click("Stop");
     studio.wait("the end", |model| model.fit.status == FitStatus::Stopped);
     write_bytes(&studio.run_folder().join("checkpoint"), b"damaged").unwrap();
-    studio.click("Go on from the checkpoint");
+    studio.click("Resume from checkpoint");
     studio.wait("the error", |model| model.log.banner().is_some());
-    assert!(studio.says("What helps"), "{}", studio.log());
+    assert!(studio.says("Fix: "), "{}", studio.log());
     studio.click("Dismiss");
     assert_lives(&mut studio);
     std::fs::remove_file(studio.run_folder().join("checkpoint")).unwrap();
     studio.frames(2);
-    studio.click("Start the fit");
-    studio.wait_for_word("The fit begins");
+    studio.click("Start");
+    studio.wait_for_word("Fit started");
 }
 
 #[test]
@@ -224,11 +224,11 @@ fn a_run_that_a_crash_interrupted_is_found_at_the_next_start_and_goes_on() {
 
     let mut again = TestStudio::in_folder(folder, None);
     again.frames(1);
-    assert!(again.says("ended while a fit was running") && again.says("Its last checkpoint is whole"));
-    again.click("Take it up again");
+    assert!(again.says("quit unexpectedly during a fit") && again.says("A valid checkpoint was found"));
+    again.click("Resume");
     again.wait("the run", |model| model.project.is_some());
     assert_eq!(again.run_folder(), run);
-    again.click("Go on from the checkpoint");
+    again.click("Resume from checkpoint");
     again.wait_for_step(done + 1);
     assert_eq!(again.model().edits.fit.steps_diffuse, ENDLESS);
 
@@ -236,7 +236,7 @@ fn a_run_that_a_crash_interrupted_is_found_at_the_next_start_and_goes_on() {
     let folder = again.close();
     let mut third = TestStudio::in_folder(folder, None);
     third.frames(1);
-    assert!(!third.says("ended while a fit was running"));
+    assert!(!third.says("quit unexpectedly during a fit"));
 }
 
 #[test]
@@ -271,10 +271,10 @@ fn a_preparation_that_is_cancelled_leaves_a_scene_that_says_so() {
         std::thread::sleep(Duration::from_millis(5));
         studio.model().poll();
     }
-    studio.model().tasks.stop(PREPARING_TITLE);
+    studio.model().tasks.stop_those_of_scene();
     studio.frames(3);
     // The button is grey rather than dead, and says what helps.
-    assert!(studio.is_grey("Start the fit"));
+    assert!(studio.is_grey("Start fit"));
     let why = availability(Act::Start, studio.model()).unwrap_err();
     assert!(why.contains("open it again"), "{why}");
     studio.act(Act::CloseProject);

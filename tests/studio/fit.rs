@@ -9,7 +9,7 @@ use patina::studio::model::FitStatus;
 #[test]
 fn a_fit_is_started_paused_stepped_continued_and_stopped_by_hand() {
     let mut studio = TestStudio::with_running_fit();
-    assert!(studio.says("Training RMSE"), "the curve grows");
+    assert!(studio.says("RMSE 0."), "the curve grows");
     assert!(studio.model().window_title().contains("fitting"), "{}", studio.model().window_title());
     studio.click("Pause fit");
     studio.wait("the pause", |model| model.fit.status == FitStatus::Paused);
@@ -17,13 +17,13 @@ fn a_fit_is_started_paused_stepped_continued_and_stopped_by_hand() {
     studio.frames(20);
     assert_eq!(studio.steps_done(), held_at, "it holds");
 
-    studio.click("Step once");
+    studio.click("Single step");
     studio.wait_for_step(held_at + 1);
     studio.frames(20);
     assert_eq!(studio.steps_done(), held_at + 1);
     assert_eq!(studio.model().fit.status, FitStatus::Paused);
 
-    studio.click("Go on with fit");
+    studio.click("Resume fit");
     studio.wait_for_step(held_at + 3);
     let written = studio.model().fit.last_checkpoint;
     studio.click("Checkpoint");
@@ -37,27 +37,27 @@ fn a_fit_is_started_paused_stepped_continued_and_stopped_by_hand() {
 
     studio.click("Stop");
     studio.wait("the end", |model| model.fit.status == FitStatus::Stopped);
-    assert!(studio.log().contains("the checkpoint holds them"), "{}", studio.log());
-    studio.control("Go on from the checkpoint");
-    studio.control("Go on with the fit");
+    assert!(studio.log().contains("the checkpoint keeps them"), "{}", studio.log());
+    studio.control("Resume from checkpoint");
+    studio.control("Resume");
 }
 
 #[test]
 fn a_fit_that_ends_leaves_scores_maps_and_a_report() {
     let mut studio = TestStudio::with_small_scene();
-    studio.click("Start fit");
+    studio.click("Start");
     studio.wait("the end", |model| model.fit.status == FitStatus::Finished);
     for file in ["report.html", "diffuse.exr", "env.exr", "settings.toml"] {
         assert!(studio.run_folder().join(file).is_file(), "{file}");
     }
     studio.click("Scores");
-    for words in ["PSNR, dB", "Against the truth", "Diffuse, RMSE", "Scale-aligned"] {
+    for words in ["PSNR, dB", "Against ground truth", "Diffuse, RMSE", "Scale-aligned"] {
         assert!(studio.says(words), "{words}");
     }
     let score = studio.model().fit.report.clone().unwrap().aggregates[0].score.raw.psnr_srgb_db;
     assert!(studio.says(&format!("{score:.2} (")), "the score itself");
 
-    studio.controls("Show report")[0].click();
+    studio.controls("Open report")[0].click();
     studio.harness.step();
     let commands = &studio.harness.output().platform_output.commands;
     let opened = commands.iter().any(|command| match command {
@@ -65,7 +65,7 @@ fn a_fit_that_ends_leaves_scores_maps_and_a_report() {
         _ => false,
     });
     assert!(opened, "{commands:?}");
-    assert!(studio.log().contains("its files are in"), "{}", studio.log());
+    assert!(studio.log().contains("Fit finished. Results:"), "{}", studio.log());
 }
 
 #[test]
@@ -79,11 +79,12 @@ fn a_stopped_run_is_opened_again_and_goes_on_where_it_stopped() {
 
     studio.click(&run.file_name().unwrap().to_string_lossy());
     studio.wait("the run", |model| model.project.is_some());
-    assert!(studio.log().contains("Start goes on from its checkpoint"), "{}", studio.log());
+    assert!(studio.log().contains("Start resumes it from its checkpoint"), "{}", studio.log());
     assert_eq!(studio.steps_done(), stopped_at, "the curve is there before it goes on");
-    studio.click("Go on from the checkpoint");
+    assert!(studio.says("Stopped") && !studio.says("Not started"), "one state, whatever tells it");
+    studio.click("Resume from checkpoint");
     studio.wait_for_step(stopped_at + 2);
-    assert!(studio.log().contains(&format!("goes on after step {stopped_at}")), "{}", studio.log());
+    assert!(studio.log().contains(&format!("resumed after step {stopped_at}")), "{}", studio.log());
     assert_eq!(studio.run_folder(), run);
     let steps: Vec<usize> = studio.model().fit.losses.iter().map(|row| row.step).collect();
     assert!(steps.windows(2).all(|pair| pair[0] < pair[1]) && steps[0] == 1, "{steps:?}");
@@ -109,11 +110,11 @@ fn after_a_stop_a_new_run_takes_the_settings_that_a_checkpoint_does_not() {
     let stopped = studio.run_folder();
     studio.click("Map size");
     studio.click("128 x 128");
-    studio.click("Start anew");
+    studio.click("Restart");
     let before = stopped.clone();
     studio.wait("the new run", move |model| model.fit.folder.as_ref().is_some_and(|own| own.path() != before));
     studio.wait_for_step(1);
-    assert_eq!(studio.log().matches("The fit begins").count(), 2, "{}", studio.log());
+    assert_eq!(studio.log().matches("Fit started").count(), 2, "{}", studio.log());
     assert_eq!(studio.model().project.as_ref().unwrap().settings.fit.map_size, 128);
     assert!(stopped.join("checkpoint").is_file(), "the run before stays");
 }
@@ -121,18 +122,18 @@ fn after_a_stop_a_new_run_takes_the_settings_that_a_checkpoint_does_not() {
 #[test]
 fn a_setting_changes_while_the_fit_runs_and_what_cannot_change_is_grey() {
     let mut studio = TestStudio::with_running_fit();
-    for fixed in ["Map size", "Quick", "Balanced", "Careful"] {
+    for fixed in ["Map size", "Draft", "Standard", "High quality"] {
         assert!(studio.is_grey(fixed), "{fixed}");
     }
-    assert!(!studio.is_grey("Samples") && !studio.is_grey("Bounces"));
+    assert!(!studio.is_grey("Samples") && !studio.is_grey("Max bounces"));
     studio.type_number("Samples", "4");
-    studio.wait_for_word("goes on with the changed settings");
+    studio.wait_for_word("continues with the changed settings");
     assert!(studio.settings_on_disk().contains("samples = 4"), "{}", studio.settings_on_disk());
     assert_eq!(studio.number("Samples"), 4.0);
 
     // Out of range: not taken, the field shows what is in force.
-    studio.type_number("Bounces", "99");
-    assert_eq!((studio.number("Bounces"), studio.model().edits.fit.bounces), (2.0, 2));
+    studio.type_number("Max bounces", "99");
+    assert_eq!((studio.number("Max bounces"), studio.model().edits.fit.bounces), (2.0, 2));
 
     // In range but less than what is done: the worker refuses, the field goes back.
     studio.wait_for_step(10);
@@ -140,7 +141,7 @@ fn a_setting_changes_while_the_fit_runs_and_what_cannot_change_is_grey() {
     studio.wait("the refusal", |model| model.edits.fit.steps_diffuse != 1);
     assert_eq!(studio.number("Steps diffuse"), super::support::ENDLESS as f64, "{}", studio.log());
     assert_eq!(studio.model().fit.status, FitStatus::Running);
-    assert!(studio.says("to look at"), "a refusal is a warning to look at");
+    assert!(studio.says("warning"), "a refusal is a warning to look at");
 }
 
 #[test]
@@ -149,50 +150,50 @@ fn a_photo_is_left_out_and_taken_in_again_while_the_fit_runs() {
     studio.click("Photos");
     let name = studio.model().project.as_ref().unwrap().chosen_name().unwrap().to_owned();
     studio.press(Modifiers::NONE, Key::X);
-    studio.wait_for_word("goes on with the changed settings");
+    studio.wait_for_word("continues with the changed settings");
     assert!(studio.settings_on_disk().contains(&format!("exclude = [\"{name}\"]")), "{}", studio.settings_on_disk());
-    assert!(studio.says("left out"));
+    assert!(studio.says("Excluded"));
     studio.model().log.clear();
-    studio.click("Take in again");
-    studio.wait_for_word("goes on with the changed settings");
+    studio.click("Include");
+    studio.wait_for_word("continues with the changed settings");
     assert!(studio.settings_on_disk().contains("exclude = []"), "{}", studio.settings_on_disk());
-    assert!(!studio.says("left out"));
-    studio.control("Leave out");
+    assert!(!studio.says("Excluded"));
+    studio.control("Exclude");
 }
 
 #[test]
 fn a_preset_sets_the_form_and_undo_brings_the_own_settings_back() {
     let mut studio = TestStudio::with_small_scene();
     let own = studio.model().edits.fit.clone();
-    assert!(studio.says("Differs from the usual"));
-    studio.click("Quick");
+    assert!(studio.says("Changed from preset"));
+    studio.click("Draft");
     // The photos are small, and so are the maps that suit them.
     assert_eq!(
         studio.model().edits.fit,
         FitSettings { method: Method::Adam, map_size: 256, ..FitSettings::preset(Preset::Quick) }
     );
-    studio.click("Balanced");
-    assert!(studio.says("Differs from the usual: method adam"), "the method is no matter of presets");
+    studio.click("Standard");
+    assert!(studio.says("Changed from preset: method adam"), "the method is no matter of presets");
     assert!(!studio.says("method adam,"), "all else of the balanced preset is the usual");
     studio.frames(4);
     studio.press(Modifiers::COMMAND, Key::Z);
     studio.press(Modifiers::COMMAND, Key::Z);
     assert_eq!(studio.model().edits.fit, own);
-    assert!(studio.says("Differs from the usual"));
+    assert!(studio.says("Changed from preset"));
 }
 
 #[test]
 fn every_setting_of_the_command_line_is_in_the_form_and_can_be_sought() {
     let mut studio = TestStudio::with_small_scene();
     studio.click("All settings");
-    for name in ["Rate light", "Environment height", "Held out interval", "Pixel filter", "Start"] {
+    for name in ["Rate light", "Environment height", "Held out interval", "Pixel filter", "Lobe ramp"] {
         assert!(!studio.controls(name).is_empty(), "{name}");
     }
     studio.harness.check_accessibility();
     studio.replace_text("Find a setting", "smooth");
     assert!(!studio.controls("Light smoothness").is_empty() && studio.controls("Rate diffuse").is_empty());
     studio.replace_text("Find a setting", "xyzzy");
-    assert!(studio.says("No setting is called so"));
+    assert!(studio.says("No matching setting"));
 }
 
 #[test]

@@ -31,6 +31,11 @@ impl TestStudio {
         self.control_of(Role::MenuItem, label)
     }
 
+    /// Whether the open menu or palette has a line with this label.
+    pub fn has_line(&self, label: &str) -> bool {
+        self.controls(label).iter().any(|node| node.accesskit_node().role() == Role::MenuItem)
+    }
+
     /// Whether any widget, text included, says this somewhere.
     pub fn says(&self, text: &str) -> bool {
         let wanted = text.to_owned();

@@ -15,10 +15,10 @@ use std::time::{Duration, Instant};
 
 /// Buttons of the maps panel that only the solver fills.
 const MAPS: [(&str, Told); 4] = [
-    ("± diffuse", Told::Diffuse),
-    ("± specular", Told::Specular),
-    ("± roughness", Told::Roughness),
-    ("Shared lobe", Told::LobeSharing),
+    ("Std. dev. (diffuse)", Told::Diffuse),
+    ("Std. dev. (specular)", Told::Specular),
+    ("Std. dev. (roughness)", Told::Roughness),
+    ("Lobe cluster size", Told::LobeSharing),
 ];
 
 /// Looks at every map that the solver fills, and at what the light is known by, with the numbers under the mouse.
@@ -47,15 +47,15 @@ fn look_at_all(studio: &mut TestStudio) {
 
 fn look_at_the_light(studio: &mut TestStudio) {
     studio.show(Panel::Light);
-    studio.click("Known by");
-    for kind in ["Highlights", "Background", "Diffuse light and shadows", "Belief"] {
+    studio.click("Evidence");
+    for kind in ["Highlights", "Background", "Diffuse shading and shadows", "Prior"] {
         assert!(studio.says(&format!("{kind} ")), "{kind} is not in the legend");
     }
-    assert!(studio.says("Factor common to light and reflectance: "), "how open the scale is");
-    let at = studio.control("What the light is known by").rect().center();
+    assert!(studio.says("Scale ambiguity of environment and reflectance: "), "how open the scale is");
+    let at = studio.control("Evidence for the environment").rect().center();
     studio.harness.event(Event::PointerMoved(at));
     studio.frames(2);
-    for word in ["highlights", "background", "diffuse", "belief", "azimuth"] {
+    for word in ["highlights", "background", "diffuse", "prior", "azimuth"] {
         assert!(studio.model().hovered_value.contains(word), "{word}: {}", studio.model().hovered_value);
     }
     studio.click("Radiance");
@@ -77,7 +77,7 @@ fn the_solver_tells_how_sure_it_is_while_it_runs_at_its_end_and_opened_again() {
     let fit = &mut studio.model().edits.fit;
     (fit.method, fit.solver_rounds, fit.solver_grid) = (Method::Solver, 2, 32);
     studio.frames(2);
-    studio.click("Start fit");
+    studio.click("Start");
     studio.wait("the first round", |model| {
         model.project.as_ref().is_some_and(|own| own.known.told().light_evidence.is_some())
     });
@@ -101,20 +101,20 @@ fn the_solver_tells_how_sure_it_is_while_it_runs_at_its_end_and_opened_again() {
 #[test]
 fn under_adam_the_maps_and_the_light_say_why_they_are_empty() {
     let mut studio = TestStudio::with_finished_run();
-    let why = "Adam does not tell this";
+    let why = "Not available with Adam";
     studio.show(Panel::Maps);
     for (button, _) in MAPS {
         assert!(studio.is_grey(button), "{button}");
     }
-    studio.control("± diffuse").hover();
+    studio.control("Std. dev. (diffuse)").hover();
     let is_told = (0..12).any(|_| {
         studio.frames(1);
         studio.says(why)
     });
     assert!(is_told, "the grey button does not say why");
     studio.show(Panel::Light);
-    studio.click("Known by");
-    assert!(studio.says("Not known") && studio.says(why));
+    studio.click("Evidence");
+    assert!(studio.says("Not available") && studio.says(why));
     studio.act(Act::LayerDiffuseDeviation);
     assert_eq!(studio.model().edits.layer, Layer::DiffuseDeviation);
     assert!(studio.model().why_untold().contains(why));

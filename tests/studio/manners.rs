@@ -17,19 +17,19 @@ fn undo_and_redo_by_key_and_by_menu_show_in_the_fields() {
     studio.frames(SETTLED);
     studio.type_number("Samples", "8");
     studio.frames(SETTLED);
-    studio.move_slider("Strength", 1.5);
+    studio.move_slider("Intensity (EV)", 1.5);
     studio.frames(SETTLED);
     studio.press(Modifiers::COMMAND, Key::Z);
-    assert_eq!((studio.number("Strength"), studio.number("Samples")), (0.0, 8.0));
+    assert_eq!((studio.number("Intensity (EV)"), studio.number("Samples")), (0.0, 8.0));
     studio.press(Modifiers::COMMAND, Key::Z);
     assert_eq!(studio.number("Samples"), 2.0);
     studio.click("Edit");
     studio.click_first("Redo");
-    assert_eq!((studio.number("Strength"), studio.number("Samples")), (0.0, 8.0));
+    assert_eq!((studio.number("Intensity (EV)"), studio.number("Samples")), (0.0, 8.0));
     studio.press(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z);
-    assert_eq!(studio.number("Strength"), 1.5);
+    assert_eq!(studio.number("Intensity (EV)"), 1.5);
     studio.press(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z);
-    assert!(studio.log().contains("Redo: nothing was taken back"), "{}", studio.log());
+    assert!(studio.log().contains("Redo: nothing to redo"), "{}", studio.log());
 }
 
 #[test]
@@ -50,22 +50,22 @@ fn undo_within_a_text_belongs_to_the_text() {
 fn the_palette_is_opened_typed_in_and_obeyed_by_keys() {
     let mut studio = TestStudio::with_finished_run();
     studio.press(Modifiers::COMMAND, Key::K);
-    studio.type_text("next li");
+    studio.type_text("next env");
     studio.press(Modifiers::NONE, Key::Enter);
     assert_eq!(studio.model().dialog, Dialog::None);
     assert_ne!(studio.model().edits.relight.first, LightName::Fitted);
     studio.press(Modifiers::COMMAND, Key::K);
     studio.type_text("layer that is not there");
-    assert!(studio.says("No act is called so"));
+    assert!(studio.says("No matching command"));
     studio.press(Modifiers::NONE, Key::Enter);
     studio.press(Modifiers::NONE, Key::Escape);
     assert_eq!(studio.model().dialog, Dialog::None);
     // By arrows: the second of those found.
     studio.press(Modifiers::COMMAND, Key::K);
-    studio.type_text("turn light");
+    studio.type_text("rotate env");
     studio.press(Modifiers::NONE, Key::ArrowDown);
     studio.press(Modifiers::NONE, Key::Enter);
-    assert_eq!(studio.model().edits.relight.turn_degrees, 345.0, "Turn light right is the second");
+    assert_eq!(studio.model().edits.relight.turn_degrees, 345.0, "the other way is the second");
 }
 
 #[test]
@@ -125,7 +125,7 @@ fn the_stage_stands_alone_and_everything_comes_back() {
     // A panel that is asked for shows, even from the stage alone.
     studio.press(Modifiers::SHIFT, Key::Tab);
     studio.press(Modifiers::COMMAND, Key::Num2);
-    studio.control("Leave out");
+    studio.control("Exclude");
 }
 
 #[test]

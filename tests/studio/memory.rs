@@ -32,7 +32,7 @@ fn damaged_settings_are_set_aside_and_told() {
     patina::files::write_bytes(&folder.path().join("studio.json"), b"{ \"theme\": ").unwrap();
     let mut studio = TestStudio::in_folder(Arc::clone(&folder), None);
     studio.frames(1);
-    assert!(studio.says("settings are damaged") && studio.says("What helps"), "{}", studio.log());
+    assert!(studio.says("settings are damaged") && studio.says("Fix: "), "{}", studio.log());
     studio.click("Dismiss");
     studio.control("Open the built-in demo");
     assert!(folder.path().join("studio.damaged.json").is_file());
@@ -51,7 +51,7 @@ fn settings_that_cannot_be_written_are_told_once_and_stop_nothing() {
     studio.model().write_preferences();
     studio.model().write_preferences();
     studio.frames(2);
-    assert_eq!(studio.log().matches("could not be remembered").count(), 1, "{}", studio.log());
+    assert_eq!(studio.log().matches("could not be saved").count(), 1, "{}", studio.log());
     studio.control("Fit again");
 }
 
@@ -63,7 +63,7 @@ fn a_remembered_light_that_vanished_is_told_and_the_others_are_there() {
     patina::files::write_bytes(&folder.path().join("studio.json"), text.as_bytes()).unwrap();
     let mut studio = TestStudio::in_folder(folder, None);
     studio.wait("the error", |model| model.log.banner().is_some());
-    assert!(studio.says("gone.hdr") && studio.says("What helps"), "{}", studio.log());
+    assert!(studio.says("gone.hdr") && studio.says("Fix: "), "{}", studio.log());
     assert_eq!(studio.model().shelf.lights().len(), 3);
     // Told once: the next start does without it.
     assert!(studio.log().contains("no longer remembered") && studio.model().preferences.lights.is_empty());

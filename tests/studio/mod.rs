@@ -18,5 +18,6 @@ mod pictures;
 mod relight;
 mod saving;
 mod stage;
+mod states;
 mod support;
 mod welcome;

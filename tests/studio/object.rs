@@ -68,12 +68,12 @@ pub fn result_folder(studio: &mut TestStudio) -> PathBuf {
 fn a_photo_of_a_sphere_becomes_light_and_reflectance_on_the_screen_and_on_disk() {
     let mut studio = TestStudio::new();
     studio.frames(2);
-    studio.click("One photo of an object…");
-    assert!(studio.is_grey("Estimate light and reflectance"), "without a photo");
+    studio.click("Single object…");
+    assert!(studio.is_grey("Estimate"), "without a photo");
     let mut studio = with_photo();
-    studio.control("Take out ball.exr");
-    assert!(studio.says("No photo yet") && studio.says("No reflectance yet") && studio.says("No light yet"));
-    studio.click("Estimate light and reflectance");
+    studio.control("Remove ball.exr");
+    assert!(studio.says("No photo yet") && studio.says("No reflectance yet") && studio.says("No environment yet"));
+    studio.click("Start estimation");
     studio.wait("the photo", |model| !model.object.photos.is_empty());
     studio.control("Photo of the object");
     studio.wait("a row", |model| model.object.rows.iter().any(|row| row.round > 0));
@@ -81,7 +81,7 @@ fn a_photo_of_a_sphere_becomes_light_and_reflectance_on_the_screen_and_on_disk()
     for label in ["Re-render of the object", "Sphere of the estimated reflectance", "Estimated environment"] {
         studio.control(label);
     }
-    assert!(!studio.says("No curve yet"));
+    assert!(!studio.says("No data"));
     studio.wait("the end", |model| model.object.status == ObjectStatus::Finished);
     let outcome = studio.model().object.outcome.clone().unwrap();
     assert!(outcome.parts.estimate.picture_log_rmse < 0.1, "{}", outcome.parts.estimate.picture_log_rmse);
@@ -98,11 +98,11 @@ fn a_photo_of_a_sphere_becomes_light_and_reflectance_on_the_screen_and_on_disk()
     studio.click("Spheres");
     studio.control("sphere under Noon sky");
     studio.act(Act::PanelObjectLight);
-    studio.click("Seen by the photos");
-    studio.control("What the photos see of the light");
-    assert!(studio.says("The photos tell next to nothing of"));
+    studio.click("Sensitivity");
+    studio.control("Sensitivity of the photos");
+    assert!(studio.says("The photos hardly constrain"));
     studio.act(Act::PanelStarts);
-    assert!(studio.says("What the photo leaves open") && studio.says("Starts that were followed"));
+    assert!(studio.says("Ambiguity") && studio.says("Initializations"));
     for (button, label) in [
         ("Wipe", "Photo and re-render"),
         ("Difference", "Photo and re-render"),
@@ -186,7 +186,7 @@ fn a_result_that_cannot_be_written_is_kept_and_can_be_saved_elsewhere() {
     let elsewhere = studio.folder.path().join("elsewhere");
     studio.click("Save result to…");
     studio.replace_text("Path", &elsewhere.display().to_string());
-    assert!(!studio.says("A folder or file can also be dropped"), "nothing is dropped to be written");
+    assert!(!studio.says("You can also drop a folder or file"), "nothing is dropped to be written");
     studio.click("Save here");
     studio.wait_for_word("Saved");
     assert!(elsewhere.join("object.json").is_file() && result_folder(&mut studio) == elsewhere);
@@ -226,7 +226,7 @@ fn files_that_do_not_do_are_refused_with_a_remedy_and_good_ones_work_after() {
         studio.act(Act::ObjectStart);
         studio.wait(word, |model| model.log.banner().is_some() && !model.object.status.is_live());
         assert!(studio.log().contains(word), "{word} is not in {}", studio.log());
-        assert!(studio.says("What helps"), "{word} has no remedy: {}", studio.log());
+        assert!(studio.says("Fix: "), "{word} has no remedy: {}", studio.log());
         studio.click("Dismiss");
         studio.model().log.clear();
     }
@@ -247,7 +247,7 @@ fn files_that_are_dropped_find_their_place() {
     assert_eq!((form.photos, form.masks), (vec!["ball.png".into()], vec!["ball_mask.png".into()]));
     assert_eq!((form.mesh.as_str(), form.is_sphere, form.cameras), ("ball.ply", false, vec!["cameras.json".into()]));
     assert!(studio.log().contains("a mask: ball_mask.png"), "{}", studio.log());
-    studio.click("Take out ball.png");
+    studio.click("Remove ball.png");
     assert!(studio.model().edits.object.photos.is_empty());
     studio.frames(60);
     studio.press(Modifiers::COMMAND, Key::Z);
@@ -294,7 +294,7 @@ fn the_library_is_shown_and_the_map_of_codes_can_be_clicked_through() {
             gap(at(a)).total_cmp(&gap(at(b)))
         })
         .unwrap();
-    let rect: Rect = studio.control("Map of the materials").rect().shrink(26.0);
+    let rect: Rect = studio.control("Latent map").rect().shrink(26.0);
     let at = rect.lerp_inside(eframe::egui::vec2(widest[0] as f32, 1.0 - widest[1] as f32));
     studio.click_at(at);
     studio.wait("what lies between", |model| model.materials.shown.as_ref().unwrap().parts.len() > 1);
@@ -350,7 +350,7 @@ fn both_workspaces_keep_what_is_theirs() {
         assert!(studio.harness.state().object_layout.visible().contains(&panel), "{title} did not come");
     }
     studio.act(Act::SceneWorkspace);
-    studio.control("Start the fit");
+    studio.control("Start fit");
     assert!(studio.model().project.is_some());
     studio.act(Act::PanelObject);
     assert_eq!(studio.model().workspace, Workspace::Object);

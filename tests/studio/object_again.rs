@@ -62,7 +62,7 @@ fn a_finished_result_is_opened_again_from_its_folder() {
     assert_eq!((form.effort, form.light_rows, form.pixels), (Effort::Quick, Some(16), Some(300)), "its settings");
     again.wait("the relit pictures", |model| !model.object.relit.is_empty());
     again.act(Act::PanelStarts);
-    assert!(again.says("What the photo leaves open") && again.says("Starts that were followed"));
+    assert!(again.says("Ambiguity") && again.says("Initializations"));
 
     // It can be saved elsewhere, file by file, and opened from there; without its photo it says so and shows the rest.
     let elsewhere = again.folder.path().join("elsewhere");
@@ -78,7 +78,7 @@ fn a_finished_result_is_opened_again_from_its_folder() {
     std::fs::write(folder.join("object.json"), "{").unwrap();
     again.model().open(folder);
     again.wait("the error", |model| model.log.banner().is_some());
-    assert!(again.says("What helps"), "{}", again.log());
+    assert!(again.says("Fix: "), "{}", again.log());
     assert!(again.model().object.outcome.is_some());
 }
 
@@ -144,7 +144,7 @@ fn write_ball(folder: &Path) {
 fn an_object_with_a_mesh_and_a_camera_is_estimated_and_opened_again() {
     // A studio in object mode with small settings; its photo of a sphere is taken out again.
     let mut studio = with_photo();
-    studio.click("Take out ball.exr");
+    studio.click("Remove ball.exr");
     let folder = studio.folder.path().to_path_buf();
     write_ball(&folder);
     type_path(&mut studio, "Photo", &folder.join("ball_photo.exr"));
@@ -152,7 +152,7 @@ fn an_object_with_a_mesh_and_a_camera_is_estimated_and_opened_again() {
         studio.model().dropped(folder.join(name));
     }
     studio.frames(2);
-    studio.click("Estimate light and reflectance");
+    studio.click("Start estimation");
     studio.wait("the end", |model| !model.object.status.is_live());
     let log = studio.log();
     assert_eq!(studio.model().object.status, ObjectStatus::Finished, "{log}");
@@ -182,6 +182,6 @@ fn a_photo_that_is_named_at_the_start_opens_object_mode_with_it() {
     assert_eq!(studio.model().workspace, Workspace::Object);
     assert_eq!(studio.model().edits.object.photos, [photo]);
     assert!(studio.harness.state().object_layout.visible().contains(&Panel::Object));
-    studio.control("Take out ball.exr");
-    assert!(!studio.is_grey("Estimate light and reflectance"));
+    studio.control("Remove ball.exr");
+    assert!(!studio.is_grey("Estimate"));
 }

@@ -8,25 +8,26 @@ use patina::error::{Finding, Place, Severity};
 use patina::studio::act::Act;
 use patina::studio::layout::Panel;
 use patina::studio::model::log::Message;
+use patina::studio::panel::curves::stage_words;
 
 #[test]
 fn a_panel_that_has_nothing_to_show_says_what_would_fill_it() {
     let mut studio = TestStudio::with_small_scene();
     for (panel, what) in [
         (Panel::Maps, "No maps yet"),
-        (Panel::Light, "No light yet"),
+        (Panel::Light, "No environment yet"),
         (Panel::Record, "No texel"),
-        (Panel::Curves, "No curve yet"),
+        (Panel::Curves, "No data"),
         (Panel::Scores, "No scores yet"),
         // Without an adapter there is nothing to draw with.
-        (Panel::Stage, "Nothing can draw in 3-D here"),
+        (Panel::Stage, "No 3-D rendering available"),
     ] {
         studio.show(panel);
         assert!(studio.says(what), "{what}");
     }
     studio.model().log.clear();
     studio.show(Panel::Messages);
-    assert!(studio.says("Nothing was noticed"));
+    assert!(studio.says("No issues"));
 }
 
 #[test]
@@ -47,7 +48,7 @@ fn every_control_of_every_panel_has_a_name() {
 fn maps_are_switched_by_their_buttons() {
     let mut studio = TestStudio::with_finished_run();
     studio.show(Panel::Maps);
-    assert!(studio.is_grey("Error") && studio.is_grey("Disagreement"), "not measured yet");
+    assert!(studio.is_grey("Residual") && studio.is_grey("Inconsistency"), "not measured yet");
     let size = studio.control("Map").value().unwrap();
     assert!(size.contains("64 x 64"), "{size}");
     // The toolbar has buttons of the same names: those of the panel lie below it.
@@ -58,19 +59,19 @@ fn maps_are_switched_by_their_buttons() {
         studio.frames(2);
         studio.control("Map");
     }
-    studio.click("Seen");
-    assert_eq!(studio.control("Seen").accesskit_node().toggled(), Some(Toggled::True));
-    studio.click("Borders");
+    studio.click_role(Role::Button, "View count");
+    assert_eq!(studio.control_of(Role::Button, "View count").accesskit_node().toggled(), Some(Toggled::True));
+    studio.click("UV seams");
     assert!(studio.model().switches.chart_borders);
     studio.press(Modifiers::NONE, Key::B);
     assert!(!studio.model().switches.chart_borders);
-    studio.click("Whole");
+    studio.click("Fit view");
 
     studio.act(Act::SurfaceLayers);
-    studio.wait_for_word("is spread over the surface");
-    studio.click("Error");
-    studio.click("Disagreement");
-    assert!(!studio.is_grey("Error"));
+    studio.wait_for_word("are projected onto the surface");
+    studio.click("Residual");
+    studio.click("Inconsistency");
+    assert!(!studio.is_grey("Residual"));
 }
 
 #[test]
@@ -78,10 +79,10 @@ fn the_fitted_light_stands_against_the_true_one() {
     let mut studio = TestStudio::with_finished_run();
     studio.show(Panel::Light);
     assert!(studio.says("16 x 8 texels, mean radiance"));
-    for picture in ["Environment", "Mirror ball", "Matte ball"] {
+    for picture in ["Environment", "Mirror ball", "Grey ball"] {
         studio.control(picture);
     }
-    studio.click("Against the truth");
+    studio.click("Against ground truth");
     studio.control("Environment divider");
 }
 
@@ -89,7 +90,7 @@ fn the_fitted_light_stands_against_the_true_one() {
 fn a_photo_is_compared_with_its_render() {
     let mut studio = TestStudio::with_finished_run();
     studio.show(Panel::Photo);
-    studio.control("Photo alone");
+    studio.control("Photo only");
     studio.click("Wipe");
     let mut waited = 0;
     while studio.controls("Photo divider").is_empty() {
@@ -103,11 +104,11 @@ fn a_photo_is_compared_with_its_render() {
     studio.frames(2);
     studio.press(Modifiers::NONE, Key::ArrowRight);
     assert!(studio.number("Photo divider") > before, "the line is moved by keys too");
-    for way in ["Difference", "Photo alone"] {
+    for way in ["Difference", "Photo only"] {
         studio.click(way);
         assert!(studio.controls("Photo divider").is_empty());
     }
-    studio.click("Left-out pixels");
+    studio.click("Excluded pixels");
     let chosen = studio.model().project.as_ref().unwrap().chosen_view;
     studio.controls("Next").last().unwrap().click();
     studio.frames(2);
@@ -149,7 +150,7 @@ fn the_table_of_photos_sorts_chooses_and_looks_through() {
     };
     let errors: Vec<f32> = order(&studio).iter().map(|name| error(&studio, name)).collect();
     assert!(errors.windows(2).all(|pair| pair[0] >= pair[1]), "worst first: {errors:?}");
-    assert!(studio.says("held out") && studio.says("fitted"));
+    assert!(studio.says("Test") && studio.says("Train"));
 
     let last = format!("photo {}", by_name[7]);
     studio.click(&last);
@@ -195,17 +196,17 @@ fn a_texel_that_is_pinned_on_a_map_tells_what_every_photo_says() {
     }
     assert!(found, "no texel could be pinned");
     let mut waited = 0;
-    while !studio.says("What each photo says") {
+    while !studio.says("Observations") {
         studio.frames(1);
         std::thread::sleep(std::time::Duration::from_millis(10));
         waited += 1;
         assert!(waited < 5000, "no record came; {}", studio.log());
     }
-    for words in ["Texel row", "Roughness", "Seen by", "Spread of views", "Nearest to highlight"] {
+    for words in ["Texel row", "Roughness", "View count", "View spread", "Closest half-angle to light"] {
         assert!(studio.says(words), "{words}");
     }
     assert!(!studio.says("NaN"), "where there is no figure, words say why");
-    studio.click("Let go");
+    studio.click("Unpin");
     assert!(studio.says("No texel") || studio.says("Texel under the cursor"));
 }
 
@@ -222,10 +223,10 @@ fn a_finding_with_a_place_is_a_link_that_goes_there() {
     log.add(finding(Place::View(name.clone()), "this photo is dark"));
     log.add(finding(Place::Setting("rate-light".into()), "this rate is high"));
     studio.frames(1);
-    assert!(studio.says("2 to look at"));
-    studio.click("2 to look at");
+    assert!(studio.says("2 warnings"));
+    studio.click("2 warnings");
     studio.frames(1);
-    assert!(!studio.says("to look at"), "looked at");
+    assert!(!studio.says("warning"), "looked at");
     assert!(studio.says("This photo is dark"));
     let link = Place::View(name.clone()).to_string();
     studio.click(&link);
@@ -241,13 +242,16 @@ fn a_finding_with_a_place_is_a_link_that_goes_there() {
 fn curves_are_drawn_over_steps_and_seconds_whole_and_by_stage() {
     let mut studio = TestStudio::with_finished_run();
     studio.show(Panel::Curves);
-    for control in ["Over seconds", "Log axis", "Over steps", "Log axis"] {
+    assert!(studio.says("Held-out RMSE") && studio.controls("Log axis").is_empty(), "one line at first");
+    studio.click("Details");
+    for control in ["X axis: Time", "Log axis", "X axis: Steps", "Log axis"] {
         studio.click(control);
     }
     let stage = studio.model().fit.losses[0].stage.clone();
-    studio.click("Stage of the fit");
+    let stage = stage_words(&stage);
+    studio.click("Phase of the fit");
     studio.click(&stage);
-    assert_eq!(studio.control("Stage of the fit").value().as_deref(), Some(stage.as_str()));
+    assert_eq!(studio.control("Phase of the fit").value().as_deref(), Some(stage.as_str()));
     assert!(studio.says("Held-out RMSE"));
 }
 
@@ -256,10 +260,10 @@ fn curves_are_drawn_over_steps_and_seconds_whole_and_by_stage() {
 fn scores_under_other_lights_are_measured_when_asked_for() {
     let mut studio = TestStudio::with_finished_run();
     studio.show(Panel::Scores);
-    studio.click("Compare under other lights");
+    studio.click("Compare under novel lighting");
     studio.wait("the comparison", |model| model.project.as_ref().is_some_and(|own| own.entanglement.is_some()));
-    assert!(studio.says("light that went into the maps"), "{}", studio.log());
-    assert!(studio.controls("Compare under other lights").is_empty());
+    assert!(studio.says("lighting baked into the maps"), "{}", studio.log());
+    assert!(studio.controls("Compare under novel lighting").is_empty());
 }
 
 #[test]

@@ -134,7 +134,12 @@ fn the_stage_shows_the_mesh_and_changes_with_layer_and_light() {
 
 /// Moves the mouse with the button down, in steps.
 fn drag(studio: &mut TestStudio, from: Pos2, to: Pos2, modifiers: Modifiers) {
-    let button = |pos, pressed| Event::PointerButton { pos, button: PointerButton::Primary, pressed, modifiers };
+    drag_by(studio, PointerButton::Primary, from, to, modifiers);
+}
+
+/// The same with another button.
+fn drag_by(studio: &mut TestStudio, button: PointerButton, from: Pos2, to: Pos2, modifiers: Modifiers) {
+    let button = |pos, pressed| Event::PointerButton { pos, button, pressed, modifiers };
     studio.harness.event_modifiers(Event::PointerMoved(from), modifiers);
     studio.harness.event_modifiers(button(from, true), modifiers);
     for step in 1..=5 {
@@ -161,6 +166,15 @@ fn a_drag_orbits_with_shift_it_turns_the_light_and_a_click_pins_a_texel() {
     drag(&mut studio, from, to, Modifiers::NONE);
     assert_ne!(studio.model().eye, eye);
     assert_eq!(studio.model().edits.relight.turn_degrees, turned, "the light stays");
+    // The middle button orbits, and pans with Shift, as in Blender.
+    let eye = studio.model().eye;
+    drag_by(&mut studio, PointerButton::Middle, from, to, Modifiers::NONE);
+    let orbited = studio.model().eye;
+    assert!(orbited.yaw_radians != eye.yaw_radians && orbited.target == eye.target, "{orbited:?}");
+    drag_by(&mut studio, PointerButton::Middle, from, to, Modifiers::SHIFT);
+    let panned = studio.model().eye;
+    assert!(panned.yaw_radians == orbited.yaw_radians && panned.target != orbited.target, "{panned:?}");
+    assert_eq!(studio.model().edits.relight.turn_degrees, turned, "the environment stays");
     studio.press(Modifiers::NONE, Key::F);
 
     // The line between two lights is dragged by its grip.
@@ -299,7 +313,7 @@ fn object_mode_is_drawn_with_its_result_and_its_library() {
     picture(&mut studio, "object_materials");
     studio.act(Act::PanelMaterialMap);
     let map = picture(&mut studio, "object_map");
-    let rect = studio.control("Map of the materials").rect();
+    let rect = studio.control("Latent map").rect();
     let colours: std::collections::HashSet<_> = part(&map, rect, 1.0).into_iter().collect();
     assert!(colours.len() > 500, "{} colours on the map", colours.len());
     for (theme, word) in THEMES {

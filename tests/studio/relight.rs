@@ -67,13 +67,13 @@ fn lights_are_swapped_by_click_and_by_arrow_and_the_fitted_one_comes_back() {
 fn the_light_turns_by_key_and_slider_and_is_made_stronger() {
     let mut studio = TestStudio::with_finished_run();
     studio.press(Modifiers::SHIFT, Key::ArrowLeft);
-    assert_eq!(studio.number("Turn"), 15.0);
+    assert_eq!(studio.number("Rotation"), 15.0);
     studio.press(Modifiers::SHIFT, Key::ArrowRight);
     studio.press(Modifiers::SHIFT, Key::ArrowRight);
-    assert_eq!(studio.number("Turn"), 345.0, "around, not below zero");
-    studio.move_slider("Turn", 90.0);
-    studio.move_slider("Strength", 2.0);
-    assert_eq!((studio.number("Turn"), studio.number("Strength")), (90.0, 2.0));
+    assert_eq!(studio.number("Rotation"), 345.0, "around, not below zero");
+    studio.move_slider("Rotation", 90.0);
+    studio.move_slider("Intensity (EV)", 2.0);
+    assert_eq!((studio.number("Rotation"), studio.number("Intensity (EV)")), (90.0, 2.0));
     let stage_light = studio.model().stage_light(&LightName::Fitted).unwrap();
     let traced = studio.model().traced_light(&LightName::Fitted).unwrap();
     let ratio = traced.mean_radiance() / stage_light.mean_radiance();
@@ -89,7 +89,7 @@ fn brightness_is_matched_unless_it_is_not_wished() {
     };
     let fitted = luminance(&mut studio, &LightName::Fitted);
     assert!((luminance(&mut studio, &sky("noon")) / fitted - 1.0).abs() < 1e-2);
-    studio.click("Match brightness");
+    studio.click("Normalize intensity");
     let own = patina::math::luminance(studio.model().shelf.find(&sky("noon")).unwrap().environment.mean_radiance());
     assert_eq!(luminance(&mut studio, &sky("noon")), own);
 }
@@ -97,22 +97,22 @@ fn brightness_is_matched_unless_it_is_not_wished() {
 #[test]
 fn two_lights_stand_side_by_side() {
     let mut studio = TestStudio::with_finished_run();
-    studio.click("Two lights");
+    studio.click("Split view");
     let second = studio.model().edits.relight.second.clone().unwrap();
     assert_ne!(second, LightName::Fitted);
-    studio.click("Second light");
+    studio.click("Environment B");
     studio.click_role(Role::Button, "Overcast sky");
     assert_eq!(studio.model().edits.relight.second, Some(sky("overcast")));
     studio.press(Modifiers::NONE, Key::M);
     assert_eq!(studio.model().edits.relight.second, None);
-    assert!(studio.controls("Second light").is_empty());
+    assert!(studio.controls("Environment B").is_empty());
 }
 
 #[test]
 #[ignore = "slow: pictures under every light"]
 fn the_strip_shows_the_view_under_every_light_and_a_click_takes_one() {
     let mut studio = TestStudio::with_finished_run();
-    studio.click("Strip of lights");
+    studio.click("Lighting contact sheet");
     studio.wait("the strip", |model| model.project.as_ref().is_some_and(|own| !own.strip.is_empty()));
     assert_eq!(studio.model().project.as_ref().unwrap().strip.len(), studio.model().shelf.lights().len());
     studio.control("view under Overcast sky").click_accesskit();
@@ -126,21 +126,21 @@ fn a_light_comes_by_path_or_by_drop_lights_the_stage_and_goes_again() {
     let folder = tempfile::tempdir().unwrap();
     let by_path = write_light(folder.path(), "left.hdr");
     studio.press(Modifiers::COMMAND, Key::L);
-    assert!(studio.says("Add an HDR map to the shelf"));
+    assert!(studio.says("Import an HDRI"));
     studio.type_text(&by_path.display().to_string());
     studio.click("Add this");
-    studio.wait_for_word("Left is on the shelf");
+    studio.wait_for_word("Left was added to the environments");
     studio.click_role(Role::RadioButton, "left");
     assert_eq!(studio.model().edits.relight.first, LightName::File(by_path.clone()));
 
     let dropped = write_light(folder.path(), "other.exr");
     drop_on_window(&mut studio, &dropped);
-    studio.wait_for_word("Other is on the shelf");
+    studio.wait_for_word("Other was added to the environments");
     assert_eq!(studio.model().preferences.lights, [by_path.clone(), dropped]);
 
     studio.controls("left")[0].click_button(egui::PointerButton::Secondary);
     studio.frames(3);
-    studio.click("Take off the shelf");
+    studio.click("Remove");
     assert!(studio.controls("left").is_empty());
     assert_eq!(studio.model().edits.relight.first, LightName::Fitted, "what lit the stage is gone");
     assert_eq!(studio.model().preferences.lights.len(), 1);
@@ -153,7 +153,7 @@ fn what_is_read_for_the_shelf_outlives_the_scene_that_is_closed() {
     // No frame between the two takes it in.
     studio.model().add_light(path.clone());
     studio.model().close();
-    studio.wait_for_word("Late is on the shelf");
+    studio.wait_for_word("Late was added to the environments");
     assert!(studio.model().project.is_none());
     assert!(studio.model().shelf.find(&LightName::File(path)).is_some());
 }
@@ -177,7 +177,7 @@ fn a_file_that_is_no_light_is_told_with_a_remedy() {
     patina::files::write_bytes(&bad, b"not a picture").unwrap();
     drop_on_window(&mut studio, &bad);
     studio.wait("the error", |model| model.log.banner().is_some());
-    assert!(studio.says("What helps") && studio.says("bad.hdr"), "{}", studio.log());
+    assert!(studio.says("Fix: ") && studio.says("bad.hdr"), "{}", studio.log());
     studio.click("Dismiss");
     let count = studio.model().shelf.lights().len();
     drop_on_window(&mut studio, &folder.path().join("nowhere.exr"));

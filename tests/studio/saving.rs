@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// Fills in the dialog and saves; waits until the files are there.
 fn save(studio: &mut TestStudio, path: &Path, place: &str) {
     studio.replace_text(place, &path.display().to_string());
-    for (field, number) in [("Width", "32"), ("Height", "24"), ("Paths a pixel", "2")] {
+    for (field, number) in [("Width", "32"), ("Height", "24"), ("Samples per pixel", "2")] {
         studio.type_number(field, number);
     }
     studio.click("Save");
@@ -34,19 +34,19 @@ fn a_picture_is_saved_as_the_screen_shows_it_and_in_linear_radiance() {
     let mut studio = TestStudio::with_finished_run();
     let folder = tempfile::tempdir().unwrap();
     studio.press(Modifiers::COMMAND, Key::S);
-    assert!(studio.says("Size in pixels"));
+    assert!(studio.says("Size (pixels)"));
     studio.harness.check_accessibility();
     let png = folder.path().join("stage.png");
-    save(&mut studio, &png, "Picture file");
+    save(&mut studio, &png, "Image file");
     assert_shows_something(&png);
-    assert!(!studio.says("Size in pixels"), "the dialog is gone");
+    assert!(!studio.says("Size (pixels)"), "the dialog is gone");
 
     studio.model().log.clear();
     // Two stops brighter on the screen: the linear picture does not follow.
     studio.model().edits.display.exposure_stops = 2.0;
     studio.press(Modifiers::COMMAND, Key::S);
     let exr = folder.path().join("deeper").join("stage.exr");
-    save(&mut studio, &exr, "Picture file");
+    save(&mut studio, &exr, "Image file");
     assert_shows_something(&exr);
     let mean = |path: &Path| {
         let picture = file::read_rgb(path).unwrap();
@@ -61,8 +61,8 @@ fn a_strip_shows_every_light_of_the_shelf_and_a_turntable_goes_around() {
     let mut studio = TestStudio::with_finished_run();
     let folder = tempfile::tempdir().unwrap();
     let strip = folder.path().join("strip");
-    studio.click("Save strip of lights…");
-    save(&mut studio, &strip, "Folder of pictures");
+    studio.click("Export contact sheet…");
+    save(&mut studio, &strip, "Image folder");
     let lights = studio.model().shelf.lights().len();
     let pictures: Vec<PathBuf> = files_of(&strip);
     assert!(pictures.len() >= lights, "{pictures:?}");
@@ -70,9 +70,9 @@ fn a_strip_shows_every_light_of_the_shelf_and_a_turntable_goes_around() {
 
     studio.model().log.clear();
     let turntable = folder.path().join("turntable");
-    studio.click("Save turntable…");
-    studio.type_number("Pictures", "3");
-    save(&mut studio, &turntable, "Folder of pictures");
+    studio.click("Render turntable…");
+    studio.type_number("Images", "3");
+    save(&mut studio, &turntable, "Image folder");
     let frames = files_of(&turntable);
     assert_eq!(frames.len(), 3, "{frames:?}");
     frames.iter().for_each(|frame| assert_shows_something(frame));
@@ -86,18 +86,18 @@ fn a_picture_that_cannot_be_written_is_told_and_one_that_is_not_wished_is_not() 
     let file_not_folder = folder.path().join("file");
     patina::files::write_bytes(&file_not_folder, b"in the way").unwrap();
     studio.press(Modifiers::COMMAND, Key::S);
-    studio.replace_text("Picture file", &file_not_folder.join("stage.png").display().to_string());
-    for (field, number) in [("Width", "16"), ("Height", "16"), ("Paths a pixel", "1")] {
+    studio.replace_text("Image file", &file_not_folder.join("stage.png").display().to_string());
+    for (field, number) in [("Width", "16"), ("Height", "16"), ("Samples per pixel", "1")] {
         studio.type_number(field, number);
     }
     studio.click("Save");
     studio.wait("the error", |model| model.log.banner().is_some());
-    assert!(studio.says("What helps"), "{}", studio.log());
+    assert!(studio.says("Fix: "), "{}", studio.log());
     studio.click("Dismiss");
 
     studio.press(Modifiers::COMMAND, Key::S);
-    studio.replace_text("Picture file", &folder.path().join("unwished.png").display().to_string());
+    studio.replace_text("Image file", &folder.path().join("unwished.png").display().to_string());
     studio.press(Modifiers::NONE, Key::Escape);
-    assert!(!studio.says("Size in pixels"));
+    assert!(!studio.says("Size (pixels)"));
     assert!(!studio.model().tasks.is_busy() && files_of(folder.path()).len() == 1);
 }

@@ -153,7 +153,7 @@ impl TestStudio {
     pub fn start_endless_fit(&mut self) {
         self.model().edits.fit.steps_diffuse = ENDLESS;
         self.frames(1);
-        self.click("Start the fit");
+        self.click("Start");
         self.wait_for_step(3);
     }
 

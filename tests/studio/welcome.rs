@@ -9,12 +9,12 @@ use patina::studio::model::FitStatus;
 fn a_typed_path_opens_a_scene_and_the_next_start_remembers_it() {
     let mut studio = TestStudio::new();
     studio.frames(1);
-    assert!(studio.says("Nothing yet") && studio.says("A BlendedMVS scene"));
+    assert!(studio.says("No recent files") && studio.says("A BlendedMVS scene"));
     studio.replace_text("Path", &small_scene().display().to_string());
     studio.click("Open path");
     studio.wait("the atlas", |model| model.project.as_ref().is_some_and(|own| own.surface.is_some()));
-    studio.control("Start the fit");
-    assert!(studio.says("8 photos, 2 held out to judge"));
+    studio.control("Start fit");
+    assert!(studio.says("8 photos (2 held out)"));
 
     let folder = studio.close();
     let mut again = TestStudio::in_folder(folder, None);
@@ -40,7 +40,7 @@ fn folders_that_hold_no_scene_and_paths_that_lead_nowhere_are_told_with_a_remedy
     for path in [empty.path().to_path_buf(), empty.path().join("nowhere"), finished_run().join("mesh.obj")] {
         let mut studio = TestStudio::opening(Some(path.clone()));
         studio.wait("the error", |model| model.log.banner().is_some());
-        assert!(studio.says("What helps"), "{}", studio.log());
+        assert!(studio.says("Fix: "), "{}", studio.log());
         studio.click("Dismiss");
         assert!(studio.controls("Dismiss").is_empty());
         assert!(studio.harness.state().model.project.is_none(), "{}", path.display());
@@ -58,14 +58,14 @@ fn a_recent_folder_that_is_gone_is_grey_and_can_be_forgotten() {
     studio.model().preferences.remember(&gone, false);
     studio.frames(1);
     assert!(studio.is_grey("scene-of-old"));
-    studio.click("Forget");
-    assert!(studio.controls("scene-of-old").is_empty() && studio.says("Nothing yet"));
+    studio.click("Remove from list");
+    assert!(studio.controls("scene-of-old").is_empty() && studio.says("No recent files"));
 }
 
 #[test]
 fn a_scene_of_linear_photos_is_given_to_the_solver_and_presets_leave_it_there() {
     let mut studio = TestStudio::opening(Some(small_scene().into()));
-    studio.wait("the scene", |model| model.project.is_some());
+    studio.wait("the atlas", |model| model.project.as_ref().is_some_and(|own| own.surface.is_some()));
     assert_eq!(studio.model().edits.fit.method, Method::Solver);
     assert!(
         studio.log().contains("The method is the solver, since all photos hold linear radiance"),
@@ -74,9 +74,9 @@ fn a_scene_of_linear_photos_is_given_to_the_solver_and_presets_leave_it_there() 
     );
     studio.act(Act::PanelFit);
     studio.control("Method");
-    assert!(!studio.says("Differs from the usual"), "what suits the scene is the usual there");
+    assert!(!studio.says("Changed from preset"), "what suits the scene is the usual there");
     assert!(studio.controls("Consistency").is_empty(), "the solver knows none");
-    studio.click("Careful");
+    studio.click("High quality");
     assert_eq!(
         studio.model().edits.fit,
         FitSettings { method: Method::Solver, map_size: 256, ..FitSettings::preset(Preset::Careful) }
@@ -89,7 +89,7 @@ fn a_long_opening_can_be_cancelled() {
     studio.frames(1);
     studio.click("Open the built-in demo");
     studio.click("Cancel");
-    assert!(studio.log().contains("Stopped: Opening"), "{}", studio.log());
+    assert!(studio.log().contains("Cancelled: Opening"), "{}", studio.log());
     assert!(!studio.model().tasks.is_busy() && studio.model().project.is_none());
     studio.control("Open the built-in demo");
 }
@@ -97,13 +97,13 @@ fn a_long_opening_can_be_cancelled() {
 #[test]
 fn a_scene_is_read_again_in_another_way() {
     let mut studio = TestStudio::with_small_scene();
-    studio.click("How the scene is read");
+    studio.click("Import settings");
     studio.frames(4);
-    assert!(studio.is_grey("Read the scene again"), "nothing differs");
-    studio.control("Shrink photos by").set_value_accesskit(2.0);
+    assert!(studio.is_grey("Reload scene"), "nothing differs");
+    studio.control("Downsample photos").set_value_accesskit(2.0);
     studio.frames(2);
-    assert!(studio.says("Not in force yet"));
-    studio.control("Read the scene again").click_accesskit();
+    assert!(studio.says("Not applied yet"));
+    studio.control("Reload scene").click_accesskit();
     studio.frames(1);
     studio.wait("the scene", |model| model.project.as_ref().is_some_and(|own| own.settings.read.shrink == 2));
     let project = studio.model().project.as_ref().unwrap();

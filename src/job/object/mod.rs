@@ -259,5 +259,5 @@ pub fn start(request: ObjectRequest, options: ObjectJobOptions) -> Result<Object
 
 fn panicked(panic: &(dyn std::any::Any + Send)) -> Error {
     Error::new(ErrorKind::Internal, format!("the estimation ended unexpectedly: {}", text_of_panic(panic)))
-        .remedy("a defect of this program; try another model or other settings")
+        .remedy("internal error (please report); try another model or other settings")
 }

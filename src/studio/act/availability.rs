@@ -1,8 +1,7 @@
 //! Whether an act can be done now, and why not.
 
 use super::{Act, Group};
-use crate::studio::model::opening::PREPARING_TITLE;
-use crate::studio::model::starting::TITLE as STARTING_TITLE;
+use crate::studio::model::tasks::TaskKind;
 use crate::studio::model::{FitStatus, Model, Workspace};
 
 /// `Ok` when the act can be done; otherwise why not, as a short sentence without a full stop.
@@ -13,7 +12,7 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
     let has_maps = project.is_some_and(|project| project.maps.is_some());
     let status = &model.fit.status;
     if model.workspace == Workspace::Object && is_of_scenes(act) {
-        return Err("this is for scenes: go to scene mode first");
+        return Err("this is for scenes: switch to the Scene workspace first");
     }
     match act {
         Act::OpenFolder
@@ -21,6 +20,7 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
         | Act::Quit
         | Act::Palette
         | Act::Help
+        | Act::Guide
         | Act::NextTheme
         | Act::ZoomIn
         | Act::ZoomOut
@@ -44,55 +44,57 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
         | Act::PanelMaterials
         | Act::PanelMaterialMap
         | Act::PanelMaterial => Ok(()),
-        Act::SceneWorkspace => need(model.workspace == Workspace::Object, "this is scene mode"),
-        Act::ObjectWorkspace => need(model.workspace == Workspace::Scene, "this is object mode"),
+        Act::SceneWorkspace => need(model.workspace == Workspace::Object, "already in the Scene workspace"),
+        Act::ObjectWorkspace => need(model.workspace == Workspace::Scene, "already in the Single object workspace"),
         Act::ObjectStart => {
-            need(!model.object.status.is_live(), "an estimation is in progress")?;
-            need(!model.edits.object.photos.is_empty(), "add a photo of an object first")?;
+            need(!model.object.status.is_live(), "an estimation is running")?;
+            need(!model.edits.object.photos.is_empty(), "add a photo of the object first")?;
             let outcome = model.object.outcome.as_ref();
             need(outcome.is_none_or(|own| own.folder.is_some()), "the last result is not on disk yet: save it first")
         }
-        Act::ObjectStop => need(model.object.status.is_live(), "no estimation is in progress"),
-        Act::ObjectRelight | Act::ObjectSave => need(model.object.outcome.is_some(), "nothing was estimated yet"),
+        Act::ObjectStop => need(model.object.status.is_live(), "no estimation is running"),
+        Act::ObjectRelight | Act::ObjectSave => need(model.object.outcome.is_some(), "no result yet"),
         Act::ObjectReport => {
             let folder = model.object.outcome.as_ref().and_then(|own| own.folder.as_ref());
-            need(folder.is_some(), "the report is written when an estimation is done")
+            need(folder.is_some(), "the report is written when the estimation is finished")
         }
         Act::NextMaterial | Act::PreviousMaterial => {
-            need(model.materials.library.is_some(), "show the materials first")
+            need(model.materials.library.is_some(), "open the Materials panel first")
         }
         Act::ExposureAuto if model.workspace == Workspace::Object => {
-            need(!model.object.photos.is_empty(), "no photo was read yet")
+            need(!model.object.photos.is_empty(), "no photo yet")
         }
         Act::ResetLayout if model.workspace == Workspace::Object => Ok(()),
         Act::PanelMessages if model.workspace == Workspace::Object => Ok(()),
-        Act::Undo => need(model.history.can_undo(&model.edits), "nothing was changed"),
-        Act::Redo => need(model.history.can_redo(&model.edits), "nothing was taken back"),
+        Act::Undo => need(model.history.can_undo(&model.edits), "nothing to undo"),
+        Act::Redo => need(model.history.can_redo(&model.edits), "nothing to redo"),
         Act::Start => {
             need(project.is_some(), "open a scene first")?;
-            need(has_views, "this run's scene is not here, so there are no photos to fit")?;
-            let why = match model.tasks.is_running(PREPARING_TITLE) {
-                true => "the scene is still being prepared",
-                false => "the scene was not prepared to its end: open it again",
-            };
-            need(project.is_some_and(|project| project.surface.is_some()), why)?;
-            need(!status.is_live(), "a fit is in progress")?;
-            need(!model.tasks.is_running(STARTING_TITLE), "the fit is about to start")
+            need(has_views, "the scene of this run was not found, so there are no photos")?;
+            need(!model.start_is_queued, "the fit starts automatically when the scene is ready")?;
+            let is_prepared = project.is_some_and(|project| project.surface.is_some());
+            need(is_prepared || model.is_preparing(), "preparing the scene was cancelled: open it again")?;
+            need(!status.is_live(), "a fit is running")?;
+            need(!model.tasks.is_running(&TaskKind::Starting), "the fit is starting")
         }
         Act::PauseOrGoOn => {
-            need(matches!(status, FitStatus::Running | FitStatus::Pausing | FitStatus::Paused), "no fit is in progress")
+            need(matches!(status, FitStatus::Running | FitStatus::Pausing | FitStatus::Paused), "no fit is running")
         }
-        Act::Stop => need(status.is_live() && *status != FitStatus::Stopping, "no fit is in progress"),
+        Act::Stop if model.start_is_queued => Ok(()),
+        Act::Stop => need(status.is_live() && *status != FitStatus::Stopping, "no fit is running"),
         Act::StepOnce => need(*status == FitStatus::Paused, "pause the fit first"),
-        Act::Checkpoint => need(matches!(status, FitStatus::Running | FitStatus::Paused), "no fit is in progress"),
+        Act::Checkpoint => need(matches!(status, FitStatus::Running | FitStatus::Paused), "no fit is running"),
         Act::OpenReport => {
             let there = model.fit.folder.as_ref().is_some_and(|folder| folder.report_html_path().is_file());
-            need(there, "the report is written when a fit is done")
+            need(there, "the report is written when the fit is finished")
         }
-        Act::SavePicture | Act::SaveTurntable | Act::SaveLightStrip | Act::LightStrip => need(
-            has_maps && project.is_some_and(|project| project.surface.is_some()),
-            "there are no maps yet: start a fit",
-        ),
+        Act::OpenRunFolder => {
+            let there = model.fit.folder.as_ref().is_some_and(|folder| folder.path().is_dir());
+            need(there, "no run yet: start a fit")
+        }
+        Act::SavePicture | Act::SaveTurntable | Act::SaveLightStrip | Act::LightStrip => {
+            need(has_maps && project.is_some_and(|project| project.surface.is_some()), "no maps yet: start a fit")
+        }
         Act::LookThrough
         | Act::NextView
         | Act::PreviousView
@@ -101,10 +103,10 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
         | Act::ExposureAuto
         | Act::Frustums
         | Act::Thumbnails
-        | Act::LeaveOut => need(has_views, "there are no photos"),
+        | Act::LeaveOut => need(has_views, "no photos"),
         Act::ErrorOverlay | Act::LayerPhotoError | Act::LayerCoverage | Act::LayerDisagreement | Act::SurfaceLayers => {
-            need(has_views, "there are no photos")?;
-            need(has_maps, "there are no maps yet: start a fit")
+            need(has_views, "no photos")?;
+            need(has_maps, "no maps yet: start a fit")
         }
         Act::LayerDiffuse
         | Act::LayerSpecular
@@ -114,19 +116,52 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
         | Act::LayerSpecularDeviation
         | Act::LayerRoughnessDeviation
         | Act::LayerLobeSharing
-        | Act::LayerChoice => need(has_maps, "there are no maps yet: start a fit"),
-        Act::FittedLight => need(has_maps, "there is no fitted light yet"),
+        | Act::LayerChoice => need(has_maps, "no maps yet: start a fit"),
+        Act::FittedLight => need(has_maps, "no estimated environment yet"),
         Act::ChartBorders => {
-            need(project.is_some_and(|project| project.surface.is_some()), "the atlas is not made yet")
+            need(project.is_some_and(|project| project.surface.is_some()), "the UV atlas is not ready yet")
         }
-        _ => need(project.is_some(), "open a scene first"),
+        Act::CloseProject
+        | Act::FitView
+        | Act::Traced
+        | Act::LayerLit
+        | Act::LayerNormal
+        | Act::NextLight
+        | Act::PreviousLight
+        | Act::SecondLight
+        | Act::TurnLightLeft
+        | Act::TurnLightRight
+        | Act::LightBackground
+        | Act::HideInterface
+        | Act::ResetLayout
+        | Act::PanelFit
+        | Act::PanelViews
+        | Act::PanelStage
+        | Act::PanelPhoto
+        | Act::PanelMaps
+        | Act::PanelLight
+        | Act::PanelRelight
+        | Act::PanelRecord
+        | Act::PanelCurves
+        | Act::PanelMessages
+        | Act::PanelScores => need(project.is_some(), "open a scene first"),
     }
 }
 
 /// Whether an act means nothing in object mode, so that its key there is not pressed in vain.
 fn is_of_scenes(act: Act) -> bool {
-    let group = act.info().group;
-    let in_group = matches!(group, Group::Fit | Group::View) || group == Group::Light && act != Act::AddLight;
-    let further = [Act::SavePicture, Act::SaveTurntable, Act::SaveLightStrip, Act::OpenReport, Act::HideInterface];
-    in_group || further.contains(&act)
+    match act.info().group {
+        Group::Fit | Group::View => true,
+        Group::Light => act != Act::AddLight,
+        Group::File | Group::Window => matches!(
+            act,
+            Act::SavePicture
+                | Act::SaveTurntable
+                | Act::SaveLightStrip
+                | Act::OpenReport
+                | Act::OpenRunFolder
+                | Act::HideInterface
+        ),
+        Group::Edit | Group::Display | Group::Object => false,
+    }
 }

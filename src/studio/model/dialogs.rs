@@ -1,7 +1,8 @@
 //! Windows over the window: which there are, and what becomes of a path that is typed or picked in one.
 
+use super::tasks::TaskKind;
 use super::{Done, Model, lights};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// What a path is picked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,39 +107,40 @@ impl Model {
 
     /// Reads an HDR map and puts it on the shelf.
     pub fn add_light(&mut self, path: PathBuf) {
-        self.tasks.spawn(title_of_light(&path), move |_| {
+        self.tasks.spawn(TaskKind::ReadingEnvironment(path.clone()), move |_| {
             lights::read(&path).map(|(light, noticed)| Done::LightRead(Box::new(light), noticed))
         });
     }
 
-    /// Forgets a remembered light that could not be read, by the title of its task: it is told of once.
-    pub(super) fn forget_light(&mut self, title: &str) {
+    /// Forgets a remembered light that could not be read, by the task that read it: it is told of once.
+    pub(super) fn forget_light(&mut self, task: &TaskKind) {
+        let TaskKind::ReadingEnvironment(gone) = task else { return };
         let count = self.preferences.lights.len();
-        self.preferences.lights.retain(|path| title_of_light(path) != title);
+        self.preferences.lights.retain(|path| path != gone);
         if self.preferences.lights.len() < count {
-            self.log.note("The light is no longer remembered: add it again when its file is back");
+            self.log.note("The environment is no longer remembered: import it again when its file is back");
         }
     }
 
     /// Opens the system's file dialog on a thread of its own.
     pub fn pick(&mut self, purpose: PickFor) {
-        self.tasks.spawn("Choosing", move |_| {
+        self.tasks.spawn(TaskKind::Choosing, move |_| {
             let dialog = rfd::FileDialog::new();
             let path = match purpose {
                 PickFor::Open => dialog.set_title("Open a scene or run folder").pick_folder(),
-                PickFor::RunsFolder => dialog.set_title("Folder for new runs").pick_folder(),
+                PickFor::RunsFolder => dialog.set_title("Output folder for new runs").pick_folder(),
                 PickFor::Light => dialog
-                    .set_title("Add an HDR map")
-                    .add_filter("HDR maps", &["hdr", "exr", "pfm", "png", "jpg"])
+                    .set_title("Import an HDRI")
+                    .add_filter("HDRIs", &["hdr", "exr", "pfm", "png", "jpg"])
                     .pick_file(),
-                PickFor::Save => dialog.set_title("Save picture").add_filter("Pictures", &["png", "exr"]).save_file(),
+                PickFor::Save => dialog.set_title("Render image").add_filter("Images", &["png", "exr"]).save_file(),
                 PickFor::ObjectPhoto => {
                     dialog.set_title("Photo of the object").add_filter("Photos", PHOTOS).pick_file()
                 }
                 PickFor::ObjectMask => dialog.set_title("Mask of the photo").add_filter("Masks", PHOTOS).pick_file(),
                 PickFor::ObjectMesh => dialog.set_title("Mesh").add_filter("Meshes", &["obj", "ply"]).pick_file(),
                 PickFor::ObjectCamera => dialog.set_title("Camera").add_filter("Cameras", &["json", "txt"]).pick_file(),
-                PickFor::ObjectLight => dialog.set_title("Known light").add_filter("HDR maps", PHOTOS).pick_file(),
+                PickFor::ObjectLight => dialog.set_title("Known environment").add_filter("HDRIs", PHOTOS).pick_file(),
                 PickFor::Material => {
                     dialog.set_title("Measured material").add_filter("MERL tables", &["binary"]).pick_file()
                 }
@@ -147,9 +149,4 @@ impl Model {
             Ok(Done::Picked(purpose, path))
         });
     }
-}
-
-/// Title of the task that reads a light.
-fn title_of_light(path: &Path) -> String {
-    format!("Reading {}", path.display())
 }

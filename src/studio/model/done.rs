@@ -1,21 +1,17 @@
 //! What tasks beside the window bring back to it.
 
 use super::lights::ShelfLight;
-use super::viewing::{ENTANGLEMENT_TITLE, LAYERS_TITLE, STRIP_TITLE};
 use super::{LightName, PickFor, materials, object, opening, starting};
 use crate::error::Finding;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Titles of the tasks that mean nothing once another scene is open, or none. Others go on: what is read for the shelf,
-/// a picture or a result that is being saved.
-pub const OF_A_SCENE: [&str; 6] =
-    [opening::TITLE, opening::PREPARING_TITLE, starting::TITLE, LAYERS_TITLE, ENTANGLEMENT_TITLE, STRIP_TITLE];
-
 /// What a task brings.
 pub enum Done {
-    /// A scene was read and checked.
+    /// A scene was read.
     SceneRead(Box<opening::SceneRead>),
+    /// It was checked.
+    SceneChecked(Box<opening::SceneChecked>),
     /// The atlas and the tracer of a scene are made.
     Prepared(Box<opening::PreparedScene>),
     /// A run folder was read.
@@ -26,8 +22,8 @@ pub enum Done {
     LightRead(Box<ShelfLight>, Vec<Finding>),
     /// A folder or file was chosen in the system's dialog; `None` when it was closed.
     Picked(PickFor, Option<PathBuf>),
-    /// Files were saved.
-    Saved(Vec<PathBuf>),
+    /// Files were saved, and the seconds that each of their paths took.
+    Saved(Vec<PathBuf>, f64),
     /// The error of the photos was spread over the surface, for these maps.
     Layers(Arc<crate::material::MaterialMaps>, Box<crate::insight::surface_layers::SurfaceLayers>),
     /// The stage's view under every light of the shelf.

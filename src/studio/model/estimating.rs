@@ -4,6 +4,7 @@ use super::lights::LightName;
 use super::log::Message;
 use super::object::RelitObject;
 use super::object_form::{ObjectForm, is_photo};
+use super::tasks::TaskKind;
 use super::{Done, Model, Workspace, store};
 use crate::error::{Error, ErrorKind, Place};
 use crate::files::unrepeated;
@@ -12,10 +13,6 @@ use crate::light::Environment;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Title of the task that shows the object under the lights of the shelf.
-pub const RELIGHT_TITLE: &str = "Relighting the object";
-/// Title of the task that opens a result.
-pub const OPEN_TITLE: &str = "Opening the result";
 /// Lights that are written into a result folder, at most.
 const MOST_RELIGHTS: usize = 8;
 
@@ -25,7 +22,7 @@ impl Model {
         self.workspace = Workspace::Object;
         let is_unsaved = self.object.outcome.as_ref().is_some_and(|own| own.folder.is_none());
         if self.object.status.is_live() || is_unsaved {
-            let why = if is_unsaved { "the last result is not on disk yet" } else { "an estimation is in progress" };
+            let why = if is_unsaved { "the last result is not on disk yet" } else { "an estimation is running" };
             return self.log.error(
                 &Error::new(ErrorKind::Unsupported, format!("the result was not opened: {why}"))
                     .at(Place::File(folder))
@@ -34,7 +31,7 @@ impl Model {
         }
         self.log.dismiss();
         let folder = std::path::absolute(&folder).unwrap_or(folder);
-        self.tasks.spawn(OPEN_TITLE, move |context| {
+        self.tasks.spawn(TaskKind::OpeningResult, move |context| {
             context.tell("reading the result", 0.0);
             Ok(Done::ObjectOpened(Box::new(object::reopen(&folder)?)))
         });
@@ -59,7 +56,7 @@ impl Model {
             ..ObjectForm::default()
         };
         if !form.take_settings(&opened.outcome.parts.settings) {
-            self.log.note("Some settings of the result are not in this form: another estimation takes the usual ones");
+            self.log.note("Some settings of the result are not in this form: another estimation uses the defaults");
         }
         self.edits.object = form;
         self.history.restart(&self.edits);
@@ -97,7 +94,7 @@ impl Model {
         };
         match object::start(request, options) {
             Ok(job) => {
-                self.tasks.stop(RELIGHT_TITLE);
+                self.tasks.stop(&TaskKind::RelightingObject);
                 self.log.dismiss();
                 self.object.begin(job, settings.outer_loops);
             }
@@ -138,8 +135,8 @@ impl Model {
             .filter(|light| is_free(&light.name))
             .map(|light| (light.name.clone(), Arc::clone(&light.environment)))
             .collect();
-        self.tasks.stop(RELIGHT_TITLE);
-        self.tasks.spawn(RELIGHT_TITLE, move |context| {
+        self.tasks.stop(&TaskKind::RelightingObject);
+        self.tasks.spawn(TaskKind::RelightingObject, move |context| {
             let maps: Vec<&Environment> = lights.iter().map(|(_, light)| light.as_ref()).collect();
             context.tell("the object", 0.0);
             // Without its photos there is no object to show.
@@ -164,7 +161,7 @@ impl Model {
     pub fn save_object(&mut self, folder: PathBuf) {
         let Some(outcome) = self.object.outcome.clone() else { return };
         let relights = self.named_lights();
-        self.tasks.spawn("Saving the result", move |_| {
+        self.tasks.spawn(TaskKind::SavingResult, move |_| {
             outcome.parts.write(&folder, &relights)?;
             Ok(Done::ObjectSaved(folder))
         });

@@ -1,11 +1,12 @@
 //! The fit as the window knows it: commands out, events in, and in which state it is.
 
+use super::advance::Advance;
 use super::log::{Log, Message};
 use crate::error::{Error, Finding, Severity};
 use crate::export::RunFolder;
 use crate::fit::{FitSettings, LossRow};
 use crate::insight::report::data::ReportData;
-use crate::job::{Command, Event, JobHandle, Progress, Snapshot};
+use crate::job::{Command, Event, FinishingStage, JobHandle, Progress, Snapshot};
 use crate::scene::Scene;
 use std::sync::Arc;
 use std::time::Instant;
@@ -25,7 +26,7 @@ pub enum FitStatus {
     /// It was asked to stop and has not yet.
     Stopping,
     /// Steps are done; files and pictures are being made.
-    Finishing(String),
+    Finishing(FinishingStage),
     /// Everything is written.
     Finished,
     /// It ended early as asked.
@@ -39,21 +40,6 @@ impl FitStatus {
     pub fn is_live(&self) -> bool {
         use FitStatus::{Finishing, Paused, Pausing, Running, Stopping};
         matches!(self, Running | Pausing | Paused | Stopping | Finishing(_))
-    }
-
-    /// The state in a few words.
-    pub fn words(&self) -> String {
-        match self {
-            FitStatus::Idle => "No fit yet".into(),
-            FitStatus::Running => "Fitting".into(),
-            FitStatus::Pausing => "Pausing after this step".into(),
-            FitStatus::Paused => "Paused".into(),
-            FitStatus::Stopping => "Stopping".into(),
-            FitStatus::Finishing(what) => format!("Finishing: {what}"),
-            FitStatus::Finished => "Finished".into(),
-            FitStatus::Stopped => "Stopped".into(),
-            FitStatus::Failed(_) => "Failed".into(),
-        }
     }
 }
 
@@ -86,11 +72,13 @@ pub struct FitControl {
     pub was_refused: bool,
     /// When the last checkpoint was written.
     pub last_checkpoint: Option<Instant>,
+    /// How far the whole job is, finishing included.
+    pub advance: Advance,
 }
 
 impl FitControl {
     /// Takes over a job that was just started.
-    pub fn begin(&mut self, job: JobHandle, folder: RunFolder, settings: FitSettings) {
+    pub fn begin(&mut self, job: JobHandle, folder: RunFolder, settings: FitSettings, finishing_ratio: f64) {
         *self = FitControl {
             job: Some(job),
             status: FitStatus::Running,
@@ -99,6 +87,7 @@ impl FitControl {
             snapshot: self.snapshot.take(),
             settings_in_force: Some(settings.clone()),
             settings_confirmed: Some(settings),
+            advance: Advance::new(finishing_ratio),
             ..FitControl::default()
         };
     }
@@ -178,6 +167,7 @@ impl FitControl {
         for event in events.drain(..) {
             self.take_in(event, log);
         }
+        self.advance.tick(&self.status);
         if !self.status.is_live() {
             self.job = None;
         }
@@ -190,8 +180,8 @@ impl FitControl {
                 self.steps_total = steps_total;
                 self.losses.truncate(steps_done);
                 log.note(match steps_done {
-                    0 => format!("The fit begins: {steps_total} steps"),
-                    _ => format!("The fit goes on after step {steps_done} of {steps_total}"),
+                    0 => format!("Fit started ({steps_total} steps)"),
+                    _ => format!("Fit resumed after step {steps_done} of {steps_total}"),
                 });
             }
             Event::Progress(progress) => {
@@ -199,6 +189,7 @@ impl FitControl {
                     self.losses.push(progress.row.clone());
                 }
                 self.steps_total = progress.steps_total;
+                self.advance.stepped(&progress);
                 self.progress = Some(progress);
             }
             Event::Finding(finding) => log.add(Message::from(&finding)),
@@ -210,7 +201,7 @@ impl FitControl {
             Event::SettingsChanged(settings) => {
                 self.changes_sent = self.changes_sent.saturating_sub(1);
                 self.settings_confirmed = Some(*settings);
-                log.note("The fit goes on with the changed settings");
+                log.note("Fit continues with the changed settings");
             }
             Event::Refused(error) => {
                 self.changes_sent = self.changes_sent.saturating_sub(1);
@@ -219,16 +210,20 @@ impl FitControl {
                     &Finding::new(Severity::Warning, "refused", error.message()).at(error.place().clone()),
                 ));
             }
-            Event::Finishing(what) => self.status = FitStatus::Finishing(what),
+            Event::Finishing(stage) => {
+                self.status = FitStatus::Finishing(stage);
+                self.advance.finishing(stage);
+            }
             Event::Finished(data) => {
                 self.report = Some(Arc::from(data));
                 self.status = FitStatus::Finished;
+                self.advance.finished();
                 let folder = self.folder.as_ref().map(|folder| folder.path().display().to_string());
-                log.note(format!("The fit is done; its files are in {}", folder.unwrap_or_default()));
+                log.note(format!("Fit finished. Results: {}", folder.unwrap_or_default()));
             }
             Event::Stopped { steps_done } => {
                 self.status = FitStatus::Stopped;
-                log.note(format!("Stopped after {steps_done} steps; the checkpoint holds them"));
+                log.note(format!("Stopped after {steps_done} steps; the checkpoint keeps them"));
             }
             Event::Failed(error) => self.fail(&error, log),
         }

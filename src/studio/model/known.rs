@@ -130,9 +130,9 @@ impl Model {
     /// Why nothing is told of the texels, as a sentence without a full stop.
     pub fn why_untold(&self) -> &'static str {
         match self.method_of_maps() {
-            Some(Method::Solver) => "Told when the solver has made its maps, at the end of the fit",
-            Some(_) => "Adam does not tell this: choose the method solver and fit again",
-            None => "Told by a fit with the method solver, at its end",
+            Some(Method::Solver) => "Available when the solver has made its maps, at the end of the fit",
+            Some(_) => "Not available with Adam: choose the method Solver and fit again",
+            None => "Available at the end of a fit with the method Solver",
         }
     }
 
@@ -140,10 +140,10 @@ impl Model {
     pub fn why_light_is_untold(&self) -> &'static str {
         match self.method_of_maps() {
             Some(Method::Solver) => {
-                "Told with the first round on the light; a fit that was taken up after its rounds does not say"
+                "Available after the first iteration on the environment; not after a resume past those iterations"
             }
-            Some(_) => "Adam does not tell this: choose the method solver and fit again",
-            None => "Told by a fit with the method solver",
+            Some(_) => "Not available with Adam: choose the method Solver and fit again",
+            None => "Available with the method Solver",
         }
     }
 

@@ -34,9 +34,9 @@ impl LightName {
     /// The name on screen.
     pub fn label(&self) -> String {
         match self {
-            LightName::Fitted => "Fitted light".into(),
-            LightName::Truth => "True light".into(),
-            LightName::Unseen => "Light no photo shows".into(),
+            LightName::Fitted => "Estimated environment".into(),
+            LightName::Truth => "Ground-truth environment".into(),
+            LightName::Unseen => "Novel environment (ground truth)".into(),
             LightName::Sky(name) => match name.as_str() {
                 "noon" => "Noon sky".into(),
                 "evening" => "Evening sky".into(),

@@ -1,5 +1,6 @@
 //! What was noticed, newest last: findings, errors, what was done.
 
+use super::tasks::TaskKind;
 use crate::error::{Error, Finding, Place, Severity};
 use std::time::Instant;
 
@@ -30,6 +31,14 @@ impl Message {
             remedy: String::new(),
             place: Place::Nowhere,
             at: Instant::now(),
+        }
+    }
+
+    /// The sentence and what can be done, for the clipboard.
+    pub fn text_to_copy(&self) -> String {
+        match self.remedy.as_str() {
+            "" => self.sentence(),
+            remedy => format!("{}\nFix: {remedy}", self.sentence()),
         }
     }
 
@@ -77,6 +86,8 @@ pub struct Log {
     messages: Vec<Message>,
     /// The error that stands across the window until it is dismissed.
     banner: Option<Message>,
+    /// The task whose error that is.
+    banner_task: Option<TaskKind>,
     /// Messages since the panel was last looked at.
     pub unread: usize,
 }
@@ -87,10 +98,10 @@ const MOST_MESSAGES: usize = 2000;
 impl Log {
     /// Adds a message; an error also goes to the banner.
     pub fn add(&mut self, message: Message) {
+        // An error stands across the window: it need not be looked for.
         if message.is_error {
-            self.banner = Some(message.clone());
-        }
-        if message.severity > Severity::Note {
+            (self.banner, self.banner_task) = (Some(message.clone()), None);
+        } else if message.severity > Severity::Note {
             self.unread += 1;
         }
         self.messages.push(message);
@@ -107,6 +118,25 @@ impl Log {
     /// Adds an error.
     pub fn error(&mut self, error: &Error) {
         self.add(Message::from(error));
+    }
+
+    /// Adds the error of a task.
+    pub fn error_of(&mut self, error: &Error, task: &TaskKind) {
+        self.error(error);
+        self.banner_task = Some(task.clone());
+    }
+
+    /// A task has worked: its error of before is past.
+    pub fn worked(&mut self, task: &TaskKind) {
+        let is_same = |own: &TaskKind| std::mem::discriminant(own) == std::mem::discriminant(task);
+        if self.banner_task.as_ref().is_some_and(is_same) {
+            self.dismiss();
+        }
+    }
+
+    /// What is told of a scene that was closed need not be looked at any more.
+    pub fn scene_was_closed(&mut self) {
+        self.unread = 0;
     }
 
     /// All messages, oldest first.
@@ -126,7 +156,7 @@ impl Log {
 
     /// Dismisses the error.
     pub fn dismiss(&mut self) {
-        self.banner = None;
+        (self.banner, self.banner_task) = (None, None);
     }
 
     /// Forgets all messages.
@@ -149,7 +179,18 @@ mod tests {
         }
         assert!(log.messages().len() <= MOST_MESSAGES);
         assert_eq!(log.banner().map(Message::sentence).as_deref(), Some("The mesh is not there"));
+        assert_eq!(log.unread, 0, "an error that stands across the window need not be looked for");
         log.dismiss();
+        assert!(log.banner().is_none());
+    }
+
+    #[test]
+    fn the_error_of_a_task_goes_when_the_same_task_works() {
+        let mut log = Log::default();
+        log.error_of(&Error::new(ErrorKind::Missing, "no scene there"), &TaskKind::Opening);
+        log.worked(&TaskKind::Saving);
+        assert!(log.banner().is_some());
+        log.worked(&TaskKind::Opening);
         assert!(log.banner().is_none());
     }
 }

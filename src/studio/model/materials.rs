@@ -1,6 +1,7 @@
 //! The library of materials as the window knows it: thumbnails, the map, and what was chosen on it.
 
 use super::lights::LightName;
+use super::tasks::TaskKind;
 use super::{Done, Model};
 use crate::image::RgbImage;
 use crate::job::materials::{MaterialShown, Materials, OpenedMaterial};
@@ -9,10 +10,6 @@ use crate::studio::layout::Panel;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Title of the task that reads the library and draws its thumbnails.
-pub const DRAWING_TITLE: &str = "Drawing the materials";
-/// Title of the task that draws the chosen material.
-pub const SHOWING_TITLE: &str = "Drawing the material";
 /// Side of a thumbnail in pixels.
 pub const THUMBNAIL_SIDE: usize = 72;
 
@@ -64,11 +61,11 @@ impl Model {
     /// Reads the library and draws its thumbnails, unless that is done or going on.
     pub fn load_materials(&mut self) {
         self.materials.was_asked = true;
-        if !self.materials.thumbnails.is_empty() || self.tasks.is_running(DRAWING_TITLE) {
+        if !self.materials.thumbnails.is_empty() || self.tasks.is_running(&TaskKind::DrawingMaterials) {
             return;
         }
         let library = self.materials.library.clone();
-        self.tasks.spawn(DRAWING_TITLE, move |context| {
+        self.tasks.spawn(TaskKind::DrawingMaterials, move |context| {
             let library = match library {
                 Some(library) => library,
                 None => Arc::new(Materials::shipped()?),
@@ -94,7 +91,7 @@ impl Model {
 
     /// Reads a measured table, a `.binary` file or a result of object mode, puts it before the library and chooses it.
     pub fn open_material(&mut self, path: PathBuf) {
-        self.tasks.spawn(format!("Reading {}", path.display()), move |_| {
+        self.tasks.spawn(TaskKind::ReadingMaterial(path.clone()), move |_| {
             let material = Arc::new(OpenedMaterial::read(&path)?);
             let thumbnail = Arc::new(material.thumbnail(THUMBNAIL_SIDE));
             Ok(Done::MaterialOpened(OpenedTile { material, thumbnail }))
@@ -133,8 +130,8 @@ impl Model {
         let Some(choice) = self.materials.choice.clone() else { return };
         let light = self.materials.light.as_ref().and_then(|name| self.shelf.find(name));
         let light = light.map(|light| Arc::clone(&light.environment));
-        self.tasks.stop(SHOWING_TITLE);
-        self.tasks.spawn(SHOWING_TITLE, move |_| {
+        self.tasks.stop(&TaskKind::DrawingMaterial);
+        self.tasks.spawn(TaskKind::DrawingMaterial, move |_| {
             let shown = match &choice {
                 Choice::Opened(material) => material.shown(light.as_deref()),
                 Choice::Place { library, parts, .. } => library.shown(parts, light.as_deref())?,

@@ -1,17 +1,20 @@
 //! What the window knows, without any widget.
 //!
-//! [`Model`] joins the parts: [`project`] is what is open, [`fit`] the job, [`known`] what the solver is sure of,
+//! [`Model`] joins the parts: [`project`] is what is open, [`fit`] the job and [`advance`] how far it is, [`phase`] the one
+//! state that labels follow, [`known`] what the solver is sure of,
 //! [`edits`] what undo covers, [`lights`] the shelf, [`tasks`] work beside the window and [`done`] what it brings, [`log`]
 //! what was noticed, [`store`] what is remembered. [`opening`] and [`starting`] are how a folder becomes a project and a
 //! project a fit, [`viewing`] where the eye stands, [`dialogs`] what is asked in windows over the window. In object mode
 //! [`object_form`] is what is asked for, [`object`] the estimation, [`estimating`] how one becomes the other, [`materials`]
 //! the library. Panels read the model and queue acts; they change nothing but [`Edits`] directly.
 
+pub mod advance;
 pub mod dialogs;
 pub mod done;
 pub mod edits;
 pub mod estimating;
 pub mod fit;
+pub mod framing;
 pub mod known;
 pub mod lights;
 pub mod log;
@@ -19,6 +22,7 @@ pub mod materials;
 pub mod object;
 pub mod object_form;
 pub mod opening;
+pub mod phase;
 pub mod project;
 pub mod starting;
 pub mod store;
@@ -30,6 +34,7 @@ pub use done::Done;
 pub use edits::Edits;
 pub use fit::{FitControl, FitStatus};
 pub use lights::LightName;
+pub use phase::Phase;
 pub use project::Project;
 
 use crate::error::{Place, Result};
@@ -43,7 +48,7 @@ use log::Log;
 use std::path::PathBuf;
 use std::sync::Arc;
 use store::{Preferences, Store};
-use tasks::{Tasks, Wake};
+use tasks::{TaskKind, Tasks, Wake};
 
 /// Which half of the studio the window shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -120,6 +125,8 @@ pub struct Model {
     pub tasks: Tasks<Done>,
     /// What was noticed.
     pub log: Log,
+    /// Whether the fit starts by itself once the scene is prepared.
+    pub start_is_queued: bool,
     /// What is remembered.
     pub preferences: Preferences,
     /// Where it is remembered.
@@ -134,6 +141,10 @@ pub struct Model {
     pub cursor: Option<Cursor>,
     /// The window over the window.
     pub dialog: Dialog,
+    /// Whether the guide is open.
+    pub guide: bool,
+    /// Panels that are in front, as last drawn.
+    pub visible_panels: Vec<Panel>,
     /// Acts to be done after the panels are drawn.
     pub acts: Vec<Act>,
     /// Panel to bring to the front.
@@ -186,6 +197,7 @@ impl Model {
             history,
             tasks: Tasks::new(Arc::clone(&wake)),
             log,
+            start_is_queued: false,
             preferences,
             store,
             shelf: Shelf::built_in(),
@@ -193,6 +205,8 @@ impl Model {
             switches: StageSwitches::default(),
             cursor: None,
             dialog: Dialog::None,
+            guide: false,
+            visible_panels: Vec::new(),
             acts: Vec::new(),
             activate: None,
             go_to: None,
@@ -221,23 +235,37 @@ impl Model {
     /// Takes in what tasks and the job brought. True when something changed.
     pub fn poll(&mut self) -> bool {
         let (mut changed, mut is_another_scene) = (false, false);
-        for (title, outcome) in self.tasks.finished() {
+        for (kind, outcome) in self.tasks.finished() {
             changed = true;
-            if is_another_scene && done::OF_A_SCENE.contains(&title.as_str()) {
+            if is_another_scene && kind.is_of_scene() {
                 // It ended in the same moment, and is of the scene that was open before.
                 continue;
             }
             is_another_scene |= matches!(outcome, Ok(Done::SceneRead(_) | Done::RunOpened(_)));
             match outcome {
-                Ok(done) => self.take_in(done),
-                Err(error) if error.kind() == crate::ErrorKind::Stopped => self.log.note(format!("Stopped: {title}")),
+                Ok(done) => {
+                    // What failed before has worked now.
+                    self.log.worked(&kind);
+                    self.take_in(done);
+                }
                 Err(error) => {
-                    self.log.error(&error);
-                    self.forget_light(&title);
+                    if matches!(kind, TaskKind::Checking | TaskKind::Preparing) {
+                        self.start_is_queued = false;
+                    }
+                    match error.kind() {
+                        crate::ErrorKind::Stopped => self.log.note(format!("Cancelled: {}", kind.words())),
+                        _ => {
+                            self.log.error_of(&error, &kind);
+                            self.forget_light(&kind);
+                        }
+                    }
                 }
             }
         }
         changed |= self.fit.poll(&mut self.log);
+        if let Some(ratio) = self.fit.advance.learned_ratio() {
+            self.preferences.finishing_ratio = 0.5 * (self.preferences.finishing_ratio + ratio);
+        }
         changed |= self.poll_object();
         self.take_back_refused();
         self.remember_run();
@@ -247,6 +275,7 @@ impl Model {
     fn take_in(&mut self, done: Done) {
         match done {
             Done::SceneRead(read) => self.scene_was_read(*read),
+            Done::SceneChecked(checked) => self.scene_was_checked(*checked),
             Done::Prepared(prepared) => self.scene_was_prepared(*prepared),
             Done::RunOpened(run) => self.run_was_opened(*run),
             Done::FitStarted(started) => self.fit_was_started(*started),
@@ -257,16 +286,17 @@ impl Model {
                 {
                     self.preferences.lights.push(path.clone());
                 }
-                self.log.note(format!("{} is on the shelf", light.name.label()));
+                self.log.note(format!("{} was added to the environments", light.name.label()));
                 self.shelf.put(*light);
             }
             Done::Picked(_, None) => {}
             Done::Picked(purpose, Some(path)) => self.picked(purpose, path),
-            Done::Saved(paths) => {
+            Done::Saved(paths, seconds_per_path) => {
+                self.preferences.seconds_per_path = Some(seconds_per_path).filter(|own| own.is_finite() && *own > 0.0);
                 let first = paths.first().map(|path| path.display().to_string()).unwrap_or_default();
                 self.log.note(match paths.len() {
                     0 | 1 => format!("Saved {first}"),
-                    count => format!("Saved {count} pictures, the first is {first}"),
+                    count => format!("Saved {count} images, the first is {first}"),
                 });
             }
             Done::Layers(maps, layers) => self.layers_were_measured(&maps, *layers),
@@ -325,7 +355,7 @@ impl Model {
         self.preferences.display = self.edits.display;
         let outcome: Result<()> = self.store.write(&self.preferences);
         if let Err(error) = outcome {
-            self.log.note(format!("Settings could not be remembered: {error}"));
+            self.log.note(format!("Preferences could not be saved: {error}"));
             // Once is enough: from here on nothing is remembered.
             self.store = Store::at(None);
         }
@@ -338,14 +368,13 @@ impl Model {
             return format!("{}{name} - Patina", self.object.status.words());
         }
         let Some(project) = &self.project else { return "Patina".into() };
-        match &self.fit.status {
-            FitStatus::Running | FitStatus::Pausing | FitStatus::Paused if self.fit.steps_total > 0 => {
-                let step = self.fit.losses.last().map_or(0, |row| row.step);
-                let share = 100 * step / self.fit.steps_total.max(1);
-                format!("{share} % {} - {} - Patina", self.fit.status.words().to_lowercase(), project.title)
+        match self.phase() {
+            Phase::Ready => format!("{} - Patina", project.title),
+            phase if phase.is_live() => {
+                let words = phase.words().to_lowercase();
+                format!("{} % {words} - {} - Patina", self.fit.advance.percent(), project.title)
             }
-            FitStatus::Idle => format!("{} - Patina", project.title),
-            status => format!("{} - {} - Patina", status.words(), project.title),
+            phase => format!("{} - {} - Patina", phase.words(), project.title),
         }
     }
 }

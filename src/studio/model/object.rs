@@ -35,7 +35,7 @@ impl ObjectStatus {
     /// The state in a word or two.
     pub fn words(&self) -> &'static str {
         match self {
-            ObjectStatus::Idle => "Nothing estimated yet",
+            ObjectStatus::Idle => "Not started",
             ObjectStatus::Running => "Estimating",
             ObjectStatus::Stopping => "Stopping",
             ObjectStatus::Finished => "Finished",
@@ -158,7 +158,7 @@ impl ObjectControl {
                 return true;
             }
             ObjectNews::Ended(None) => {
-                log.note("The estimation was stopped before its first round: there is nothing to keep");
+                log.note("The estimation was stopped before its first round: no result");
                 self.status = ObjectStatus::Ended;
             }
             ObjectNews::Ended(Some(outcome)) => {
@@ -204,7 +204,7 @@ fn told(outcome: &ObjectOutcome) -> String {
     let estimate = &outcome.parts.estimate;
     let place = outcome.folder.as_ref().map_or("not written yet".into(), |folder| folder.display().to_string());
     format!(
-        "Began as {}; picture within {:.3} in logarithms; {:.0} s: {place}",
+        "Best initialization: {}; log-RMSE {:.3}; {:.0} s: {place}",
         estimate.start, estimate.picture_log_rmse, estimate.seconds
     )
 }

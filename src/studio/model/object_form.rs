@@ -22,9 +22,9 @@ pub enum Effort {
 impl Effort {
     /// All of them with their names and what they mean.
     pub const NAMED: [(Effort, &str, &str); 3] = [
-        (Effort::Quick, "Quick", "A light of 32 rows, 1024 pixels, 6 rounds: a first look"),
-        (Effort::Usual, "Usual", "A light of 64 rows, 2048 pixels, 8 rounds"),
-        (Effort::Released, "As released", "The schedule released with the paper; takes long"),
+        (Effort::Quick, "Draft", "Environment of 64 x 32, 1024 pixels, 6 rounds: a first look"),
+        (Effort::Usual, "Standard", "Environment of 128 x 64, 2048 pixels, 8 rounds"),
+        (Effort::Released, "Published", "The schedule released with the paper; takes long"),
     ];
 
     /// Its settings.

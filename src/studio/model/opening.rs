@@ -1,10 +1,10 @@
 //! From a path to a project: reading, checking and preparing happen beside the window, step by step, and each step shows
 //! what it brought. What is open stays until another scene was read.
 
-use super::done::OF_A_SCENE;
 use super::lights::{LightName, ShelfLight};
 use super::log::Message;
 use super::project::Atlas;
+use super::tasks::TaskKind;
 use super::{Cursor, Done, Edits, Model, Project, StageSwitches, Workspace};
 use crate::error::{Finding, Severity};
 use crate::export::RunFolder;
@@ -16,36 +16,44 @@ use crate::job::materials::OpenedMaterial;
 use crate::job::open::{self, OpenStage, OpenedRun, OpenedScene, PathKind};
 use crate::job::prepare::{Prepared, RunSettings, prepare_with};
 use crate::object::result_read;
+use crate::render::Surface;
 use crate::scene::demo::DemoSettings;
-use crate::scene::{Mesh, ReadSettings, Scene};
+use crate::scene::{Mesh, PixelState, ReadSettings, Scene};
 use crate::studio::stage::eye::OrbitEye;
+use rayon::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Title of the task that opens a scene or run.
-pub const TITLE: &str = "Opening";
-/// Title of the task that makes the atlas of a scene that was read.
-pub const PREPARING_TITLE: &str = "Preparing";
 /// Longest side of the small picture of a photo, in pixels.
 const THUMBNAIL_SIDE: usize = 128;
+/// Pixels along the shorter side of a photo whose rays are asked whether they meet the surface.
+const LOOKED_AT_A_SIDE: usize = 64;
 
-/// A scene that was read and checked.
+/// A scene that was read; it is shown before it is checked.
 pub struct SceneRead {
     path: Option<PathBuf>,
     settings: RunSettings,
+    /// What suits the scene as far as its photos alone say; the check says the rest.
     suited: Option<Suited>,
     scene: Arc<Scene>,
     mesh: Arc<Mesh>,
-    findings: Vec<Finding>,
     timings: Vec<StageTime>,
     thumbnails: Vec<Arc<RgbImage>>,
     clipped_shares: Vec<f32>,
+}
+
+/// What the check of a scene says.
+pub struct SceneChecked {
+    suited: Suited,
+    findings: Vec<Finding>,
+    timings: Vec<StageTime>,
 }
 
 /// A scene with its atlas.
 pub struct PreparedScene {
     prepared: Prepared,
     atlas: Atlas,
+    clipped_shares: Vec<f32>,
 }
 
 /// A run that was read.
@@ -79,25 +87,25 @@ impl Model {
     /// read: a path that leads to neither takes nothing away.
     pub fn open_with(&mut self, path: PathBuf, read: ReadSettings) {
         self.workspace = Workspace::Scene;
-        self.tasks.stop(TITLE);
+        self.tasks.stop(&TaskKind::Opening);
         self.log.dismiss();
         let path = std::path::absolute(&path).unwrap_or(path);
         let mut settings = RunSettings { scene: path.clone(), read, ..RunSettings::default() };
-        self.tasks.spawn(TITLE, move |context| {
+        self.tasks.spawn(TaskKind::Opening, move |context| {
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
             context.tell("looking at the folder", 0.0);
             match open::kind_of(&path)? {
                 PathKind::Run => {
                     let folder = RunFolder::open(&path)?;
                     let run = open::view_run(&folder, None, &context.stop, &tell)?;
-                    context.tell("small pictures", 0.0);
+                    context.tell("thumbnails", 0.0);
                     Ok(Done::RunOpened(Box::new(RunRead::new(folder, run))))
                 }
                 PathKind::Scene => {
-                    let opened = open::open_scene(&path, &settings.read, &context.stop, &tell)?;
+                    let opened = open::read_unchecked(&path, &settings.read, &context.stop, &tell)?;
                     let suited = Suited::to(&opened.scene, &opened.report);
                     settings.fit = suited.resolve(&settings.fit, &[]);
-                    context.tell("small pictures", 0.0);
+                    context.tell("thumbnails", 0.0);
                     let read = SceneRead::new(Some(path), settings, opened);
                     Ok(Done::SceneRead(Box::new(SceneRead { suited: Some(suited), ..read })))
                 }
@@ -108,8 +116,8 @@ impl Model {
     /// Photographs and opens the built-in scene.
     pub fn open_demo(&mut self) {
         self.workspace = Workspace::Scene;
-        self.tasks.stop(TITLE);
-        self.tasks.spawn(TITLE, move |context| {
+        self.tasks.stop(&TaskKind::Opening);
+        self.tasks.spawn(TaskKind::Opening, move |context| {
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
             let settings = demo::settings();
             let opened = open::open_demo(&DemoSettings::default(), &context.stop, &tell)?;
@@ -119,8 +127,8 @@ impl Model {
 
     /// Opens a scene that was made in code.
     pub fn open_made(&mut self, scene: Scene, settings: RunSettings) {
-        self.tasks.stop(TITLE);
-        self.tasks.spawn(TITLE, move |_| {
+        self.tasks.stop(&TaskKind::Opening);
+        self.tasks.spawn(TaskKind::Opening, move |_| {
             let opened = OpenedScene { scene, report: Default::default(), timings: Vec::new() };
             Ok(Done::SceneRead(Box::new(SceneRead::new(None, settings, opened))))
         });
@@ -141,7 +149,9 @@ impl Model {
 
     /// Goes back to the first page. A fit in progress is stopped; its checkpoint keeps what was done.
     pub fn close(&mut self) {
-        OF_A_SCENE.iter().for_each(|title| self.tasks.stop(title));
+        self.tasks.stop_those_of_scene();
+        self.start_is_queued = false;
+        self.log.scene_was_closed();
         self.fit.forget();
         self.project = None;
         self.cursor = None;
@@ -153,17 +163,12 @@ impl Model {
 
     pub(super) fn scene_was_read(&mut self, read: SceneRead) {
         self.close();
-        self.note_findings(&read.findings);
         if let Some(path) = &read.path {
             self.preferences.remember(path, false);
         }
         let views = read.scene.views.len();
         self.edits.fit = read.settings.fit.clone();
-        if let Some(suited) = &read.suited {
-            let told = suited.told(&FitSettings::default(), &self.edits.fit);
-            told.into_iter().for_each(|line| self.log.note(line));
-        }
-        self.eye = OrbitEye::around(bounds(&read.mesh));
+        self.eye = OrbitEye::around(super::framing::subject(&read.mesh, Some(&read.scene)));
         if let Some(truth) = &read.scene.truth {
             let light = Arc::new(truth.environment.clone());
             self.shelf.put(ShelfLight::new(LightName::Truth, light));
@@ -171,8 +176,7 @@ impl Model {
                 self.shelf.put(ShelfLight::new(LightName::Unseen, Arc::new(unseen.environment.clone())));
             }
         }
-        let (scene, settings) = (Arc::clone(&read.scene), read.settings.clone());
-        let (findings, timings) = (read.findings.clone(), read.timings.clone());
+        let is_made = read.suited.is_none();
         self.project = Some(Project {
             title: read.scene.name.clone(),
             path: read.path,
@@ -182,7 +186,7 @@ impl Model {
             surface: None,
             suited: read.suited,
             settings: read.settings,
-            findings: read.findings,
+            default_fit: is_made.then(|| self.edits.fit.clone()),
             timings: read.timings,
             view_errors: vec![None; views],
             clipped_shares: read.clipped_shares,
@@ -191,11 +195,63 @@ impl Model {
         });
         self.history.restart(&self.edits);
         self.first_light();
-        self.tasks.spawn(PREPARING_TITLE, move |context| {
+        match is_made {
+            // What was made in code is as it should be.
+            true => self.prepare(),
+            false => self.check(),
+        }
+    }
+
+    /// Checks the scene that was read, beside the window.
+    fn check(&mut self) {
+        let Some(project) = &self.project else { return };
+        let Some(scene) = project.scene.clone() else { return };
+        let mut timings = project.timings.clone();
+        self.tasks.spawn(TaskKind::Checking, move |context| {
+            let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
+            let report = open::check(&scene, &mut timings, &context.stop, &tell)?;
+            let suited = Suited::to(&scene, &report);
+            Ok(Done::SceneChecked(Box::new(SceneChecked { suited, findings: report.findings, timings })))
+        });
+    }
+
+    /// Takes in what the check says: what was set meanwhile stays, all else becomes what suits the scene.
+    pub(super) fn scene_was_checked(&mut self, checked: SceneChecked) {
+        let Some(project) = &mut self.project else { return };
+        let chosen = self.edits.fit.differences(&project.settings.fit);
+        let chosen: Vec<String> = chosen.into_iter().map(|(name, ..)| name).collect();
+        let settings = checked.suited.resolve(&FitSettings::default(), &[]);
+        project.settings.fit = settings.clone();
+        let asked = FitSettings { method: settings.method, ..FitSettings::default() };
+        let suits = checked.suited.resolve(&asked, &chosen);
+        if let Ok(joined) = suits.with(&chosen, &self.edits.fit) {
+            self.edits.fit = joined;
+        }
+        for line in checked.suited.told(&FitSettings::default(), &settings) {
+            self.log.note(line);
+        }
+        project.suited = Some(checked.suited);
+        project.findings.clone_from(&checked.findings);
+        project.timings = checked.timings;
+        if chosen.is_empty() {
+            self.history.restart(&self.edits);
+        }
+        self.note_findings(&checked.findings);
+        self.prepare();
+    }
+
+    /// Makes atlas and tracer beside the window.
+    fn prepare(&mut self) {
+        let Some(project) = &self.project else { return };
+        let Some(scene) = project.scene.clone() else { return };
+        let settings = project.settings.clone();
+        let (findings, timings) = (project.findings.clone(), project.timings.clone());
+        self.tasks.spawn(TaskKind::Preparing, move |context| {
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
             let prepared = prepare_with(scene, findings, &settings, timings, &context.stop, &tell)?;
             let atlas = Atlas::of(Arc::clone(&prepared.surface));
-            Ok(Done::Prepared(Box::new(PreparedScene { prepared, atlas })))
+            let clipped_shares = clipped_shares(&prepared.scene, &prepared.surface);
+            Ok(Done::Prepared(Box::new(PreparedScene { prepared, atlas, clipped_shares })))
         });
     }
 
@@ -205,16 +261,20 @@ impl Model {
         project.findings = done.prepared.findings;
         project.timings = done.prepared.timings;
         project.take_atlas(done.atlas);
+        project.clipped_shares = done.clipped_shares;
         project.quality.clone_from(&done.prepared.quality);
         if let Some(quality) = &done.prepared.quality {
             self.log.note(format!(
-                "The atlas has {} charts and fills {:.0} % of its square",
+                "UV atlas: {} islands, {:.0} % packed",
                 quality.charts,
                 100.0 * quality.share_of_area
             ));
         }
         let findings: Vec<Finding> = self.project.as_ref().map_or(Vec::new(), |own| own.findings[known..].to_vec());
         self.note_findings(&findings);
+        if std::mem::take(&mut self.start_is_queued) {
+            self.start_fit();
+        }
     }
 
     pub(super) fn run_was_opened(&mut self, read: RunRead) {
@@ -223,7 +283,7 @@ impl Model {
         self.note_findings(&run.findings);
         self.preferences.remember(folder.path(), true);
         self.edits.fit = run.settings.fit.clone();
-        self.eye = OrbitEye::around(bounds(&atlas.mesh));
+        self.eye = OrbitEye::around(super::framing::subject(&atlas.mesh, run.scene.as_deref()));
         let views = run.scene.as_ref().map_or(0, |scene| scene.views.len());
         let environment = Arc::new(run.environment);
         self.shelf.put(ShelfLight::new(LightName::Fitted, Arc::clone(&environment)));
@@ -236,6 +296,8 @@ impl Model {
         self.fit.report = run.report.map(Arc::new);
         if self.fit.report.is_some() {
             self.fit.status = super::FitStatus::Finished;
+        } else if run.can_resume {
+            self.fit.status = super::FitStatus::Stopped;
         }
         let title = folder.path().file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         let mut project = Project {
@@ -258,7 +320,7 @@ impl Model {
         self.project = Some(project);
         self.history.restart(&self.edits);
         if self.fit.report.is_none() {
-            self.log.note("This run has not ended: Start goes on from its checkpoint");
+            self.log.note("This run is unfinished: Start resumes it from its checkpoint");
         }
     }
 
@@ -294,7 +356,7 @@ impl Model {
 
 impl SceneRead {
     fn new(path: Option<PathBuf>, settings: RunSettings, opened: OpenedScene) -> Self {
-        let OpenedScene { scene, report, timings } = opened;
+        let OpenedScene { scene, timings, .. } = opened;
         let mut mesh = scene.mesh.clone();
         if mesh.normals.len() != mesh.positions.len() {
             mesh.compute_normals();
@@ -306,7 +368,6 @@ impl SceneRead {
             settings,
             scene: Arc::new(scene),
             mesh: Arc::new(mesh),
-            findings: report.findings,
             timings,
             thumbnails,
             clipped_shares,
@@ -317,16 +378,18 @@ impl SceneRead {
 impl RunRead {
     fn new(folder: RunFolder, run: OpenedRun) -> Self {
         let atlas = Atlas::of(Arc::clone(&run.surface));
-        let (thumbnails, clipped_shares) = run.scene.as_deref().map(small_pictures).unwrap_or_default();
+        let (thumbnails, _) = run.scene.as_deref().map(small_pictures).unwrap_or_default();
+        let of_rays = |scene: &Scene| clipped_shares(scene, &run.surface);
+        let clipped_shares = run.scene.as_deref().map(of_rays).unwrap_or_default();
         RunRead { folder, run, atlas, thumbnails, clipped_shares }
     }
 }
 
 /// A small picture of each photo, and the share of each photo's surface pixels that are clipped.
 fn small_pictures(scene: &Scene) -> (Vec<Arc<RgbImage>>, Vec<f32>) {
-    let shares = scene.views.iter().map(|view| {
+    let shares = scene.views.par_iter().map(|view| {
         let surface = view.states.pixels().iter().filter(|state| state.is_surface()).count();
-        let clipped = view.states.pixels().iter().filter(|state| state.is_clipped()).count();
+        let clipped = view.states.pixels().iter().filter(|state| **state == PixelState::SurfaceClipped).count();
         clipped as f32 / surface.max(1) as f32
     });
     let shares = shares.collect();
@@ -334,7 +397,29 @@ fn small_pictures(scene: &Scene) -> (Vec<Arc<RgbImage>>, Vec<f32>) {
         let (photo, size) = (&view.photo, (view.photo.width(), view.photo.height()));
         Arc::new(crate::image::area::thumbnail_of(size, |row, column| photo.radiance(row, column), THUMBNAIL_SIDE))
     };
-    (scene.views.iter().map(small).collect(), shares)
+    (scene.views.par_iter().map(small).collect(), shares)
+}
+
+/// The share of clipped pixels among those whose rays meet the surface, of each photo: without a mask only rays tell the
+/// object from a bright sky. Looks at a grid of pixels.
+fn clipped_shares(scene: &Scene, surface: &Surface) -> Vec<f32> {
+    let of_view = |view: &crate::scene::View| {
+        let states = &view.states;
+        let every = (states.width().min(states.height()) / LOOKED_AT_A_SIDE).max(1);
+        let (mut met, mut clipped) = (0usize, 0usize);
+        for row in (every / 2..states.height()).step_by(every) {
+            for column in (every / 2..states.width()).step_by(every) {
+                let state = states[(row, column)];
+                let place = glam::Vec2::new(column as f32 + 0.5, row as f32 + 0.5);
+                if state.is_surface() && surface.closest(&view.camera.ray_through(place)).is_some() {
+                    met += 1;
+                    clipped += usize::from(state.is_clipped());
+                }
+            }
+        }
+        clipped as f32 / met.max(1) as f32
+    };
+    scene.views.par_iter().map(of_view).collect()
 }
 
 /// Root mean square errors of a report, in the order of a scene's views.

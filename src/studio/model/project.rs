@@ -4,7 +4,7 @@ use super::known::Known;
 use super::lights::LightName;
 use crate::atlas::{AtlasQuality, chart_borders};
 use crate::error::Finding;
-use crate::fit::Suited;
+use crate::fit::{FitSettings, Suited};
 use crate::image::{GreyImage, RgbImage};
 use crate::insight::cursor::UvIndex;
 use crate::insight::report::data::StageTime;
@@ -56,6 +56,8 @@ pub struct Project {
     pub surface: Option<Arc<Surface>>,
     /// What suits the scene where nobody chose; `None` for runs and for scenes made in code.
     pub suited: Option<Suited>,
+    /// Settings a scene made in code came with; `None` for others.
+    pub default_fit: Option<FitSettings>,
     /// Settings beyond those of the fit: how it was read, how the atlas is made.
     pub settings: RunSettings,
     /// How good the atlas is, where it was made here.

@@ -1,6 +1,6 @@
 //! From a project to a fit, and settings that change on the way.
 
-use super::viewing::{ENTANGLEMENT_TITLE, LAYERS_TITLE, STRIP_TITLE};
+use super::tasks::TaskKind;
 use super::{Done, FitStatus, Model, store};
 use crate::error::Result;
 use crate::export::RunFolder;
@@ -12,9 +12,6 @@ use crate::render::Surface;
 use crate::studio::layout::Panel;
 use std::path::PathBuf;
 use std::sync::Arc;
-
-/// Title of the task that starts a fit.
-pub const TITLE: &str = "Starting the fit";
 
 /// A job that was started.
 pub struct Started {
@@ -51,7 +48,11 @@ impl Model {
 
     /// Starts a fit of what is open, or goes on with one from its checkpoint.
     pub fn start_fit(&mut self) {
-        match self.fit.folder.clone().filter(|_| crate::studio::panel::fit::can_go_on(self)) {
+        if self.project.as_ref().is_some_and(|project| project.surface.is_none()) && self.is_preparing() {
+            self.start_is_queued = true;
+            return self.log.note("The fit starts automatically when the scene is ready");
+        }
+        match self.fit.folder.clone().filter(|_| self.can_resume()) {
             Some(folder) => self.go_on_with(folder),
             None => self.start_anew(),
         }
@@ -68,7 +69,7 @@ impl Model {
         // The atlas keeps its charts apart at the size it was made for; other map sizes need another atlas.
         let same_atlas = project.settings.fit.map_size == settings.fit.map_size || project.is_run;
         let options = self.job_options();
-        self.tasks.spawn(TITLE, move |context| {
+        self.tasks.spawn(TaskKind::Starting, move |context| {
             let folder = RunFolder::create(&path)?;
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
             let prepared = match same_atlas {
@@ -81,6 +82,14 @@ impl Model {
         });
     }
 
+    /// Stops the fit, or takes it back where it has not begun.
+    pub fn stop_fit(&mut self) {
+        if std::mem::take(&mut self.start_is_queued) {
+            return self.log.note("The fit is no longer queued");
+        }
+        self.fit.stop();
+    }
+
     /// What the next job is given.
     fn job_options(&self) -> JobOptions {
         let before_step = self.before_step.clone();
@@ -91,7 +100,7 @@ impl Model {
     fn go_on_with(&mut self, folder: RunFolder) {
         let options = self.job_options();
         let wanted = self.edits.fit.clone();
-        self.tasks.spawn(TITLE, move |context| {
+        self.tasks.spawn(TaskKind::Starting, move |context| {
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
             let (prepared, mut fitter, mut settings) = open::resume(&folder, None, &context.stop, &tell)?;
             if settings.fit != wanted {
@@ -107,7 +116,9 @@ impl Model {
     pub(super) fn fit_was_started(&mut self, started: Started) {
         let Started { job, folder, settings, surface, goes_on } = started;
         // What is still being measured is of the maps before.
-        [LAYERS_TITLE, ENTANGLEMENT_TITLE, STRIP_TITLE].iter().for_each(|title| self.tasks.stop(title));
+        for kind in [TaskKind::Residuals, TaskKind::NovelLighting, TaskKind::ContactSheet] {
+            self.tasks.stop(&kind);
+        }
         if let Some(project) = &mut self.project {
             if project.surface.as_ref().is_none_or(|own| !Arc::ptr_eq(own, &surface)) {
                 // The atlas was made anew for another size of the maps.
@@ -127,8 +138,10 @@ impl Model {
             self.fit.losses.clear();
         }
         self.preferences.remember(folder.path(), true);
-        self.log.note(format!("The run is written to {}", folder.path().display()));
-        self.fit.begin(job, folder, settings);
+        // A failure of the fit before is past.
+        self.log.dismiss();
+        self.log.note(format!("Output folder: {}", folder.path().display()));
+        self.fit.begin(job, folder, settings, self.preferences.finishing_ratio);
         self.activate = Some(Panel::Curves);
     }
 

@@ -29,7 +29,7 @@ pub enum ThemeChoice {
 impl ThemeChoice {
     /// All themes with their names.
     pub const NAMED: [(ThemeChoice, &str); 4] = [
-        (ThemeChoice::System, "As the system"),
+        (ThemeChoice::System, "System"),
         (ThemeChoice::Dark, "Dark"),
         (ThemeChoice::Light, "Light"),
         (ThemeChoice::HighContrast, "High contrast"),
@@ -75,6 +75,10 @@ pub struct Preferences {
     pub object_layout: String,
     /// How often the window follows a running fit.
     pub follow: Follow,
+    /// Seconds of finishing for a second of fitting on this machine, as learned from former runs.
+    pub finishing_ratio: f64,
+    /// Seconds a path of a render took on this machine, as learned from former renders; `None` before the first.
+    pub seconds_per_path: Option<f64>,
     /// The run that was in progress when this was written; a later start finds it here after a crash.
     pub running: Option<PathBuf>,
 }
@@ -105,6 +109,8 @@ impl Default for Preferences {
             layout: String::new(),
             object_layout: String::new(),
             follow: Follow::Live,
+            finishing_ratio: super::advance::FIRST_RATIO,
+            seconds_per_path: None,
             running: None,
         }
     }

@@ -1,6 +1,7 @@
 //! Where the eye stands, which light it sees by, and what is measured for it.
 
 use super::lights::LightName;
+use super::tasks::TaskKind;
 use super::{Done, Model, SaveRequest, SaveWhat};
 use crate::error::Place;
 use crate::insight::surface_layers::{LayerSettings, SurfaceLayers, surface_layers};
@@ -16,23 +17,18 @@ use crate::studio::layout::Panel;
 use crate::studio::stage::eye::{Eye, OrbitEye};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Width and height of a picture of the strip of lights in pixels.
 const STRIP_SIZE: (usize, usize) = (240, 160);
 /// Paths a pixel of the strip.
 const STRIP_SAMPLES: usize = 24;
-/// Title of the task that compares pictures under other lights.
-pub const ENTANGLEMENT_TITLE: &str = "Comparing under other lights";
-/// Title of the task that measures the error of the photos.
-pub const LAYERS_TITLE: &str = "Measuring the error of the photos";
-/// Title of the task that draws the view under every light.
-pub const STRIP_TITLE: &str = "Drawing the strip";
 
 impl Model {
-    /// Moves the eye so that the whole scene is seen.
+    /// Moves the eye so that what the photos show fills the viewport.
     pub fn frame_scene(&mut self) {
         if let Some(project) = &self.project {
-            self.eye.fit(super::opening::bounds(&project.mesh), 1.4);
+            self.eye.fit(super::framing::subject(&project.mesh, project.scene.as_deref()), 1.4);
             self.switches.looking_through = false;
         }
     }
@@ -165,7 +161,7 @@ impl Model {
         else {
             return;
         };
-        if self.tasks.is_running(LAYERS_TITLE) {
+        if self.tasks.is_running(&TaskKind::Residuals) {
             return;
         }
         let excluded = scene.views.iter().map(|view| self.edits.fit.exclude.contains(&view.name)).collect();
@@ -179,7 +175,7 @@ impl Model {
             excluded,
             ..LayerSettings::default()
         };
-        self.tasks.spawn(LAYERS_TITLE, move |context| {
+        self.tasks.spawn(TaskKind::Residuals, move |context| {
             let own = parameters(&maps, &environment);
             let layers = surface_layers(&scene, &surface, &own, &settings, &context.stop, &|share| {
                 context.tell("rendering", share);
@@ -191,7 +187,7 @@ impl Model {
     pub(super) fn layers_were_measured(&mut self, maps: &Arc<MaterialMaps>, layers: SurfaceLayers) {
         let Some(project) = &mut self.project else { return };
         if project.maps.as_ref().is_none_or(|own| !Arc::ptr_eq(own, maps)) {
-            self.log.note("The maps changed while the error of the photos was measured: measure it again");
+            self.log.note("The maps changed while residuals were computed: compute them again");
             return;
         }
         project.photo_error_range = [0.0, high_end(&layers.photo_error)];
@@ -206,7 +202,7 @@ impl Model {
         for (own, measured) in project.view_errors.iter_mut().zip(&layers.views) {
             *own = Some(measured.rmse as f32).filter(|rmse| rmse.is_finite());
         }
-        self.log.note("The error of the photos is spread over the surface");
+        self.log.note("Residuals are projected onto the surface");
     }
 
     /// Factor of each photo that a fit with exposure gains found; empty for ones.
@@ -223,12 +219,12 @@ impl Model {
         let light = light.to_lowercase();
         let view = match (self.switches.looking_through, project.chosen_name()) {
             (true, Some(name)) => name.to_owned(),
-            _ => "stage".into(),
+            _ => "viewport".into(),
         };
         let path = match what {
-            SaveWhat::Picture => folder.join("pictures").join(format!("{view}_{light}.png")),
-            SaveWhat::Turntable => folder.join("pictures").join(format!("turntable_{light}")),
-            SaveWhat::Strip => folder.join("pictures").join(format!("{view}_lights")),
+            SaveWhat::Picture => folder.join("renders").join(format!("{view}_{light}.png")),
+            SaveWhat::Turntable => folder.join("renders").join(format!("turntable_{light}")),
+            SaveWhat::Strip => folder.join("renders").join(format!("{view}_lights")),
         };
         let (width, height) = match self.eye_in_force() {
             Eye::Photo(camera) => (camera.width, camera.height),
@@ -261,9 +257,10 @@ impl Model {
                 lights.extend(self.traced_light(&light.name).map(|environment| NamedLight { name, environment }));
             }
         }
-        self.tasks.spawn("Saving", move |context| {
+        self.tasks.spawn(TaskKind::Saving, move |context| {
             let tell = |share: f32| context.tell("rendering", share);
             let stop = &context.stop;
+            let began = Instant::now();
             let saved = match request.what {
                 SaveWhat::Picture => {
                     gallery::write_picture(&path, &surface, &own, &camera, &settings, &display, stop, &tell)?
@@ -283,7 +280,8 @@ impl Model {
                     gallery::write_strip(&path, &surface, &own, &camera, &lights, &settings, &display, stop, &tell)?
                 }
             };
-            Ok(Done::Saved(saved))
+            let paths = (request.width * request.height * request.samples * saved.len()) as f64;
+            Ok(Done::Saved(saved, began.elapsed().as_secs_f64() / paths.max(1.0)))
         });
     }
 
@@ -299,7 +297,7 @@ impl Model {
             .iter()
             .filter_map(|name| Some(NamedLight { name: name.label(), environment: self.traced_light(name)? }))
             .collect();
-        self.tasks.spawn(STRIP_TITLE, move |context| {
+        self.tasks.spawn(TaskKind::ContactSheet, move |context| {
             let tell = |share: f32| context.tell("rendering", share);
             let pictures = gallery::relight_strip(&surface, &own, &camera, &lights, &settings, &context.stop, &tell)?;
             let pictures = pictures.into_iter().map(|picture| Arc::new(picture.radiance));
@@ -323,7 +321,7 @@ impl Model {
             picture: PictureSettings { background_visible: false, ..self.picture_settings(32) },
             ..EntanglementSettings::default()
         };
-        self.tasks.spawn(ENTANGLEMENT_TITLE, move |context| {
+        self.tasks.spawn(TaskKind::NovelLighting, move |context| {
             let table = entanglement(&scene, &surface, &own, &lights, &settings, &context.stop, &|share| {
                 context.tell("rendering", share);
             })?;

@@ -17,10 +17,15 @@ pub fn show(context: &Context, model: &mut Model) {
                 ui.set_max_width(620.0);
                 ui.label(RichText::new(message.sentence()).color(colours.error).strong());
                 if !message.remedy.is_empty() {
-                    ui.label(format!("What helps: {}", capitalised(&message.remedy)));
+                    ui.label(format!("Fix: {}", capitalised(&message.remedy)));
                 }
                 ui.add_space(4.0);
-                dismissed = ui.button("Dismiss").clicked();
+                ui.horizontal(|ui| {
+                    dismissed = ui.button("Dismiss").on_hover_text("Key: Esc").clicked();
+                    if ui.button("Copy").on_hover_text("Copy the message to the clipboard").clicked() {
+                        ui.ctx().copy_text(message.text_to_copy());
+                    }
+                });
             });
         },
     );

@@ -1,14 +1,19 @@
-//! Loss curves: parts of the loss and the held-out error, over steps or seconds, stage by stage.
+//! Error curves: the held-out error over seconds, with the phases of the fit as bands. Training error, parts of the
+//! objective, steps and single phases stand under Details.
 
 use super::empty;
 use crate::fit::LossRow;
 use crate::studio::model::Model;
 use crate::studio::theme;
-use egui::{Align2, Color32, ComboBox, RichText, Sense, Ui, vec2};
-use egui_plot::{GridMark, HoverPosition, Line, Plot, PlotPoint, PlotPoints, Points, Text, VLine};
+use egui::{Align2, Color32, ComboBox, RichText, Sense, Stroke, Ui, vec2};
+use egui_plot::{GridMark, HoverPosition, Line, Plot, PlotPoint, PlotPoints, Points, Polygon, Text};
+
+/// More bands than this are named only where there is room.
+const MOST_NAMED_BANDS: usize = 4;
 
 /// What the panel keeps.
 pub struct CurvesMemory {
+    details: bool,
     over_seconds: bool,
     logarithmic: bool,
     stage: Option<String>,
@@ -29,7 +34,14 @@ struct MadeOf {
 
 impl Default for CurvesMemory {
     fn default() -> Self {
-        CurvesMemory { over_seconds: false, logarithmic: true, stage: None, made: None, lines: Series::default() }
+        CurvesMemory {
+            details: false,
+            over_seconds: true,
+            logarithmic: true,
+            stage: None,
+            made: None,
+            lines: Series::default(),
+        }
     }
 }
 
@@ -44,10 +56,31 @@ struct Series {
 }
 
 impl Series {
-    /// The highest value of any curve.
-    fn top(&self) -> f64 {
-        let points = [&self.all, &self.surface, &self.held_out].into_iter().flatten();
-        points.map(|point| point[1]).fold(f64::NEG_INFINITY, f64::max).max(-300.0)
+    /// Points of the curves that are drawn on the axis of errors.
+    fn points(&self, details: bool) -> impl Iterator<Item = &[f64; 2]> {
+        let is_held_out = !self.held_out.is_empty();
+        let drawn = [(&self.all, details), (&self.surface, details || !is_held_out), (&self.held_out, true)];
+        drawn.into_iter().filter(|(_, is_drawn)| *is_drawn).flat_map(|(points, _)| points)
+    }
+
+    /// The highest value that is drawn.
+    fn top(&self, details: bool) -> f64 {
+        self.points(details).map(|point| point[1]).fold(f64::NEG_INFINITY, f64::max).max(-300.0)
+    }
+
+    /// The lowest value that is drawn.
+    fn bottom(&self, details: bool) -> f64 {
+        self.points(details).map(|point| point[1]).fold(f64::INFINITY, f64::min).clamp(-300.0, self.top(details))
+    }
+
+    /// Where the first band begins.
+    fn begin(&self) -> f64 {
+        self.borders.first().map_or(0.0, |(x, _)| *x)
+    }
+
+    /// Where the last point lies.
+    fn end(&self) -> f64 {
+        self.points(true).map(|point| point[0]).fold(self.begin(), f64::max)
     }
 }
 
@@ -56,26 +89,36 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut CurvesMemory) {
     let rows = &model.fit.losses;
     if rows.is_empty() {
         (memory.made, memory.stage) = (None, None);
-        return empty(ui, "No curve yet", "The error of every step appears here once a fit runs");
+        return empty(ui, "No data", "The error appears here once a fit runs");
     }
     let mut stages: Vec<String> = rows.iter().map(|row| row.stage.clone()).collect();
     stages.dedup();
     // A stage of another run is none of this one.
     memory.stage = memory.stage.take().filter(|stage| stages.contains(stage));
     ui.horizontal_wrapped(|ui| {
-        ui.selectable_value(&mut memory.over_seconds, false, "Over steps");
-        ui.selectable_value(&mut memory.over_seconds, true, "Over seconds");
+        let switch = ui.checkbox(&mut memory.details, "Details");
+        let help = "Training error, parts of the objective, steps and single phases";
+        if switch.on_hover_text(help).changed() && !memory.details {
+            (memory.over_seconds, memory.logarithmic, memory.stage) = (true, true, None);
+        }
+        if !memory.details {
+            main_figure(ui, rows);
+            return;
+        }
+        ui.separator();
+        ui.selectable_value(&mut memory.over_seconds, false, "X axis: Steps");
+        ui.selectable_value(&mut memory.over_seconds, true, "X axis: Time");
         ui.separator();
         ui.checkbox(&mut memory.logarithmic, "Log axis");
         ui.separator();
-        let chosen = memory.stage.clone().unwrap_or_else(|| "All stages".into());
+        let chosen = memory.stage.as_deref().map_or_else(|| "All phases".into(), stage_words);
         let list = ComboBox::from_id_salt("stage of curves").selected_text(chosen).show_ui(ui, |ui| {
-            ui.selectable_value(&mut memory.stage, None, "All stages");
+            ui.selectable_value(&mut memory.stage, None, "All phases");
             for stage in &stages {
-                ui.selectable_value(&mut memory.stage, Some(stage.clone()), stage);
+                ui.selectable_value(&mut memory.stage, Some(stage.clone()), stage_words(stage));
             }
         });
-        list.response.accessible_name("Stage of the fit").on_hover_text("The stage whose curve is shown");
+        list.response.accessible_name("Phase of the fit").on_hover_text("The phase whose curve is shown");
         figures(ui, rows);
     });
     let key = MadeOf {
@@ -99,6 +142,49 @@ fn identity(rows: &[LossRow]) -> [u64; 4] {
     [first_seconds, first_loss, last_seconds, last_loss]
 }
 
+/// The newest held-out error; the training error where no photo is held out.
+fn main_figure(ui: &mut Ui, rows: &[LossRow]) {
+    ui.separator();
+    let colours = theme::palette(ui.visuals()).curves;
+    let (words, value, colour, help) = match rows.iter().rev().find_map(|row| row.held_out_rmse) {
+        Some(rmse) => {
+            ("Held-out RMSE", Some(rmse), colours[1], "Unclipped surface pixels of held-out photos, downsampled")
+        }
+        None => {
+            let rmse = rows.iter().rev().find_map(|row| row.surface_rmse);
+            (
+                "Training RMSE",
+                rmse,
+                colours[0],
+                "No photo was held out so far: unclipped surface pixels of the step's photos",
+            )
+        }
+    };
+    let (rect, _) = ui.allocate_exact_size(vec2(9.0, 9.0), Sense::hover());
+    ui.painter().circle_filled(rect.center(), 4.0, colour);
+    let value = value.map_or_else(|| "not computed yet".to_owned(), |rmse| format!("{rmse:.4}"));
+    ui.label(RichText::new(format!("{words} {value}")).strong()).on_hover_text(help);
+}
+
+/// A phase of a fit as it is called on screen, such as `Light (coarse) ½` for `wide light 1/2`.
+pub fn stage_words(stage: &str) -> String {
+    let (kind, level) = match stage.rsplit_once(" 1/") {
+        Some((kind, "1")) => (kind, String::new()),
+        Some((kind, "2")) => (kind, " ½".to_owned()),
+        Some((kind, "4")) => (kind, " ¼".to_owned()),
+        Some((kind, "8")) => (kind, " ⅛".to_owned()),
+        Some((kind, level)) => (kind, format!(" 1/{level}")),
+        None => (stage, String::new()),
+    };
+    let words = match kind {
+        "wide light" => "Light (coarse)".to_owned(),
+        "narrow light" => "Light (fine)".to_owned(),
+        "polish" => "Refinement".to_owned(),
+        other => crate::studio::model::log::capitalised(other),
+    };
+    words + &level
+}
+
 /// The newest figures, each with a dot in the colour of its curve: they are the legend.
 fn figures(ui: &mut Ui, rows: &[LossRow]) {
     ui.separator();
@@ -109,13 +195,13 @@ fn figures(ui: &mut Ui, rows: &[LossRow]) {
     };
     if let Some(row) = rows.last() {
         dot(ui, faint(colours[0]));
-        ui.label(format!("Loss {:.4}", row.image_loss.max(0.0).sqrt())).on_hover_text(
-            "Root of what the fit lowers: every pixel that is evidence, background and clipped ones included",
+        ui.label(format!("Objective (RMS) {:.4}", row.image_loss.max(0.0).sqrt())).on_hover_text(
+            "Square root of the image term of the objective: every used pixel, background and clipped ones included",
         );
         if let Some(surface) = row.surface_rmse {
             dot(ui, colours[0]);
             ui.label(format!("Training RMSE {surface:.4}"))
-                .on_hover_text("Unclipped surface pixels of the step's photos, as held-out photos are judged");
+                .on_hover_text("Unclipped surface pixels of the step's photos, as for held-out photos");
         }
         if row.consistency > 0.0 {
             dot(ui, colours[2]);
@@ -126,7 +212,7 @@ fn figures(ui: &mut Ui, rows: &[LossRow]) {
     if let Some(held_out) = rows.iter().rev().find_map(|row| row.held_out_rmse) {
         dot(ui, colours[1]);
         ui.label(RichText::new(format!("Held-out RMSE {held_out:.4}")).strong())
-            .on_hover_text("Unclipped surface pixels of photos that the fit never sees, shrunk");
+            .on_hover_text("Unclipped surface pixels of held-out photos, downsampled");
     }
 }
 
@@ -173,7 +259,7 @@ fn plot(ui: &mut Ui, memory: &CurvesMemory) {
     let weak = ui.visuals().weak_text_color();
     let logarithmic = memory.logarithmic;
     let value = move |y: f64| if logarithmic { 10f64.powf(y) } else { y };
-    let unit = if memory.over_seconds { "seconds of work" } else { "steps" };
+    let unit = if memory.over_seconds { "time (s)" } else { "steps" };
     let over_seconds = memory.over_seconds;
     Plot::new("loss curves")
         // Room for the names of the stages above the curves.
@@ -189,25 +275,46 @@ fn plot(ui: &mut Ui, memory: &CurvesMemory) {
         })
         .allow_scroll(false)
         .show(ui, |plot| {
-            let top = memory.lines.top();
-            for (x, stage) in &memory.lines.borders {
-                // Without a name a line is not in the legend.
-                plot.vline(VLine::new("", *x).color(weak.gamma_multiply(0.6)).width(1.0));
-                let label = RichText::new(format!(" {stage}")).color(weak).small();
-                // Not at the border of what is shown: text counts among what is to be shown, and the plot would grow for ever.
-                plot.text(Text::new("", PlotPoint::new(*x, top), label).anchor(Align2::LEFT_BOTTOM));
+            let (top, bottom) = (memory.lines.top(memory.details), memory.lines.bottom(memory.details));
+            let end = memory.lines.end();
+            let many = memory.lines.borders.len() > MOST_NAMED_BANDS;
+            for (index, (x, stage)) in memory.lines.borders.iter().enumerate() {
+                let right = memory.lines.borders.get(index + 1).map_or(end, |(next, _)| *next);
+                // Without a name a line or band is not in the legend.
+                if index % 2 == 1 {
+                    let corners = vec![[*x, bottom], [right, bottom], [right, top], [*x, top]];
+                    let band = Polygon::new("", PlotPoints::from(corners)).fill_color(weak.gamma_multiply(0.10));
+                    plot.polygon(band.stroke(Stroke::NONE).allow_hover(false));
+                }
+                // A name that has no room would lie over the next.
+                let is_wide = (right - x) > 0.09 * (end - memory.lines.begin());
+                if !many || is_wide {
+                    let label = RichText::new(format!(" {}", stage_words(stage))).color(weak).small();
+                    // Not at the border of what is shown: text counts among what is to be shown, and the plot would grow for ever.
+                    plot.text(Text::new("", PlotPoint::new(*x, top), label).anchor(Align2::LEFT_BOTTOM));
+                }
             }
             let line = |name: &str, points: &Vec<[f64; 2]>, colour, width: f32| {
                 Line::new(name.to_owned(), PlotPoints::from(points.clone())).color(colour).width(width)
             };
-            plot.line(line("Loss, all pixels", &memory.lines.all, faint(colours[0]), 1.5));
-            plot.line(line("Training photos", &memory.lines.surface, colours[0], 2.0));
-            if !memory.lines.held_out.is_empty() {
-                plot.line(line("Held-out photos", &memory.lines.held_out, colours[1], 2.0));
-                let dots = PlotPoints::from(memory.lines.held_out.clone());
-                plot.points(Points::new("Held-out photos", dots).color(colours[1]).radius(3.0));
+            if memory.details {
+                plot.line(line("Objective (RMS)", &memory.lines.all, faint(colours[0]), 1.5));
             }
-            if !memory.lines.consistency.is_empty() {
+            let has_held_out = !memory.lines.held_out.is_empty();
+            if memory.details || !has_held_out {
+                plot.line(line(
+                    "Training photos",
+                    &memory.lines.surface,
+                    colours[0],
+                    if has_held_out { 2.0 } else { 3.0 },
+                ));
+            }
+            if has_held_out {
+                plot.line(line("Held-out photos", &memory.lines.held_out, colours[1], 3.5));
+                let dots = PlotPoints::from(memory.lines.held_out.clone());
+                plot.points(Points::new("Held-out photos", dots).color(colours[1]).radius(4.0));
+            }
+            if memory.details && !memory.lines.consistency.is_empty() {
                 plot.line(line("MVCL (own scale)", &memory.lines.consistency, colours[2], 1.5));
             }
         });
@@ -228,6 +335,20 @@ mod tests {
     use super::*;
 
     #[test]
+    fn phases_have_names_a_person_reads() {
+        for (stage, words) in [
+            ("wide light 1/2", "Light (coarse) ½"),
+            ("narrow light", "Light (fine)"),
+            ("maps 1/4", "Maps ¼"),
+            ("diffuse 1/1", "Diffuse"),
+            ("all 1/16", "All 1/16"),
+            ("polish", "Refinement"),
+        ] {
+            assert_eq!(stage_words(stage), words);
+        }
+    }
+
+    #[test]
     fn smoothing_stops_at_stage_borders_and_nothing_below_zero_reaches_a_log_axis() {
         let row = |step: usize, stage: &str, image_loss: f64| LossRow {
             step,
@@ -246,10 +367,12 @@ mod tests {
         assert_eq!(lines.all[0], [2.0, 0.2f64.log10()]);
         assert_eq!(lines.all.last(), Some(&[6.0, 0.5f64.log10()]), "the mean begins anew");
         assert_eq!(lines.surface.last(), Some(&[6.0, 0.0]), "errors of the surface are a curve of their own");
-        assert_eq!(lines.top(), 0.0);
+        assert_eq!(lines.top(true), 0.0);
+        assert_eq!(lines.top(false), 0.5f64.log10(), "what is not drawn needs no room");
         let below = series(&rows[1..2], true, true, None);
         assert_eq!(below.all.len(), 0, "a step below zero has no logarithm");
         assert_eq!(lines.held_out, [[6.0, 0.5f64.log10()]]);
         assert_eq!(series(&rows, false, false, Some("fine")).all, [[3.0, 0.5]]);
+        assert_eq!((lines.begin(), lines.end(), lines.top(true) > lines.bottom(true)), (2.0, 6.0, true));
     }
 }

@@ -1,6 +1,7 @@
 //! Windows over the window: the palette of acts, help, a path, how to save.
 
 use super::act_line;
+use crate::insight::report::number;
 use crate::studio::act::{Act, ActInfo, Group, LIST};
 use crate::studio::model::{Dialog, Model, PickFor, SaveRequest, SaveWhat};
 use crate::studio::theme;
@@ -25,7 +26,7 @@ pub fn show(context: &Context, model: &mut Model) {
             }
         }
         Dialog::Help => {
-            if help(ui) {
+            if help(ui, model) {
                 next = Dialog::None;
             }
         }
@@ -66,11 +67,12 @@ fn found(query: &str) -> Vec<&'static ActInfo> {
 
 fn palette(ui: &mut Ui, model: &mut Model, query: &mut String) -> bool {
     ui.set_width(480.0);
-    let label = ui.label("Find an act");
+    let label = ui.label("Type a command");
     // The field has the keys before it is drawn for the first time: a person types on while the palette opens.
     let id = Id::unique("palette field");
     ui.memory_mut(|memory| memory.request_focus(id));
-    let field = ui.add(TextEdit::singleline(query).id(id).desired_width(f32::INFINITY).hint_text("e.g. next light"));
+    let field =
+        ui.add(TextEdit::singleline(query).id(id).desired_width(f32::INFINITY).hint_text("e.g. next environment"));
     let field = field.labelled_by(label.id);
     let hits = found(query);
     let enter = ui.input(|input| input.key_pressed(Key::Enter));
@@ -92,7 +94,7 @@ fn palette(ui: &mut Ui, model: &mut Model, query: &mut String) -> bool {
             }
         }
         if hits.is_empty() {
-            ui.label(RichText::new("No act is called so").weak());
+            ui.label(RichText::new("No matching command").weak());
         }
     });
     if field.changed() {
@@ -105,11 +107,11 @@ fn palette(ui: &mut Ui, model: &mut Model, query: &mut String) -> bool {
     chosen.is_some()
 }
 
-fn help(ui: &mut Ui) -> bool {
+fn help(ui: &mut Ui, model: &mut Model) -> bool {
     ui.set_width(720.0);
-    ui.heading("Keys and help");
-    ui.label("Drag on the stage to orbit, right-drag to pan, wheel to zoom, Shift and drag to turn the light.");
-    ui.label("Click the surface to pin a texel: photo, stage and maps show the same place.");
+    ui.heading("Keyboard shortcuts");
+    ui.label("Drag in the viewport to orbit (middle-drag too), right-drag or Shift-middle-drag to pan, wheel to zoom, Shift-drag to rotate the environment.");
+    ui.label("Click the surface to pin a texel: photo, viewport and maps show the same place.");
     ui.add_space(6.0);
     ScrollArea::vertical().max_height(480.0).auto_shrink(false).show(ui, |ui| {
         for (group, title) in Group::ALL {
@@ -126,15 +128,23 @@ fn help(ui: &mut Ui) -> bool {
         }
     });
     ui.add_space(6.0);
-    ui.button("Close").clicked()
+    let mut done = false;
+    ui.horizontal(|ui| {
+        if ui.button("User guide").clicked() {
+            model.guide = true;
+            done = true;
+        }
+        done |= ui.button("Close").clicked();
+    });
+    done
 }
 
 fn path(ui: &mut Ui, model: &mut Model, purpose: PickFor, text: &mut String) -> bool {
     ui.set_width(520.0);
     let (title, hint) = match purpose {
-        PickFor::Light => ("Add an HDR map to the shelf", "/home/me/lights/garden.hdr"),
+        PickFor::Light => ("Import an HDRI", "/home/me/lights/garden.hdr"),
         PickFor::ObjectPhoto => ("Add a photo of an object", "/home/me/photos/ball.exr"),
-        PickFor::ObjectResult => ("Save the result to a folder", "/home/me/results/ball"),
+        PickFor::ObjectResult => ("Save result as", "/home/me/results/ball"),
         PickFor::Material => {
             ("Open a measured material, or the result of an estimation", "/home/me/brdfs/gold-paint.binary")
         }
@@ -165,14 +175,14 @@ fn path(ui: &mut Ui, model: &mut Model, purpose: PickFor, text: &mut String) -> 
             }
             done = true;
         }
-        if ui.button("Browse…").on_hover_text("Opens the system's file dialog, where there is one").clicked() {
+        if ui.button("Browse…").on_hover_text("Open the system's file dialog").clicked() {
             model.pick(purpose);
             done = true;
         }
         done |= ui.button("Cancel").clicked();
     });
     if purpose != PickFor::ObjectResult {
-        ui.label(RichText::new("A folder or file can also be dropped on the window").weak());
+        ui.label(RichText::new("You can also drop a folder or file on the window").weak());
     }
     done
 }
@@ -180,17 +190,17 @@ fn path(ui: &mut Ui, model: &mut Model, purpose: PickFor, text: &mut String) -> 
 fn save(ui: &mut Ui, model: &mut Model, request: &mut SaveRequest) -> bool {
     ui.set_width(520.0);
     ui.heading(match request.what {
-        SaveWhat::Picture => "Save picture",
-        SaveWhat::Turntable => "Save turntable",
-        SaveWhat::Strip => "Save strip of lights",
+        SaveWhat::Picture => "Render image",
+        SaveWhat::Turntable => "Render turntable",
+        SaveWhat::Strip => "Export contact sheet",
     });
     Grid::new("save").num_columns(2).spacing([12.0, 6.0]).show(ui, |ui| {
-        let label = ui.label(if request.what == SaveWhat::Picture { "Picture file" } else { "Folder of pictures" });
+        let label = ui.label(if request.what == SaveWhat::Picture { "Image file" } else { "Image folder" });
         ui.add(TextEdit::singleline(&mut request.path).desired_width(380.0))
             .labelled_by(label.id)
-            .on_hover_text("PNG as shown on the stage, EXR in linear radiance; by the ending of the name");
+            .on_hover_text("PNG as shown in the viewport or EXR in linear radiance, by the file extension");
         ui.end_row();
-        ui.label("Size in pixels");
+        ui.label("Size (pixels)");
         ui.horizontal(|ui| {
             let side = |value| DragValue::new(value).range(16..=8192).speed(4.0);
             let label = ui.label("Width");
@@ -199,20 +209,25 @@ fn save(ui: &mut Ui, model: &mut Model, request: &mut SaveRequest) -> bool {
             ui.add(side(&mut request.height)).labelled_by(label.id);
         });
         ui.end_row();
-        let label = ui.label("Paths a pixel");
+        let label = ui.label("Samples per pixel");
         ui.add(DragValue::new(&mut request.samples).range(1..=4096))
             .labelled_by(label.id)
-            .on_hover_text("Four times as many halve the noise and take four times as long");
+            .on_hover_text("Four times as many samples halve the noise and take four times as long");
         ui.end_row();
         if request.what == SaveWhat::Turntable {
-            let label = ui.label("Pictures");
+            let label = ui.label("Images");
             ui.add(DragValue::new(&mut request.frames).range(2..=720)).labelled_by(label.id);
             ui.end_row();
         }
     });
-    let millions = (request.width * request.height * request.samples) as f64 * 1e-6;
-    let frames = if request.what == SaveWhat::Turntable { request.frames as f64 } else { 1.0 };
-    ui.label(RichText::new(format!("{:.0} million paths", millions * frames)).weak());
+    let images = if request.what == SaveWhat::Turntable { request.frames as f64 } else { 1.0 };
+    let paths = (request.width * request.height * request.samples) as f64 * images;
+    let seconds = model.preferences.seconds_per_path.map(|own| own * paths);
+    let told = seconds.map_or_else(
+        || format!("{:.0} million samples", paths * 1e-6),
+        |seconds| format!("About {} on this machine", number::duration(seconds)),
+    );
+    ui.label(RichText::new(told).weak());
     let mut done = false;
     ui.horizontal(|ui| {
         let colours = theme::palette(ui.visuals());
@@ -236,12 +251,12 @@ mod tests {
 
     #[test]
     fn the_palette_finds_by_words_of_name_and_help() {
-        assert_eq!(found("next li").first().map(|info| info.act), Some(Act::NextLight));
+        assert_eq!(found("next env").first().map(|info| info.act), Some(Act::NextLight));
         assert_eq!(found("start fit").first().map(|info| info.act), Some(Act::Start));
         assert!(found("shadows interreflection").iter().any(|info| info.act == Act::Traced));
         // A whole name comes before a longer one that begins with it.
-        assert_eq!(found("panel: photo").first().map(|info| info.act), Some(Act::PanelPhoto));
-        assert_eq!(found("panel: photos").first().map(|info| info.act), Some(Act::PanelViews));
+        assert_eq!(found("photo panel").first().map(|info| info.act), Some(Act::PanelPhoto));
+        assert_eq!(found("photos panel").first().map(|info| info.act), Some(Act::PanelViews));
         assert!(found("xyzzy").is_empty());
         assert_eq!(found("").len(), LIST.len() - 1);
     }

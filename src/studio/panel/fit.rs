@@ -7,15 +7,9 @@ use crate::insight::report::number;
 use crate::studio::act::Act;
 use crate::studio::act::availability::availability;
 use crate::studio::model::store::Follow;
-use crate::studio::model::{FitStatus, Model, PickFor};
+use crate::studio::model::{Model, Phase, PickFor};
 use crate::studio::theme;
 use egui::{ComboBox, RichText, ScrollArea, Ui};
-
-/// Whether a start would go on from a checkpoint.
-pub fn can_go_on(model: &Model) -> bool {
-    let stopped = matches!(model.fit.status, FitStatus::Stopped | FitStatus::Failed(_) | FitStatus::Idle);
-    stopped && model.fit.folder.as_ref().is_some_and(|folder| folder.checkpoint_path().is_file())
-}
 
 /// Draws the panel.
 pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut form::FormMemory, reading: &mut reading::ReadingMemory) {
@@ -45,7 +39,7 @@ fn facts(ui: &mut Ui, model: &Model) {
     let views = project.view_count();
     let held_out = project.scene.as_ref().map_or(0, |scene| scene.views.iter().filter(|view| view.held_out).count());
     let triangles = number::whole(project.mesh.triangles.len() as u64);
-    ui.label(RichText::new(format!("{triangles} triangles, {views} photos, {held_out} held out to judge")).weak());
+    ui.label(RichText::new(format!("{triangles} triangles · {views} photos ({held_out} held out)")).weak());
     if model.edits.fit.method != Method::Adam {
         // The figure is Adam's: the solver keeps other things.
         return;
@@ -54,36 +48,43 @@ fn facts(ui: &mut Ui, model: &Model) {
     // Texels, their gradient and two moments, of 32 bytes each, with a third more for the mip chain.
     let bytes = size * size * 32 * 4 * 4 / 3;
     ui.label(
-        RichText::new(format!("Maps of {size} x {size} take about {} while fitting", number::memory(bytes))).weak(),
+        RichText::new(format!("Maps of {size} x {size} need about {} while fitting", number::memory(bytes))).weak(),
     )
     .on_hover_text("Texels, gradient and both moments of Adam, with their mip chains");
 }
 
 fn controls(ui: &mut Ui, model: &mut Model) {
     ui.add_space(6.0);
-    ui.horizontal_wrapped(|ui| match model.fit.status.clone() {
-        FitStatus::Running => {
+    ui.horizontal_wrapped(|ui| match model.phase() {
+        Phase::Fitting => {
             act_button_named(ui, model, Act::PauseOrGoOn, "Pause fit");
             act_button_named(ui, model, Act::Checkpoint, "Checkpoint");
         }
-        FitStatus::Paused => {
-            act_button_named(ui, model, Act::PauseOrGoOn, "Go on with fit");
+        Phase::Paused => {
+            act_button_named(ui, model, Act::PauseOrGoOn, "Resume fit");
             act_button(ui, model, Act::StepOnce);
             act_button_named(ui, model, Act::Checkpoint, "Checkpoint");
         }
-        FitStatus::Pausing | FitStatus::Stopping | FitStatus::Finishing(_) => {
-            ui.label(model.fit.status.words());
+        phase @ (Phase::Pausing | Phase::Stopping | Phase::Finishing(_) | Phase::Queued | Phase::Starting) => {
+            ui.label(phase.words());
         }
-        FitStatus::Finished => {
+        Phase::Finished => {
             act_button(ui, model, Act::OpenReport);
+            act_button(ui, model, Act::OpenRunFolder);
             act_button(ui, model, Act::SavePicture);
             act_button_named(ui, model, Act::Start, "Fit again");
         }
-        FitStatus::Idle | FitStatus::Stopped | FitStatus::Failed(_) => {
-            let goes_on = can_go_on(model);
-            let label = if goes_on { "Go on from the checkpoint" } else { "Start the fit" };
+        Phase::Closed
+        | Phase::Opening
+        | Phase::Preparing
+        | Phase::Unprepared
+        | Phase::Ready
+        | Phase::Stopped
+        | Phase::Failed(_) => {
+            let can_resume = model.can_resume();
+            let label = if can_resume { "Resume from checkpoint" } else { "Start fit" };
             act_button_named(ui, model, Act::Start, label);
-            if goes_on {
+            if can_resume {
                 start_anew(ui, model);
             }
         }
@@ -98,8 +99,8 @@ fn controls(ui: &mut Ui, model: &mut Model) {
 fn start_anew(ui: &mut Ui, model: &mut Model) {
     let available = availability(Act::Start, model);
     let button = ui
-        .add_enabled(available.is_ok(), egui::Button::new("Start anew"))
-        .on_hover_text("Starts a new run with the settings as they are; this run and its checkpoint stay on disk");
+        .add_enabled(available.is_ok(), egui::Button::new("Restart"))
+        .on_hover_text("Start a new run with the current settings; this run and its checkpoint stay on disk");
     let button = match available {
         Ok(()) => button,
         Err(why) => button.on_disabled_hover_text(format!("Not now: {why}")),
@@ -121,15 +122,20 @@ fn presets(ui: &mut Ui, model: &mut Model) {
         }
         settings
     };
-    let usual = for_scene(Preset::Balanced);
-    let presets = Preset::ALL.map(|preset| (preset, for_scene(preset)));
+    // A scene made in code brings settings that suit it: they are its standard.
+    let made_for = model.project.as_ref().and_then(|project| project.default_fit.clone());
+    let usual = made_for.unwrap_or_else(|| for_scene(Preset::Balanced));
+    let presets = Preset::ALL.map(|preset| match preset {
+        Preset::Balanced => (preset, usual.clone()),
+        _ => (preset, for_scene(preset)),
+    });
     ui.add_enabled_ui(!live, |ui| {
         ui.horizontal(|ui| {
             for (preset, settings) in presets {
                 let differences = settings.differences(&usual);
                 let mut text = match differences.is_empty() {
-                    true => "The usual settings".to_owned(),
-                    false => "Differs from the usual settings in".to_owned(),
+                    true => "Default settings".to_owned(),
+                    false => "Changed from the default".to_owned(),
                 };
                 for (name, value, usual) in differences {
                     text += &format!("\n{}: {value} instead of {usual}", form::words(&name));
@@ -146,26 +152,32 @@ fn presets(ui: &mut Ui, model: &mut Model) {
     let changed = own.differences(&usual);
     if !changed.is_empty() {
         let names: Vec<String> = changed.iter().map(|(name, value, _)| format!("{name} {value}")).collect();
-        ui.label(RichText::new(format!("Differs from the usual: {}", names.join(", "))).weak());
+        ui.horizontal_wrapped(|ui| {
+            ui.label(RichText::new(format!("Changed from preset: {}", names.join(", "))).weak());
+            let reset = ui.add_enabled(!live, egui::Button::new("Reset settings").small());
+            if reset.on_hover_text("Restore the Standard preset for this scene").clicked() {
+                model.edits.fit = FitSettings { exclude: own.exclude.clone(), seed: own.seed, ..usual.clone() };
+            }
+        });
     }
 }
 
 fn run_folder(ui: &mut Ui, model: &mut Model) {
-    heading(ui, "Where runs go");
+    heading(ui, "Output folder");
     if let Some(folder) = &model.fit.folder {
         ui.label(RichText::new(folder.path().display().to_string()).weak()).on_hover_text("The folder of this run");
     }
     let folder = model.runs_folder();
     ui.horizontal_wrapped(|ui| {
-        ui.label(RichText::new(format!("New runs: {}", folder.display())).weak());
-        if ui.button("Change…").on_hover_text("Chooses the folder for new runs").clicked() {
+        ui.label(RichText::new(format!("{}", folder.display())).weak());
+        if ui.button("Browse…").on_hover_text("Choose the output folder for new runs").clicked() {
             model.pick(PickFor::RunsFolder);
         }
     });
     ui.horizontal(|ui| {
-        let label = ui.label("Follow").on_hover_text("How often stage, maps and curves follow a running fit");
+        let label = ui.label("Live update").on_hover_text("How often viewport, maps and curves update during a fit");
         let follow = &mut model.preferences.follow;
-        let names = [(Follow::Live, "Live"), (Follow::Seldom, "Every 5 s"), (Follow::Off, "Not at all")];
+        let names = [(Follow::Live, "On"), (Follow::Seldom, "Every 5 s"), (Follow::Off, "Off")];
         let chosen = names.iter().find(|(own, _)| own == follow).map_or("", |(_, name)| name);
         ComboBox::from_id_salt("follow")
             .selected_text(chosen)

@@ -49,6 +49,7 @@ pub fn show(ui: &mut Ui, settings: &mut FitSettings, live: bool, memory: &mut Fo
         let wanted = memory.filter.trim().to_lowercase();
         let matches = |setting: &&SettingDescription| {
             !is_first(setting)
+                && is_read(&setting.name, settings)
                 && setting.value_kind != ValueKind::Names
                 && (wanted.is_empty()
                     || setting.name.contains(&wanted)
@@ -56,7 +57,7 @@ pub fn show(ui: &mut Ui, settings: &mut FitSettings, live: bool, memory: &mut Fo
         };
         let rest: Vec<&SettingDescription> = described.iter().filter(matches).collect();
         if rest.is_empty() {
-            ui.label(RichText::new("No setting is called so").weak());
+            ui.label(RichText::new("No matching setting").weak());
         }
         grid(ui, "all settings", rest.into_iter(), settings, live, memory);
     }
@@ -83,7 +84,7 @@ fn grid<'a>(
                 memory.sought = None;
             }
             let enabled = !live || setting.changes_mid_run;
-            let why = "This cannot change while a fit runs";
+            let why = "Cannot be changed during a fit";
             ui.add_enabled_ui(enabled, |ui| field(ui, setting, settings, label.id, memory))
                 .response
                 .on_disabled_hover_text(why);
@@ -92,8 +93,30 @@ fn grid<'a>(
     });
 }
 
+/// Settings that only Adam's two steps read; the solver's refinement reads the other ones of Adam too.
+const OF_TWO_STEPS: [&str; 6] = ["steps", "steps-diffuse", "steps-all", "consistency", "levels", "lobe-ramp"];
+
+/// Whether a fit with these settings reads the one of this name.
+fn is_read(name: &str, settings: &FitSettings) -> bool {
+    match settings.method {
+        Method::Adam => !name.starts_with("solver-"),
+        Method::Solver | Method::Automatic if settings.solver_polish > 0 => !OF_TWO_STEPS.contains(&name),
+        Method::Solver | Method::Automatic => !Method::means_adam(&[name.to_owned()]),
+    }
+}
+
 /// A setting's name in words: `map-size` becomes `Map size`.
 pub fn words(name: &str) -> String {
+    let named = [
+        ("solver-rounds", "Light iterations"),
+        ("solver-polish", "Refinement steps (Adam)"),
+        ("bounces", "Max bounces"),
+        ("exposure", "Per-photo exposure compensation"),
+        ("background", "Background pixels"),
+    ];
+    if let Some((_, words)) = named.iter().find(|(own, _)| *own == name) {
+        return (*words).into();
+    }
     crate::studio::model::log::capitalised(&name.replace('-', " "))
 }
 
@@ -103,7 +126,7 @@ fn help(setting: &SettingDescription, default: &FitSettings) -> String {
         text += &format!("\n{value}: {meaning}");
     }
     if let Ok(usual) = default.get_text(&setting.name) {
-        text += &format!("\nUsually {}", if usual.is_empty() { "none" } else { &usual });
+        text += &format!("\nDefault: {}", if usual.is_empty() { "none" } else { &usual });
     }
     text
 }

@@ -32,12 +32,14 @@ pub struct LightMemory {
 /// Draws the panel.
 pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut LightMemory) {
     let Some(environment) = model.project.as_ref().and_then(|project| project.environment.clone()) else {
-        return empty(ui, "No light yet", "The fitted environment appears with the first steps of the fit");
+        return empty(ui, "No environment yet", "The estimated environment appears with the first steps of the fit");
     };
     ui.horizontal(|ui| {
-        ui.selectable_value(&mut memory.shows_known, false, "Radiance").on_hover_text("The light that was fitted");
-        ui.selectable_value(&mut memory.shows_known, true, "Known by")
-            .on_hover_text("What each texel of it is known by: highlights, background, diffuse light, or belief alone");
+        ui.selectable_value(&mut memory.shows_known, false, "Radiance")
+            .on_hover_text("Radiance of the estimated environment");
+        ui.selectable_value(&mut memory.shows_known, true, "Evidence").on_hover_text(
+            "What constrains each direction: highlights, background, diffuse shading, or the prior alone",
+        );
     });
     if memory.shows_known {
         return light_known::show(ui, model, &mut memory.known);
@@ -59,8 +61,8 @@ pub fn draw(
 ) {
     ui.horizontal_wrapped(|ui| {
         if truth.is_some() {
-            ui.checkbox(&mut memory.against_truth, "Against the truth")
-                .on_hover_text("Fitted left, true right; drag the line");
+            ui.checkbox(&mut memory.against_truth, "Against ground truth")
+                .on_hover_text("Estimated left, ground truth right; drag the divider");
         }
         let mean = environment.mean_radiance();
         ui.label(
@@ -79,7 +81,7 @@ pub fn draw(
     let comparison = truth.filter(|_| memory.against_truth).map(|truth| Comparison {
         other: Source::from(kept(&mut memory.truth, &truth)),
         mode: Compare::Wipe(memory.wipe.unwrap_or(0.5)),
-        names: ["Fitted".into(), "True".into()],
+        names: ["Estimated".into(), "Ground truth".into()],
     });
     let overlay = Overlay { comparison, badge: "up", ..Overlay::default() };
     let width = ui.available_width();
@@ -130,7 +132,7 @@ fn balls(ui: &mut Ui, display: &DisplaySettings, memory: &mut LightMemory, envir
         for ((picture, view), (name, label)) in pictures
             .iter()
             .zip(&mut memory.ball_views)
-            .zip([("Mirror ball", "The light in a mirror ball"), ("Matte ball", "The light on a white matte ball")])
+            .zip([("Mirror ball", "Reflection"), ("Grey ball", "Diffuse shading")])
         {
             ui.allocate_ui(vec2(side, side + 20.0), |ui| {
                 ui.vertical(|ui| {

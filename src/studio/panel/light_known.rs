@@ -14,14 +14,10 @@ use std::sync::Arc;
 
 /// Kinds of evidence with their colour in the picture, linear, and what they are.
 const KINDS: [(&str, Vec3, &str); 4] = [
-    ("Highlights", Vec3::X, "Mirrored by the surface: tells directions apart"),
+    ("Highlights", Vec3::X, "Specular reflections: resolve directions"),
     ("Background", Vec3::Y, "Seen directly, beside the surface"),
-    (
-        "Diffuse light and shadows",
-        Vec3::Z,
-        "Gathered by matt parts of the surface: tells directions apart by shadows only",
-    ),
-    ("Belief", Vec3::ZERO, "No photo tells: what a smooth sky would have there"),
+    ("Diffuse shading and shadows", Vec3::Z, "Integrated by diffuse surfaces: resolves directions only by shadows"),
+    ("Prior", Vec3::ZERO, "No photo constrains it: a smooth sky is assumed"),
 ];
 
 /// What the picture keeps.
@@ -35,7 +31,7 @@ pub struct KnownMemory {
 pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut KnownMemory) {
     let shares = model.project.as_ref().and_then(|project| project.known.told().light_evidence.clone());
     let Some(shares) = shares else {
-        return empty(ui, "Not known", model.why_light_is_untold());
+        return empty(ui, "Not available", model.why_light_is_untold());
     };
     if memory.means.as_ref().is_none_or(|(own, _)| !Arc::ptr_eq(own, &shares)) {
         memory.means = Some((Arc::clone(&shares), mean_shares(&shares)));
@@ -48,7 +44,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut KnownMemory) {
         }
     });
     if let Some(deviation) = model.project.as_ref().and_then(|project| project.known.told().light_scale_deviation) {
-        ui.label(format!("Factor common to light and reflectance: {}", scale_words(deviation))).on_hover_text(
+        ui.label(format!("Scale ambiguity of environment and reflectance: {}", scale_words(deviation))).on_hover_text(
             "Light twice as bright over surfaces half as bright gives diffuse surfaces the same pictures. Highlights, \
              background and interreflection tell the two apart.",
         );
@@ -59,7 +55,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut KnownMemory) {
     ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
         // Shares are no light: neither exposure nor curve.
         let display = DisplaySettings::default();
-        let response = picture::show(ui, "What the light is known by", &source, &display, &mut memory.view, &overlay);
+        let response = picture::show(ui, "Evidence for the environment", &source, &display, &mut memory.view, &overlay);
         let Some(place) = response.hovered else { return };
         let share = response.value.map_or(Vec3::ZERO, picture::Value::rgb);
         let [azimuth, elevation] = place_words(place, (shares.width(), shares.height()));
@@ -67,13 +63,13 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut KnownMemory) {
             ("highlights", share.x),
             ("background", share.y),
             ("diffuse", share.z),
-            ("belief", 1.0 - share.element_sum()),
+            ("prior", 1.0 - share.element_sum()),
             azimuth,
             elevation,
         ];
         model.hovered_value = picture::describe(place, None, &named);
     });
-    ui.label(RichText::new("Share of each texel's precision; dark texels are belief").small().weak());
+    ui.label(RichText::new("Share of each texel's precision; dark texels follow the prior alone").small().weak());
 }
 
 fn swatch(ui: &mut Ui, colour: Vec3) {

@@ -32,21 +32,29 @@ impl Map {
         (Map::Diffuse, "Diffuse", "Diffuse reflectance, linear RGB"),
         (Map::Specular, "Specular", "Specular reflectance F0, linear RGB"),
         (Map::Roughness, "Roughness", "r, the square of the microfacet width"),
-        (Map::TimesSeen, "Seen", "How many photos see a texel; hatched: none"),
-        (Map::PhotoError, "Error", "Root mean square error over the photos that see a texel"),
-        (Map::Disagreement, "Disagreement", "Variance over photos of the gradient by diffuse, in [0, 1]"),
-        (Map::Told(Told::Diffuse), "± diffuse", "Standard deviation of diffuse, mean of the channels"),
-        (Map::Told(Told::Specular), "± specular", "Standard deviation of specular, mean of the channels"),
-        (Map::Told(Told::Roughness), "± roughness", "Standard deviation of roughness"),
+        (Map::TimesSeen, "View count", "How many photos see a texel; hatched: none"),
+        (Map::PhotoError, "Residual", "Root mean square residual over the photos that see a texel"),
+        (Map::Disagreement, "Inconsistency", "Variance over photos of the gradient by diffuse, in [0, 1]"),
+        (
+            Map::Told(Told::Diffuse),
+            "Std. dev. (diffuse)",
+            "Posterior standard deviation of diffuse, mean of the channels",
+        ),
+        (
+            Map::Told(Told::Specular),
+            "Std. dev. (specular)",
+            "Posterior standard deviation of specular, mean of the channels",
+        ),
+        (Map::Told(Told::Roughness), "Std. dev. (roughness)", "Posterior standard deviation of roughness"),
         (
             Map::Told(Told::LobeSharing),
-            "Shared lobe",
-            "How many texels share a texel's lobe; hatched: taken over from neighbours",
+            "Lobe cluster size",
+            "How many texels share a texel's lobe; hatched: filled from neighbours",
         ),
         (
             Map::Told(Told::Choice),
-            "Lobe needed",
-            "What judging views chose: 1 no lobe, 2 one for its region, 3 lobes of their own; hatched: none judge",
+            "Lobe model",
+            "What the held-out views selected: 1 no lobe, 2 a shared lobe, 3 lobes of their own; hatched: no held-out view",
         ),
     ];
 }
@@ -73,19 +81,19 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut MapsMemory) {
             let button = egui::Button::selectable(memory.map == map, name);
             let response = ui.add_enabled(there, button).on_hover_text(help);
             let why = match map {
-                Map::TimesSeen => "Measure it first: View, Measure photo error; a finished run brings it along",
+                Map::TimesSeen => "Compute it first: View › Compute residuals; a finished run includes it",
                 Map::Told(_) => model.why_untold(),
-                _ => "Measure it first: View, Measure photo error",
+                _ => "Compute it first: View › Compute residuals",
             };
             if response.on_disabled_hover_text(why).clicked() {
                 memory.map = map;
             }
         }
         let on = model.switches.chart_borders;
-        act_switch(ui, model, Act::ChartBorders, "Borders", on);
+        act_switch(ui, model, Act::ChartBorders, "UV seams", on);
         if ui
-            .button("Whole")
-            .on_hover_text("Shows the whole map\nWheel zooms, drag moves; enlarged texels show their numbers")
+            .button("Fit view")
+            .on_hover_text("Show the whole map\nWheel zooms, drag pans; enlarged texels show their values")
             .clicked()
         {
             memory.view.fit();

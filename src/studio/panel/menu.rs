@@ -1,7 +1,8 @@
 //! The menu bar, drawn from the list of acts; at its right, which half of the studio is shown.
 
 use super::act_line;
-use crate::studio::act::{Act, Group, LIST};
+use crate::studio::act::{Act, ActInfo, Group, LIST};
+use crate::studio::layout::Panel;
 use crate::studio::model::{Model, Workspace};
 use egui::{Align, Button, Layout, Ui};
 
@@ -15,11 +16,19 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
             for (group, title) in Group::ALL {
                 ui.menu_button(title, |ui| {
                     ui.set_min_width(230.0);
-                    for info in LIST.iter().filter(|info| info.group == group) {
-                        if act_line(ui, model, info, |button| button).clicked() {
-                            model.act(info.act);
-                            ui.close();
-                        }
+                    let (panels, own): (Vec<&ActInfo>, Vec<&ActInfo>) =
+                        LIST.iter().filter(|info| info.group == group).partition(|info| Panel::of(info.act).is_some());
+                    for info in own {
+                        line(ui, model, info, false);
+                    }
+                    if !panels.is_empty() {
+                        let list = ui.menu_button("Panels", |ui| {
+                            for info in panels {
+                                let is_on = Panel::of(info.act).is_some_and(|own| model.visible_panels.contains(&own));
+                                line(ui, model, info, is_on);
+                            }
+                        });
+                        list.response.accessible_name("Panels");
                     }
                 });
             }
@@ -40,4 +49,12 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
             });
         });
     });
+}
+
+/// A line of a menu; `is_on` where it shows a panel that is in front.
+fn line(ui: &mut Ui, model: &mut Model, info: &ActInfo, is_on: bool) {
+    if act_line(ui, model, info, |button| button.selected(is_on)).clicked() {
+        model.act(info.act);
+        ui.close();
+    }
 }

@@ -16,8 +16,17 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
     }
     let messages: Vec<Message> = model.log.messages().iter().rev().take(300).cloned().collect();
     if messages.is_empty() {
-        return empty(ui, "Nothing was noticed", "Findings of the check and of the fit appear here");
+        return empty(ui, "No issues", "Findings of the scene check and of the fit appear here");
     }
+    ui.horizontal(|ui| {
+        if ui.button("Copy all").on_hover_text("Copy all messages to the clipboard").clicked() {
+            let lines: Vec<String> = model.log.messages().iter().map(Message::text_to_copy).collect();
+            ui.ctx().copy_text(lines.join("\n"));
+        }
+        if ui.button("Clear messages").on_hover_text("Remove all messages").clicked() {
+            model.log.clear();
+        }
+    });
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         for (index, message) in messages.iter().enumerate() {
             ui.push_id(index, |ui| line(ui, model, message));
@@ -49,7 +58,7 @@ pub fn line(ui: &mut Ui, model: &mut Model, message: &Message) {
     if !message.remedy.is_empty() {
         ui.horizontal_wrapped(|ui| {
             ui.add_space(18.0);
-            ui.label(RichText::new(format!("What helps: {}", message.remedy)).weak());
+            ui.label(RichText::new(format!("Fix: {}", message.remedy)).weak());
         });
     }
 }

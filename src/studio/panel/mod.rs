@@ -8,6 +8,7 @@ pub mod curves;
 pub mod dialog;
 pub mod fit;
 pub mod form;
+pub mod guide;
 pub mod light;
 pub mod light_known;
 pub mod maps;
@@ -57,6 +58,8 @@ pub struct Memory {
     pub relight: relight::RelightMemory,
     /// The panels of object mode.
     pub object: object::ObjectMemory,
+    /// The guide.
+    pub guide: guide::GuideMemory,
     /// The first page.
     pub welcome: welcome::WelcomeMemory,
 }

@@ -57,7 +57,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut PhotoMemory) {
         let scene = Arc::clone(project.scene.as_ref()?);
         (project.chosen_view < scene.views.len()).then_some((scene, project.chosen_view))
     }) else {
-        return empty(ui, "No photo", "Open a scene; a run whose scene moved away has no photos");
+        return empty(ui, "No photo", "Open a scene; a run whose scene has moved has no photos");
     };
     let key = Arc::as_ptr(&scene) as usize;
     if memory.photo.as_ref().is_none_or(|(own, index, _)| (*own, *index) != (key, view)) {
@@ -79,7 +79,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut PhotoMemory) {
         .as_ref()
         .filter(|(index, _)| *index == view)
         .map(|(_, picture)| Source::from(Arc::clone(picture)));
-    let names = ["Photo".to_owned(), "Fit".to_owned()];
+    let names = ["Photo".to_owned(), "Render".to_owned()];
     let compared = |mode| rendered.clone().map(|other| Comparison { other, mode, names: names.clone() });
     let comparison = match memory.show {
         Show::Photo => None,
@@ -89,10 +89,10 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut PhotoMemory) {
     };
     let badge = match (memory.show, &comparison) {
         (Show::Photo, _) => name.clone(),
-        (_, None) => format!("{name}: rendering the fit"),
-        (Show::Render, _) => format!("{name}: fit"),
-        (Show::Wipe, _) => format!("{name}: photo left, fit right"),
-        (Show::Difference, _) => format!("{name}: green where the photo is brighter, red where the fit is, x 4"),
+        (_, None) => format!("{name}: rendering"),
+        (Show::Render, _) => format!("{name}: render"),
+        (Show::Wipe, _) => format!("{name}: photo left, render right"),
+        (Show::Difference, _) => format!("{name}: green where the photo is brighter, red where the render is, x 4"),
     };
     let colours = theme::palette(ui.visuals());
     let marks: Vec<Mark> = cursor_in_view(model, view)
@@ -127,22 +127,26 @@ fn controls(ui: &mut Ui, model: &mut Model, memory: &mut PhotoMemory, name: &str
         let has_maps =
             model.project.as_ref().is_some_and(|project| project.maps.is_some() && project.surface.is_some());
         for (show, label, help) in [
-            (Show::Photo, "Photo alone", "The photo as it was read, linear"),
-            (Show::Render, "Fit", "The same view, path traced with the fitted maps and light, in the photo's exposure"),
-            (Show::Wipe, "Wipe", "Photo left, fit right; drag the line"),
-            (Show::Difference, "Difference", "Luminance of photo minus fit"),
+            (Show::Photo, "Photo only", "The photo as it was read, linear"),
+            (
+                Show::Render,
+                "Render",
+                "The same view, path traced with the estimated maps and environment, in the photo's exposure",
+            ),
+            (Show::Wipe, "Wipe", "Photo left, render right; drag the divider"),
+            (Show::Difference, "Difference", "Luminance of photo minus render"),
         ] {
             let enabled = show == Show::Photo || has_maps;
             let button = egui::Button::selectable(memory.show == show, label);
             let response = ui.add_enabled(enabled, button).on_hover_text(help);
-            if response.on_disabled_hover_text("There are no maps yet: start a fit").clicked() {
+            if response.on_disabled_hover_text("No maps yet. Start a fit first.").clicked() {
                 memory.show = show;
             }
         }
         ui.separator();
-        ui.checkbox(&mut memory.masked, "Left-out pixels")
-            .on_hover_text("Hatches pixels that are no evidence: masked or damaged");
-        if ui.button("Whole").on_hover_text("Shows the whole photo").clicked() {
+        ui.checkbox(&mut memory.masked, "Excluded pixels")
+            .on_hover_text("Hatch pixels that are not used: masked or damaged");
+        if ui.button("Fit view").on_hover_text("Show the whole photo").clicked() {
             memory.view.fit();
         }
         let project = model.project.as_ref();

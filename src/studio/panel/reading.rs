@@ -20,9 +20,9 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ReadingMemory) {
         memory.chosen = Some((path.clone(), in_force.clone()));
     }
     let Some((_, chosen)) = &mut memory.chosen else { return };
-    CollapsingHeader::new("How the scene is read").show(ui, |ui| {
+    CollapsingHeader::new("Import settings").show(ui, |ui| {
         Grid::new("reading").num_columns(2).spacing([10.0, 4.0]).show(ui, |ui| {
-            let label = ui.label("Up axis").on_hover_text("The direction of the data set that points to the sky");
+            let label = ui.label("Up axis").on_hover_text("The axis of the data set that points up");
             let ups = std::iter::once(Up::Auto).chain(Up::NAMED);
             let response = ComboBox::from_id_salt("up").selected_text(chosen.up.to_string()).show_ui(ui, |ui| {
                 for up in ups {
@@ -31,16 +31,13 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ReadingMemory) {
             });
             response.response.labelled_by(label.id);
             ui.end_row();
-            let label = ui
-                .label("Hold out every")
-                .on_hover_text("Every so many photos one is kept out of the fit, to judge it; 0 keeps none");
+            let label = ui.label("Hold out every").on_hover_text("Hold out every Nth photo for validation (0 = none)");
             ui.add(DragValue::new(&mut chosen.hold_out_every).range(0..=100)).labelled_by(label.id);
             ui.end_row();
-            let label =
-                ui.label("Shrink photos by").on_hover_text("Photos are averaged over squares of so many pixels");
+            let label = ui.label("Downsample photos").on_hover_text("Average photos over squares of this many pixels");
             ui.add(DragValue::new(&mut chosen.shrink).range(1..=16)).labelled_by(label.id);
             ui.end_row();
-            let label = ui.label("Masks").on_hover_text("Whether masks beside the photos are used");
+            let label = ui.label("Masks").on_hover_text("Use the masks beside the photos");
             let mut used = chosen.masks == MaskUse::Use;
             ui.checkbox(&mut used, "").labelled_by(label.id);
             chosen.masks = if used { MaskUse::Use } else { MaskUse::Ignore };
@@ -65,10 +62,10 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ReadingMemory) {
                 .labelled_by(label.id);
             chosen.layer = (!layer.is_empty()).then_some(layer);
             ui.end_row();
-            let label = ui.label("Background").on_hover_text("What pixels show where no surface is");
+            let label = ui.label("Background").on_hover_text("What pixels without surface show");
             let names = [
-                (BackgroundChoice::Auto, "Found out"),
-                (BackgroundChoice::Environment, "The light itself"),
+                (BackgroundChoice::Auto, "Auto-detect"),
+                (BackgroundChoice::Environment, "Environment"),
                 (BackgroundChoice::Black, "Black"),
             ];
             let name = names.iter().find(|(own, _)| *own == chosen.background).map_or("", |(_, name)| name);
@@ -81,12 +78,12 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ReadingMemory) {
             ui.end_row();
         });
         let differs = *chosen != in_force;
-        let again = ui.add_enabled(differs, egui::Button::new("Read the scene again"));
-        if again.on_hover_text("A fit in progress is stopped; its checkpoint keeps what was done").clicked() {
+        let again = ui.add_enabled(differs, egui::Button::new("Reload scene"));
+        if again.on_hover_text("A running fit is stopped; its checkpoint keeps the progress").clicked() {
             let chosen = chosen.clone();
             model.open_with(path, chosen);
         } else if differs {
-            ui.label(RichText::new("Not in force yet").weak());
+            ui.label(RichText::new("Not applied yet").weak());
         }
     });
 }

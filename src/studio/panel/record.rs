@@ -1,5 +1,6 @@
 //! The texel under the cursor: its values, the photos that see it, and what each of them says.
 
+use super::views::{role, role_words};
 use super::{empty, heading};
 use crate::error::{Error, ErrorKind};
 use crate::image::value_scale::three_digits;
@@ -40,14 +41,18 @@ fn place_of(cursor: &Cursor) -> [u32; 2] {
 /// Draws the panel.
 pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut RecordMemory) {
     let Some(cursor) = model.cursor else {
-        return empty(ui, "No texel", "Point at the stage, a map or a photo; a click on the stage pins the texel");
+        return empty(
+            ui,
+            "No texel",
+            "Point at the viewport, a map or a photo; a click in the viewport pins the texel",
+        );
     };
     take_in(model, memory);
     ask(ui, model, &cursor, memory);
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.horizontal(|ui| {
             ui.label(RichText::new(if cursor.pinned { "Pinned texel" } else { "Texel under the cursor" }).strong());
-            if cursor.pinned && ui.button("Let go").clicked() {
+            if cursor.pinned && ui.button("Unpin").clicked() {
                 model.cursor = None;
             }
         });
@@ -60,16 +65,16 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut RecordMemory) {
         match memory.record.as_ref().filter(|(own, _)| own.place == place) {
             Some((_, record)) => body(ui, model, record),
             None if !cursor.pinned => {
-                ui.label("Click the surface to see what every photo says of it");
+                ui.label("Click the surface to list the observations of every photo");
             }
             None if model.project.as_ref().is_none_or(|project| project.maps.is_none()) => {
-                ui.label("There are no maps yet: start a fit");
+                ui.label("No maps yet. Start a fit first.");
             }
             None if memory.pending.is_none() && memory.failed.is_some_and(|own| own.place == place) => {
-                ui.label("The photos could not be asked: see Messages");
+                ui.label("The views could not be queried: see Messages");
             }
             None => {
-                ui.label("Asking the photos");
+                ui.label("Querying views…");
             }
         }
     });
@@ -85,8 +90,8 @@ fn take_in(model: &mut Model, memory: &mut RecordMemory) {
             // The thread is gone without a record: the same question would end the same way.
             memory.failed = Some(*question);
             model.log.error(
-                &Error::new(ErrorKind::Internal, "the photos could not be asked about a texel")
-                    .remedy("a defect of this program; other texels can still be asked about"),
+                &Error::new(ErrorKind::Internal, "the views could not be queried for a texel")
+                    .remedy("internal error (please report); other texels can still be queried"),
             );
         }
     }
@@ -163,16 +168,16 @@ fn body(ui: &mut Ui, model: &mut Model, record: &TexelRecord) {
         for (name, value, help) in uncertainty {
             line(name, value, help);
         }
-        line("Seen by", format!("{} photos", record.rows.len()), "Photos whose view of the texel nothing blocks");
-        line("Resolved to", figure(record.footprint_texels, 2, " texels a pixel", UNSEEN), "Above 1 no photo resolves single texels here");
-        line("Spread of views", figure(record.view_spread_degrees, 0, " degrees", UNSEEN), "Small: shine cannot be told from colour");
-        let no_highlight = if record.rows.is_empty() { UNSEEN } else { "it faces away from the light" };
-        line("Nearest to highlight", figure(record.highlight_degrees, 0, " degrees", no_highlight), "Angle between the normal and the nearest half vector of a view and the brightest light: small, and roughness can be known");
+        line("View count", format!("{} photos", record.rows.len()), "Photos that see the texel");
+        line("Texels per photo pixel", figure(record.footprint_texels, 2, "", UNSEEN), "Above 1, no photo resolves single texels here");
+        line("View spread", figure(record.view_spread_degrees, 0, "°", UNSEEN), "Small: specular and diffuse cannot be separated");
+        let no_highlight = if record.rows.is_empty() { UNSEEN } else { "faces away from the environment" };
+        line("Closest half-angle to light", figure(record.highlight_degrees, 0, "°", no_highlight), "Angle between the normal and the nearest half vector of a view and the brightest direction: where it is small, roughness is constrained");
         line("Clipped", figure(100.0 * record.clipped_share, 0, " %", UNSEEN), "Share of these pixels that are clipped and no data");
     });
-    heading(ui, "What each photo says");
+    heading(ui, "Observations");
     if record.rows.is_empty() {
-        ui.label("No photo sees this place: its values come from its neighbours");
+        ui.label("No photo sees this texel: its values are filled from its neighbours");
         return;
     }
     let largest = record.rows.iter().map(|row| row.residual.length()).fold(1e-6f32, f32::max);
@@ -181,8 +186,8 @@ fn body(ui: &mut Ui, model: &mut Model, record: &TexelRecord) {
             ("Photo", "Click to choose it"),
             ("Angle", "Between the normal and the view, in degrees"),
             ("Photo", "Radiance in the photo"),
-            ("Fit", "Radiance of the fit, path traced"),
-            ("Pull", "Fit minus photo: what the photo would change"),
+            ("Render", "Radiance of the render, path traced"),
+            ("Residual", "Render minus photo"),
         ] {
             ui.label(RichText::new(title).weak().small()).on_hover_text(help);
         }
@@ -190,13 +195,7 @@ fn body(ui: &mut Ui, model: &mut Model, record: &TexelRecord) {
         for view in &record.rows {
             let name = RichText::new(&view.name).small();
             let name = if view.is_excluded || view.held_out { name.weak() } else { name };
-            let role = if view.is_excluded {
-                "left out"
-            } else if view.held_out {
-                "held out"
-            } else {
-                "fitted to"
-            };
+            let role = role_words(role(view.is_excluded, view.held_out));
             if ui.link(name).on_hover_text(role).clicked()
                 && let Some(project) = &mut model.project
             {
@@ -215,14 +214,14 @@ fn body(ui: &mut Ui, model: &mut Model, record: &TexelRecord) {
 fn uncertainty(model: &Model, (row, column): (usize, usize)) -> Vec<(&'static str, String, &'static str)> {
     let Some(project) = &model.project else { return Vec::new() };
     let named = [
-        (Told::Diffuse, "± diffuse", "Standard deviation, mean of the channels"),
-        (Told::Specular, "± specular", "Standard deviation, mean of the channels"),
-        (Told::Roughness, "± roughness", "Standard deviation"),
-        (Told::LobeSharing, "Shared lobe", "Texels that share this texel's specular lobe"),
+        (Told::Diffuse, "Std. dev. (diffuse)", "Posterior standard deviation, mean of the channels"),
+        (Told::Specular, "Std. dev. (specular)", "Posterior standard deviation, mean of the channels"),
+        (Told::Roughness, "Std. dev. (roughness)", "Posterior standard deviation"),
+        (Told::LobeSharing, "Lobe cluster size", "Number of texels that share this texel's specular lobe"),
         (
             Told::Choice,
-            "Lobe needed",
-            "What judging views chose: 1 no lobe, 2 one for its region, 3 lobes of their own",
+            "Lobe model",
+            "What the held-out views selected: 1 no lobe, 2 a shared lobe, 3 lobes of their own",
         ),
     ];
     let line = |(what, name, help): (Told, &'static str, &'static str)| {
@@ -230,8 +229,8 @@ fn uncertainty(model: &Model, (row, column): (usize, usize)) -> Vec<(&'static st
         let value = (row < texels.height() && column < texels.width()).then(|| texels[(row, column)])?;
         let words = match what {
             _ if !value.is_nan() => three_digits(value),
-            Told::Choice => "no view judges".into(),
-            _ => "taken over from neighbours".into(),
+            Told::Choice => "no held-out view".into(),
+            _ => "filled from neighbours".into(),
         };
         Some((name, words, help))
     };
@@ -269,7 +268,7 @@ mod tests {
 
     #[test]
     fn a_figure_that_is_none_says_why() {
-        assert_eq!(figure(12.345, 1, " degrees", UNSEEN), "12.3 degrees");
+        assert_eq!(figure(12.345, 1, "°", UNSEEN), "12.3°");
         assert_eq!(figure(f32::NAN, 0, " %", UNSEEN), "no photo sees it");
     }
 }

@@ -26,7 +26,7 @@ pub struct RelightMemory {
 pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut RelightMemory) {
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         controls(ui, model);
-        heading(ui, "Shelf");
+        heading(ui, "Environments");
         shelf(ui, model, memory);
         ui.horizontal_wrapped(|ui| {
             act_button(ui, model, Act::AddLight);
@@ -36,40 +36,37 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut RelightMemory) {
             act_button(ui, model, Act::SaveTurntable);
         });
         strip(ui, model, memory);
-        ui.label(
-            RichText::new("Right and left arrow go along the shelf; Shift and drag on the stage turns the light")
-                .weak(),
-        );
+        ui.label(RichText::new("Arrow keys switch the environment · Shift-drag rotates it").weak());
     });
 }
 
 fn controls(ui: &mut Ui, model: &mut Model) {
     egui::Grid::new("relight").num_columns(2).spacing([10.0, 5.0]).show(ui, |ui| {
         let relight = &mut model.edits.relight;
-        let label = ui.label("Turn");
+        let label = ui.label("Rotation");
         ui.add(Slider::new(&mut relight.turn_degrees, 0.0..=360.0).suffix("°").fixed_decimals(0))
             .labelled_by(label.id)
-            .on_hover_text("About the up axis\nKeys: Shift and the left or right arrow");
+            .on_hover_text("Rotate the environment about the up axis\nKeys: Shift and the arrow keys");
         ui.end_row();
-        let label = ui.label("Strength");
-        ui.add(Slider::new(&mut relight.strength_stops, -6.0..=6.0).suffix(" stops").fixed_decimals(1))
+        let label = ui.label("Intensity (EV)");
+        ui.add(Slider::new(&mut relight.strength_stops, -6.0..=6.0).suffix(" EV").fixed_decimals(1))
             .labelled_by(label.id)
-            .on_hover_text("The light is scaled by two to this power");
+            .on_hover_text("Scale the environment by two to this power");
         ui.end_row();
     });
     ui.horizontal_wrapped(|ui| {
-        ui.checkbox(&mut model.edits.relight.matched, "Match brightness")
-            .on_hover_text("Other lights are scaled to the mean luminance of the fitted one");
+        ui.checkbox(&mut model.edits.relight.matched, "Normalize intensity")
+            .on_hover_text("Scale other environments to the mean luminance of the estimated one");
         let on = model.edits.relight.as_background;
         act_switch(ui, model, Act::LightBackground, "Background", on);
         act_button(ui, model, Act::FittedLight);
     });
     ui.horizontal_wrapped(|ui| {
         let two = model.edits.relight.second.is_some();
-        act_switch(ui, model, Act::SecondLight, "Two lights", two);
+        act_switch(ui, model, Act::SecondLight, "Split view", two);
         if let Some(second) = model.edits.relight.second.clone() {
             let mut chosen = second.clone();
-            let label = ui.label("Second light");
+            let label = ui.label("Environment B");
             let list = ComboBox::from_id_salt("second light").selected_text(chosen.label()).show_ui(ui, |ui| {
                 for light in model.shelf.lights() {
                     ui.selectable_value(&mut chosen, light.name.clone(), light.name.label());
@@ -114,7 +111,7 @@ fn shelf(ui: &mut Ui, model: &mut Model, memory: &mut RelightMemory) {
                     let response = response.on_hover_text(about(light));
                     if matches!(light.name, LightName::File(_)) {
                         response.context_menu(|ui| {
-                            if ui.button("Take off the shelf").clicked() {
+                            if ui.button("Remove").clicked() {
                                 removed = Some(light.name.clone());
                                 ui.close();
                             }
@@ -147,7 +144,7 @@ fn strip(ui: &mut Ui, model: &mut Model, memory: &mut RelightMemory) {
         memory.strip.clear();
         return;
     }
-    heading(ui, "The same view under every light");
+    heading(ui, "Lighting contact sheet");
     let display = model.edits.display;
     let known = memory.strip.len() == pictures.len()
         && memory
@@ -182,10 +179,10 @@ fn strip(ui: &mut Ui, model: &mut Model, memory: &mut RelightMemory) {
 fn about(light: &ShelfLight) -> String {
     let (mean, brightest) = (light.mean_radiance, light.brightest);
     let place = match &light.name {
-        LightName::File(path) => format!("{}\nRight click takes it off the shelf", path.display()),
-        LightName::Fitted => "The light that was fitted to the photos".into(),
-        LightName::Truth => "The light the photos were made in".into(),
-        LightName::Unseen => "A light of the truth that no photo shows".into(),
+        LightName::File(path) => format!("{}\nRight-click to remove it", path.display()),
+        LightName::Fitted => "The environment estimated from the photos".into(),
+        LightName::Truth => "The environment the photos were rendered in".into(),
+        LightName::Unseen => "A ground-truth environment that no photo shows".into(),
         LightName::Sky(_) => "A built-in sky".into(),
     };
     format!(

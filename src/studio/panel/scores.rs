@@ -6,17 +6,17 @@ use crate::insight::scores::AggregateScore;
 use crate::job::entanglement::Entanglement;
 use crate::studio::act::Act;
 use crate::studio::model::Model;
-use crate::studio::model::viewing::ENTANGLEMENT_TITLE;
+use crate::studio::model::tasks::TaskKind;
 use egui::{Grid, RichText, ScrollArea, Ui};
 
 /// Draws the panel.
 pub fn show(ui: &mut Ui, model: &mut Model) {
     let Some(report) = model.fit.report.clone() else {
-        return empty(ui, "No scores yet", "They are measured when a fit is done");
+        return empty(ui, "No scores yet", "Computed when the fit is finished");
     };
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.horizontal(|ui| {
-            heading(ui, "Photos against the fit");
+            heading(ui, "Photos vs. render");
             act_button(ui, model, Act::OpenReport);
         });
         Grid::new("scores").striped(true).num_columns(5).spacing([18.0, 4.0]).show(ui, |ui| {
@@ -25,10 +25,10 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
                 row(ui, &aggregate.name, &aggregate.score);
             }
             if let Some(relit) = report.truth.as_ref().and_then(|truth| truth.relit.as_ref()) {
-                row(ui, "a light no photo shows", relit);
+                row(ui, "novel lighting", relit);
             }
         });
-        ui.label(RichText::new("In brackets: after the one best factor per channel, which no photo can tell").weak());
+        ui.label(RichText::new("In brackets: scale-aligned (per channel)").weak());
         truth(ui, &report);
         other_lights(ui, model);
     });
@@ -36,13 +36,13 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
 
 /// Scores under lights the fit never saw: the check of the paper.
 fn other_lights(ui: &mut Ui, model: &mut Model) {
-    heading(ui, "Under lights it was not fitted to");
+    heading(ui, "Novel lighting");
     let table = model.project.as_ref().and_then(|project| project.entanglement.clone());
     match table.as_deref() {
         None => {
-            let busy = model.tasks.is_running(ENTANGLEMENT_TITLE);
+            let busy = model.tasks.is_running(&TaskKind::NovelLighting);
             let there = model.project.as_ref().is_some_and(|project| project.scene.is_some() && project.maps.is_some());
-            if ui.add_enabled(there && !busy, egui::Button::new("Compare under other lights")).clicked() {
+            if ui.add_enabled(there && !busy, egui::Button::new("Compare under novel lighting")).clicked() {
                 model.measure_entanglement();
             }
         }
@@ -51,20 +51,20 @@ fn other_lights(ui: &mut Ui, model: &mut Model) {
         }
         Some(Entanglement::Known(rows)) => {
             Grid::new("other lights").striped(true).num_columns(5).spacing([18.0, 4.0]).show(ui, |ui| {
-                header(ui, "Light");
+                header(ui, "Environment");
                 for line in rows {
                     row(ui, &line.light, &line.score);
                 }
             });
-            ui.label(RichText::new("An error that grows under other lights is light that went into the maps").weak());
+            ui.label(RichText::new("An error that grows under novel lighting is lighting baked into the maps").weak());
         }
     }
 }
 
 fn header(ui: &mut Ui, first: &str) {
     for (title, help) in [
-        (first, "Which pictures"),
-        ("Number", "How many pictures"),
+        (first, "Which images"),
+        ("Images", "Number of images"),
         ("PSNR, dB", "10 log10 of 1 over the mean squared error of sRGB values"),
         ("SSIM", "Structural similarity of sRGB values (Wang et al. 2004)"),
         ("RMSE", "Root mean squared error of linear radiance"),
@@ -85,16 +85,16 @@ fn row(ui: &mut Ui, name: &str, score: &AggregateScore) {
 }
 
 fn truth(ui: &mut Ui, report: &ReportData) {
-    heading(ui, "Did light and material come apart?");
+    heading(ui, "Disentanglement");
     let Some(truth) = &report.truth else {
         ui.label(
-            "The truth is not known here. Compare by eye: in the panel Relight, a surface that keeps the shadows or \
-             highlights of the photos under another light has light baked into it.",
+            "No ground truth here. Compare by eye: in the Relight panel, a surface that keeps the shadows or \
+             highlights of the photos under another environment has lighting baked into it.",
         );
         return;
     };
     Grid::new("truth").striped(true).num_columns(3).spacing([18.0, 4.0]).show(ui, |ui| {
-        for title in ["Against the truth", "As fitted", "Scale-aligned"] {
+        for title in ["Against ground truth", "As estimated", "Scale-aligned"] {
             ui.label(RichText::new(title).weak());
         }
         ui.end_row();
@@ -110,14 +110,14 @@ fn truth(ui: &mut Ui, report: &ReportData) {
             line("Roughness, RMSE", maps.roughness.raw, maps.roughness.aligned);
         }
         if let Some(light) = &truth.environment {
-            line("Light, relative L2", light.relative_l2.raw, light.relative_l2.aligned);
-            line("Light, log RMSE", light.log_rmse.raw, light.log_rmse.aligned);
+            line("Environment, relative L2", light.relative_l2.raw, light.relative_l2.aligned);
+            line("Environment, log RMSE", light.log_rmse.raw, light.log_rmse.aligned);
         }
         if let Some(relit) = &truth.relit {
-            line("Relit pictures, RMSE", relit.raw.rmse_linear, relit.aligned.rmse_linear);
+            line("Relit renders, RMSE", relit.raw.rmse_linear, relit.aligned.rmse_linear);
         }
     });
     if let Some(degrees) = truth.environment.as_ref().and_then(|light| light.brightest_angle_degrees) {
-        ui.label(format!("The brightest light is off by {degrees:.1} degrees"));
+        ui.label(format!("Brightest direction off by {degrees:.1}°"));
     }
 }

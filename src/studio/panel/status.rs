@@ -2,7 +2,8 @@
 
 use crate::insight::report::number;
 use crate::studio::act::Act;
-use crate::studio::model::{FitStatus, Model, Workspace};
+use crate::studio::model::tasks::TaskKind;
+use crate::studio::model::{Model, Phase, Workspace};
 use crate::studio::theme;
 use egui::{Align, Layout, ProgressBar, RichText, Ui};
 
@@ -17,70 +18,80 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
 }
 
 fn left(ui: &mut Ui, model: &mut Model) {
-    let colours = theme::palette(ui.visuals());
-    if let Some((title, what, share)) = model.tasks.progress().into_iter().find(|(title, ..)| title != "Choosing") {
-        let text = if what.is_empty() { title.clone() } else { format!("{title}: {what}") };
+    let phase = model.phase();
+    if model.workspace == Workspace::Scene && phase.is_live() {
+        return fit(ui, model, &phase);
+    }
+    let tasks = model.tasks.progress();
+    if let Some((kind, what, share)) = tasks.into_iter().find(|(kind, ..)| *kind != TaskKind::Choosing) {
+        let text = if what.is_empty() { kind.words() } else { format!("{}: {what}", kind.words()) };
         ui.label(text);
         // A bar that moves by itself would be drawn anew all the time, and take from the work it tells of.
         ui.add(ProgressBar::new(share).desired_width(140.0).show_percentage());
-        if ui.button("Cancel").on_hover_text("Ends this work; what was there before stays").clicked() {
-            model.tasks.stop(&title);
-            model.log.note(format!("Stopped: {title}"));
+        if ui.button("Cancel").on_hover_text("Cancel this task; nothing that was open is lost").clicked() {
+            model.tasks.stop(&kind);
+            if kind.is_of_scene() {
+                model.start_is_queued = false;
+            }
+            model.log.note(format!("Cancelled: {}", kind.words()));
+        }
+        if phase == Phase::Queued {
+            ui.label("Fit starts automatically when ready");
         }
         return;
     }
     if model.workspace == Workspace::Object {
         return super::object::toolbar::status(ui, model);
     }
-    if model.project.is_none() {
-        return;
-    }
-    match &model.fit.status {
-        FitStatus::Failed(why) => {
-            ui.label(RichText::new(format!("Failed: {why}")).color(colours.error));
+    match &phase {
+        Phase::Closed => {}
+        Phase::Failed(_) => {
+            let colours = theme::palette(ui.visuals());
+            ui.label(RichText::new(phase.words()).color(colours.error));
         }
-        status => {
-            let live = status.is_live();
-            let words = RichText::new(status.words());
-            ui.label(if live { words.color(colours.accent).strong() } else { words });
+        _ => {
+            ui.label(phase.words());
         }
     }
-    if let (Some(row), true) = (model.fit.losses.last(), model.fit.status.is_live()) {
+}
+
+/// One bar over the whole job, with the number that the window's title shows.
+fn fit(ui: &mut Ui, model: &Model, phase: &Phase) {
+    let colours = theme::palette(ui.visuals());
+    ui.label(RichText::new(phase.words()).color(colours.accent).strong());
+    let advance = &model.fit.advance;
+    ui.add(ProgressBar::new(advance.share()).desired_width(160.0).text(format!("{} %", advance.percent())))
+        .on_hover_text("Share of the whole job, report included");
+    if let (Some(seconds), Phase::Fitting | Phase::Finishing(_)) = (advance.seconds_left(), phase) {
+        ui.label(format!("{} left", number::duration(seconds)));
+    }
+    if let (Some(row), Phase::Fitting | Phase::Pausing | Phase::Paused) = (model.fit.losses.last(), phase) {
         let total = model.fit.steps_total.max(1);
-        ui.add(ProgressBar::new(row.step as f32 / total as f32).desired_width(160.0))
-            .on_hover_text("Share of the steps that are done");
-        ui.label(format!("step {} of {total}, {}", row.step, row.stage));
-        if let (Some(progress), FitStatus::Running) = (&model.fit.progress, &model.fit.status) {
-            ui.label(format!(
-                "{:.1} steps/s, {} left",
-                progress.steps_per_second,
-                number::duration(progress.seconds_left)
-            ));
-        }
-        let (rmse, over) = match row.surface_rmse {
-            Some(surface) => (surface, "the unclipped surface of the last step's photos"),
-            None => (row.image_loss.max(0.0).sqrt(), "every pixel of the last step's photos that is evidence"),
-        };
-        ui.label(format!("RMSE {rmse:.4}"))
-            .on_hover_text(format!("Root mean squared error of linear radiance over {over}"));
+        ui.label(RichText::new(super::curves::stage_words(&row.stage)).weak())
+            .on_hover_text(format!("Step {} of {total}", row.step));
+    }
+    if let Some(rmse) = model.fit.losses.iter().rev().find_map(|row| row.held_out_rmse) {
+        ui.label(format!("Held-out RMSE {rmse:.4}"))
+            .on_hover_text("Root mean squared error of linear radiance over unclipped surface of held-out photos");
     }
 }
 
 fn right(ui: &mut Ui, model: &mut Model) {
     let warnings = model.log.unread;
-    if ui.button("Help").on_hover_text("Every act and its key\nKey: F1").clicked() {
+    if ui.button("Help").on_hover_text("Every command and its key\nKey: F1").clicked() {
         model.act(Act::Help);
     }
     if warnings > 0 {
         let colours = theme::palette(ui.visuals());
-        let text = RichText::new(format!("{warnings} to look at")).color(colours.warning);
-        if ui.button(text).on_hover_text("Warnings and errors since you last looked").clicked() {
+        let text = RichText::new(format!("{warnings} {}", if warnings == 1 { "warning" } else { "warnings" }))
+            .color(colours.warning);
+        if ui.button(text).on_hover_text("Warnings since you last opened Messages").clicked() {
             model.act(Act::PanelMessages);
         }
     }
     if model.software_adapter {
-        ui.label(RichText::new("software drawing").weak()).on_hover_text(format!(
-            "No graphics card is used: {}. Everything works; turning the scene is slower",
+        ui.label(RichText::new("CPU rendering").weak()).on_hover_text(format!(
+            "No graphics card is used: {}. Everything works; orbiting is slower",
             model.adapter
         ));
     }

@@ -4,7 +4,7 @@ use super::{act_button_named, act_switch};
 use crate::image::display::ToneCurve;
 use crate::studio::act::Act;
 use crate::studio::model::edits::PhotoLook;
-use crate::studio::model::{FitStatus, Model};
+use crate::studio::model::{Model, Phase};
 use crate::studio::stage::Layer;
 use crate::studio::theme;
 use egui::{Button, ComboBox, DragValue, Ui};
@@ -18,9 +18,9 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
             ui.separator();
             layers(ui, model);
             ui.separator();
-            act_switch(ui, model, Act::Traced, "Traced", model.switches.traced);
+            act_switch(ui, model, Act::Traced, "Path traced", model.switches.traced);
             act_switch(ui, model, Act::Frustums, "Cameras", model.switches.frustums);
-            act_switch(ui, model, Act::LookThrough, "Look through", model.switches.looking_through);
+            act_switch(ui, model, Act::LookThrough, "Camera view", model.switches.looking_through);
             if model.switches.looking_through {
                 photo(ui, model);
             }
@@ -32,24 +32,35 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
 }
 
 fn run(ui: &mut Ui, model: &mut Model) {
-    match model.fit.status {
-        FitStatus::Running => {
+    match model.phase() {
+        Phase::Fitting => {
             act_button_named(ui, model, Act::PauseOrGoOn, "Pause");
             act_button_named(ui, model, Act::Stop, "Stop");
         }
-        FitStatus::Paused => {
-            act_button_named(ui, model, Act::PauseOrGoOn, "Go on");
+        Phase::Paused => {
+            act_button_named(ui, model, Act::PauseOrGoOn, "Resume");
             act_button_named(ui, model, Act::StepOnce, "Step");
             act_button_named(ui, model, Act::Stop, "Stop");
         }
-        FitStatus::Pausing => {
-            act_button_named(ui, model, Act::PauseOrGoOn, "Go on");
+        Phase::Pausing => {
+            act_button_named(ui, model, Act::PauseOrGoOn, "Resume");
             act_button_named(ui, model, Act::Stop, "Stop");
         }
-        FitStatus::Stopping | FitStatus::Finishing(_) => {
+        Phase::Stopping | Phase::Finishing(_) => {
             act_button_named(ui, model, Act::Stop, "Stop");
         }
-        _ => start(ui, model),
+        Phase::Queued => {
+            act_button_named(ui, model, Act::Stop, "Cancel start");
+        }
+        Phase::Closed
+        | Phase::Opening
+        | Phase::Preparing
+        | Phase::Unprepared
+        | Phase::Ready
+        | Phase::Starting
+        | Phase::Finished
+        | Phase::Stopped
+        | Phase::Failed(_) => start(ui, model),
     }
 }
 
@@ -57,8 +68,7 @@ fn run(ui: &mut Ui, model: &mut Model) {
 fn start(ui: &mut Ui, model: &mut Model) {
     let available = crate::studio::act::availability::availability(Act::Start, model);
     let colours = theme::palette(ui.visuals());
-    let goes_on = super::fit::can_go_on(model);
-    let label = if goes_on { "Go on with the fit" } else { "Start fit" };
+    let label = if model.can_resume() { "Resume" } else { "Start" };
     let button = match available {
         Ok(()) => Button::new(egui::RichText::new(label).color(colours.on_accent)).fill(colours.accent),
         Err(_) => Button::new(label),
@@ -95,7 +105,7 @@ fn layers(ui: &mut Ui, model: &mut Model) {
         (Act::LayerChoice, Layer::Choice),
     ];
     let chosen = further.iter().find(|(_, layer)| *layer == model.edits.layer);
-    let text = chosen.map_or("More", |(act, _)| act.name());
+    let text = chosen.map_or("Diagnostics", |(act, _)| act.name());
     let mut menu = Button::new(text);
     if chosen.is_some() {
         menu = menu.selected(true);
@@ -111,20 +121,21 @@ fn layers(ui: &mut Ui, model: &mut Model) {
 fn photo(ui: &mut Ui, model: &mut Model) {
     let look = &mut model.edits.photo;
     let name = match look {
-        PhotoLook::Off => "No photo",
-        PhotoLook::Under => "Photo behind",
-        PhotoLook::Over(_) => "Photo over",
-        PhotoLook::Wipe(_) => "Photo wiped",
+        PhotoLook::Off => "Off",
+        PhotoLook::Under => "Backdrop",
+        PhotoLook::Over(_) => "Overlay",
+        PhotoLook::Wipe(_) => "Wipe",
     };
     ComboBox::from_id_salt("photo look").selected_text(name).width(96.0).show_ui(ui, |ui| {
-        ui.selectable_value(look, PhotoLook::Off, "No photo");
-        ui.selectable_value(look, PhotoLook::Under, "Photo behind").on_hover_text("In place of the background");
+        ui.selectable_value(look, PhotoLook::Off, "Off");
+        ui.selectable_value(look, PhotoLook::Under, "Backdrop")
+            .on_hover_text("Behind the surface, in place of the background");
         let over = matches!(look, PhotoLook::Over(_));
-        if ui.selectable_label(over, "Photo over").clicked() && !over {
+        if ui.selectable_label(over, "Overlay").clicked() && !over {
             *look = PhotoLook::Over(0.5);
         }
         let wiped = matches!(look, PhotoLook::Wipe(_));
-        if ui.selectable_label(wiped, "Photo wiped").clicked() && !wiped {
+        if ui.selectable_label(wiped, "Wipe").clicked() && !wiped {
             *look = PhotoLook::Wipe(0.5);
         }
     });
@@ -138,10 +149,10 @@ fn photo(ui: &mut Ui, model: &mut Model) {
 pub(super) fn display(ui: &mut Ui, model: &mut Model) {
     ui.label("Exposure");
     let stops = &mut model.edits.display.exposure_stops;
-    ui.add(DragValue::new(stops).speed(0.05).range(-20.0..=20.0).max_decimals(2).suffix(" stops"))
+    ui.add(DragValue::new(stops).speed(0.05).range(-20.0..=20.0).max_decimals(2).suffix(" EV"))
         // A setting of the fit is called exposure too.
         .accessible_name("Display exposure")
-        .on_hover_text("Pictures are scaled by two to this power\nKeys: E and Shift+E");
+        .on_hover_text("Scale the image by two to this power\nKeys: E and Shift+E");
     let curve = &mut model.edits.display.curve;
     let name = ToneCurve::NAMED.iter().find(|(own, _)| own == curve).map_or("", |(_, name)| name);
     let list = ComboBox::from_id_salt("tone curve").selected_text(name).width(80.0).show_ui(ui, |ui| {
@@ -149,7 +160,7 @@ pub(super) fn display(ui: &mut Ui, model: &mut Model) {
             ui.selectable_value(curve, own, name);
         }
     });
-    list.response.accessible_name("Tone curve").on_hover_text("How radiance becomes brightness\nKey: K");
+    list.response.accessible_name("Tone curve").on_hover_text("Tone mapping\nKey: K");
     act_switch(ui, model, Act::FalseColour, "False colour", model.edits.display.false_colour);
-    act_switch(ui, model, Act::Stripes, "Clipping", model.edits.display.stripes);
+    act_switch(ui, model, Act::Stripes, "Zebra", model.edits.display.stripes);
 }

@@ -1,6 +1,7 @@
 //! The table of photos: error, exposure, clipping; sort, choose, leave out.
 
 use super::{act_button_named, empty};
+use crate::fit::ViewUse;
 use crate::studio::act::Act;
 use crate::studio::model::Model;
 use crate::studio::theme;
@@ -44,9 +45,9 @@ impl Column {
             56.0,
             "Root mean squared error of linear radiance over unclipped surface, as last known",
         ),
-        (Column::Exposure, "Stops", 46.0, "Exposure that was fitted for the photo, in stops"),
-        (Column::Clipped, "Clipped", 52.0, "Share of the surface's pixels that are clipped and hence no data"),
-        (Column::Role, "Role", 58.0, "Fitted to, held out to judge, or left out"),
+        (Column::Exposure, "Exp. (EV)", 52.0, "Estimated exposure of the photo, in EV"),
+        (Column::Clipped, "Clipped", 52.0, "Share of the surface pixels that are clipped and not used"),
+        (Column::Role, "Use", 58.0, "Train, Test (held out) or Excluded"),
     ];
 
     fn width(self) -> f32 {
@@ -70,14 +71,32 @@ struct Row {
     error: Option<f32>,
     stops: f32,
     clipped: f32,
-    role: &'static str,
+    role: ViewUse,
+}
+
+/// What a photo is used for.
+pub(super) fn role(is_excluded: bool, is_held_out: bool) -> ViewUse {
+    match (is_excluded, is_held_out) {
+        (true, _) => ViewUse::LeftOut,
+        (false, true) => ViewUse::HeldOut,
+        (false, false) => ViewUse::Training,
+    }
+}
+
+/// The same in a word.
+pub(super) fn role_words(role: ViewUse) -> &'static str {
+    match role {
+        ViewUse::Training => "Train",
+        ViewUse::HeldOut => "Test",
+        ViewUse::LeftOut => "Excluded",
+    }
 }
 
 /// Draws the panel.
 pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ViewsMemory) {
     let rows = rows(model);
     if rows.is_empty() {
-        return empty(ui, "No photos", "Open a scene; a run whose scene moved away shows its maps only");
+        return empty(ui, "No photos", "Open a scene; a run whose scene has moved shows its maps only");
     }
     let rows = sorted(rows, memory);
     controls(ui, model);
@@ -112,13 +131,7 @@ fn rows(model: &Model) -> Vec<Row> {
             error: project.view_errors.get(index).copied().flatten(),
             stops: if stops.is_finite() { stops } else { 0.0 },
             clipped: project.clipped_shares.get(index).copied().unwrap_or(0.0),
-            role: if left_out {
-                "left out"
-            } else if view.held_out {
-                "held out"
-            } else {
-                "fitted"
-            },
+            role: role(left_out, view.held_out),
         }
     };
     scene.views.iter().enumerate().map(row).collect()
@@ -131,7 +144,7 @@ fn sorted(mut rows: Vec<Row>, memory: &ViewsMemory) -> Vec<Row> {
         Column::Error => unknown_last(a.error).total_cmp(&unknown_last(b.error)),
         Column::Exposure => a.stops.total_cmp(&b.stops),
         Column::Clipped => a.clipped.total_cmp(&b.clipped),
-        Column::Role => a.role.cmp(b.role),
+        Column::Role => role_words(a.role).cmp(role_words(b.role)),
     });
     if memory.descending {
         rows.reverse();
@@ -143,10 +156,10 @@ fn controls(ui: &mut Ui, model: &mut Model) {
     ui.horizontal_wrapped(|ui| {
         act_button_named(ui, model, Act::PreviousView, "Previous");
         act_button_named(ui, model, Act::NextView, "Next");
-        act_button_named(ui, model, Act::LookThrough, "Look through");
+        act_button_named(ui, model, Act::LookThrough, "Camera view");
         let name = model.project.as_ref().and_then(|project| project.chosen_name()).unwrap_or_default().to_owned();
         let out = model.edits.fit.exclude.contains(&name);
-        act_button_named(ui, model, Act::LeaveOut, if out { "Take in again" } else { "Leave out" });
+        act_button_named(ui, model, Act::LeaveOut, if out { "Include" } else { "Exclude" });
     });
     ui.add_space(4.0);
 }
@@ -167,7 +180,7 @@ fn header(ui: &mut Ui, memory: &mut ViewsMemory) {
                 ui.add(button)
             });
             let response = response.inner;
-            if response.on_hover_text(format!("{help}\nClick sorts by it, again turns the order")).clicked() {
+            if response.on_hover_text(format!("{help}\nClick to sort, click again to reverse")).clicked() {
                 memory.descending =
                     if own { !memory.descending } else { column == Column::Error || column == Column::Clipped };
                 memory.sorted_by = column;
@@ -191,7 +204,7 @@ fn line(ui: &mut Ui, model: &mut Model, row: &Row, chosen: bool, usual: f32, scr
     }
     let mut inner = ui.new_child(egui::UiBuilder::new().max_rect(rect).layout(Layout::left_to_right(Align::Center)));
     inner.spacing_mut().item_spacing.x = GAP;
-    let dim = row.role == "left out";
+    let dim = row.role == ViewUse::LeftOut;
     let mut cell = |column: Column, text: String, colour: Option<egui::Color32>| {
         let text = RichText::new(text).size(TEXT_POINTS);
         let text = match colour {
@@ -211,7 +224,7 @@ fn line(ui: &mut Ui, model: &mut Model, row: &Row, chosen: bool, usual: f32, scr
     cell(Column::Exposure, if row.stops == 0.0 { "0".into() } else { format!("{:+.2}", row.stops) }, None);
     let much = row.clipped > 0.05;
     cell(Column::Clipped, format!("{:.1} %", 100.0 * row.clipped), much.then_some(colours.warning));
-    cell(Column::Role, row.role.into(), None);
+    cell(Column::Role, role_words(row.role).into(), None);
     if chosen && scroll {
         response.scroll_to_me(None);
     }
@@ -221,7 +234,7 @@ fn line(ui: &mut Ui, model: &mut Model, row: &Row, chosen: bool, usual: f32, scr
     if response.double_clicked() && !model.switches.looking_through {
         model.act(Act::LookThrough);
     }
-    response.on_hover_text(format!("{}\nClick chooses it, double click looks through its camera", row.name));
+    response.on_hover_text(format!("{}\nClick to choose, double-click for its camera view", row.name));
 }
 
 #[cfg(test)]
@@ -236,7 +249,7 @@ mod tests {
             error,
             stops: 0.0,
             clipped: 0.0,
-            role: "fitted",
+            role: ViewUse::Training,
         };
         let rows = vec![row(0, Some(0.1)), row(1, None), row(2, Some(0.3))];
         let order = |descending| {

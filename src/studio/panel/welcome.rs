@@ -1,8 +1,8 @@
 //! The first page: open, recents, the demo, and what a scene folder must hold.
 
 use crate::studio::act::Act;
-use crate::studio::model::opening::TITLE;
 use crate::studio::model::store::Recent;
+use crate::studio::model::tasks::TaskKind;
 use crate::studio::model::{Model, PickFor};
 use crate::studio::theme;
 use egui::{
@@ -24,10 +24,13 @@ const KINDS: [(&str, &str); 5] = [
     ),
     ("An exchange folder", "scene.json with cameras, mesh.obj, views/ with EXR or PNG pictures"),
     ("Your own photos", "scene.toml that names a mesh (OBJ or PLY), a list of photos and their calibrated cameras"),
-    ("A run of Patina", "what a fit left behind: maps, light, report, checkpoint; an unfinished one can go on"),
+    (
+        "A run of Patina",
+        "the results of a fit: maps, environment, report, checkpoint; an unfinished one can be resumed",
+    ),
     (
         "One photo of an object",
-        "object mode: a sphere, or a mesh with its camera; finds the light and a measured reflectance",
+        "a sphere, or a mesh with its camera; estimates the environment and a measured reflectance",
     ),
 ];
 
@@ -48,29 +51,29 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut super::Memory) {
 fn page(ui: &mut Ui, model: &mut Model, memory: &mut WelcomeMemory) {
     let colours = theme::palette(ui.visuals());
     ui.label(RichText::new("Patina").size(40.0).color(colours.accent).strong());
-    ui.label(RichText::new("From photos of a place to materials one can relight").size(16.0));
+    ui.label(RichText::new("From calibrated photos to relightable materials").size(16.0));
     ui.add_space(20.0);
     interrupted(ui, model);
     ui.horizontal(|ui| {
         let demo = Button::new(RichText::new("Open the built-in demo").size(16.0).color(colours.on_accent))
             .fill(colours.accent)
             .min_size(vec2(230.0, 40.0));
-        if ui.add(demo).on_hover_text("A small scene whose materials are known; needs no data").clicked() {
+        if ui.add(demo).on_hover_text("A small scene with known materials; needs no data").clicked() {
             model.act(Act::OpenDemo);
         }
         let open = Button::new(RichText::new("Open a folder…").size(16.0)).min_size(vec2(190.0, 40.0));
-        if ui.add(open).on_hover_text("A scene folder, or a run that a fit left behind").clicked() {
+        if ui.add(open).on_hover_text("A scene folder or a run folder").clicked() {
             model.pick(PickFor::Open);
         }
         ui.label(RichText::new("or drop one here").weak());
     });
     ui.add_space(6.0);
     ui.horizontal(|ui| {
-        let object = Button::new(RichText::new("One photo of an object…").size(16.0)).min_size(vec2(230.0, 40.0));
+        let object = Button::new(RichText::new("Single object…").size(16.0)).min_size(vec2(230.0, 40.0));
         if ui.add(object).on_hover_text(Act::ObjectWorkspace.info().help).clicked() {
             model.act(Act::ObjectWorkspace);
         }
-        let materials = Button::new(RichText::new("Library of materials").size(16.0)).min_size(vec2(190.0, 40.0));
+        let materials = Button::new(RichText::new("Material library").size(16.0)).min_size(vec2(190.0, 40.0));
         if ui.add(materials).on_hover_text(Act::PanelMaterials.info().help).clicked() {
             model.act(Act::PanelMaterials);
         }
@@ -107,14 +110,14 @@ fn interrupted(ui: &mut Ui, model: &mut Model) {
     let Some(run) = model.interrupted_run.clone() else { return };
     let colours = theme::palette(ui.visuals());
     Frame::group(ui.style()).stroke(egui::Stroke::new(1.0, colours.warning)).show(ui, |ui| {
-        ui.label(RichText::new("Patina ended while a fit was running").color(colours.warning).strong());
-        ui.label(format!("Its last checkpoint is whole: {}", run.display()));
+        ui.label(RichText::new("Patina quit unexpectedly during a fit").color(colours.warning).strong());
+        ui.label(format!("A valid checkpoint was found: {}", run.display()));
         ui.horizontal(|ui| {
-            if ui.button("Take it up again").clicked() {
+            if ui.button("Resume").clicked() {
                 model.interrupted_run = None;
                 model.open(run.clone());
             }
-            if ui.button("Leave it").on_hover_text("The run stays on disk and can be opened later").clicked() {
+            if ui.button("Dismiss").on_hover_text("The run stays on disk and can be opened later").clicked() {
                 model.interrupted_run = None;
                 model.preferences.remember(&run, true);
             }
@@ -126,7 +129,7 @@ fn interrupted(ui: &mut Ui, model: &mut Model) {
 /// How far the scene is that is being opened.
 fn opening(ui: &mut Ui, model: &mut Model) {
     let progress = model.tasks.progress();
-    let Some((_, what, share)) = progress.iter().find(|(title, ..)| title == TITLE) else { return };
+    let Some((_, what, share)) = progress.iter().find(|(kind, ..)| *kind == TaskKind::Opening) else { return };
     ui.add_space(14.0);
     Frame::group(ui.style()).inner_margin(12.0).show(ui, |ui| {
         ui.label(RichText::new("Opening").strong());
@@ -136,9 +139,9 @@ fn opening(ui: &mut Ui, model: &mut Model) {
 }
 
 fn recents(ui: &mut Ui, model: &mut Model) {
-    ui.label(RichText::new("Opened before").strong());
+    ui.label(RichText::new("Recent").strong());
     if model.preferences.recents.is_empty() {
-        ui.label(RichText::new("Nothing yet").weak());
+        ui.label(RichText::new("No recent files").weak());
         return;
     }
     let recents: Vec<Recent> = model.preferences.recents.clone();
@@ -148,13 +151,13 @@ fn recents(ui: &mut Ui, model: &mut Model) {
         ui.horizontal(|ui| {
             let link = ui.add_enabled(is_there, Button::new(&name).frame(false));
             let link = link.on_hover_text(recent.path.display().to_string());
-            if link.on_disabled_hover_text("It is no longer there").clicked() {
+            if link.on_disabled_hover_text("No longer there").clicked() {
                 model.open(recent.path.clone());
             }
             ui.label(RichText::new(if recent.is_run { "run" } else { "scene" }).weak());
             let folder = recent.path.parent().map_or_else(String::new, |folder| folder.display().to_string());
             ui.label(RichText::new(folder).weak().small());
-            if !is_there && ui.small_button("Forget").clicked() {
+            if !is_there && ui.small_button("Remove from list").clicked() {
                 model.preferences.recents.retain(|other| *other != recent);
             }
         });
@@ -168,7 +171,7 @@ fn findings(ui: &mut Ui, model: &mut Model) {
         return;
     }
     ui.add_space(12.0);
-    ui.label(RichText::new("Noticed").strong());
+    ui.label(RichText::new("Issues").strong());
     for (index, message) in messages.iter().enumerate() {
         ui.push_id(index, |ui| super::messages::line(ui, model, message));
     }
@@ -183,7 +186,8 @@ pub fn drop_hint(context: &Context) {
     let painter = context.layer_painter(LayerId::new(Order::Foreground, Id::unique("drop hint")));
     let area = context.content_rect();
     painter.rect_filled(area, 0.0, Color32::from_black_alpha(170));
-    let text = "Drop a scene or run folder to open it, an HDR map to put it on the shelf; in object mode photos, masks, mesh, camera";
+    let text =
+        "Drop a scene or run folder to open it, an HDRI to import it; for a single object: photos, masks, mesh, camera";
     let font = TextStyle::Heading.resolve(&context.global_style());
     painter.text(area.center(), Align2::CENTER_CENTER, text, font, Color32::WHITE);
 }

@@ -52,21 +52,21 @@ pub enum Layer {
 impl Layer {
     /// All layers with their names on screen.
     pub const NAMED: [(Layer, &str); 15] = [
-        (Layer::Lit, "Lit"),
+        (Layer::Lit, "Shaded"),
         (Layer::Diffuse, "Diffuse"),
         (Layer::Specular, "Specular"),
         (Layer::Roughness, "Roughness"),
-        (Layer::Normal, "Normal"),
-        (Layer::PhotoError, "Photo error"),
+        (Layer::Normal, "Surface normal"),
+        (Layer::PhotoError, "Residual"),
         (Layer::Coverage, "Coverage"),
-        (Layer::TimesSeen, "Times seen"),
-        (Layer::Disagreement, "Disagreement"),
-        (Layer::DiffuseDeviation, "Uncertainty of diffuse"),
-        (Layer::SpecularDeviation, "Uncertainty of specular"),
-        (Layer::RoughnessDeviation, "Uncertainty of roughness"),
-        (Layer::LobeSharing, "Texels that share a lobe"),
-        (Layer::Choice, "Lobes that are needed"),
-        (Layer::Uv, "Texture coordinates"),
+        (Layer::TimesSeen, "View count"),
+        (Layer::Disagreement, "Multi-view inconsistency"),
+        (Layer::DiffuseDeviation, "Std. dev. (diffuse)"),
+        (Layer::SpecularDeviation, "Std. dev. (specular)"),
+        (Layer::RoughnessDeviation, "Std. dev. (roughness)"),
+        (Layer::LobeSharing, "Lobe cluster size"),
+        (Layer::Choice, "Lobe model"),
+        (Layer::Uv, "UV coordinates"),
     ];
 
     /// Whether the layer shows [`StageContent::quantity`] by the colour scale.

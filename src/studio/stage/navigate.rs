@@ -11,8 +11,8 @@ const WHEEL_POINTS: f32 = 400.0;
 
 /// Moves the eye by what the pointer did on the stage; whether it moved.
 ///
-/// Left drag turns; right or middle drag, or Ctrl and left drag, moves sideways; the wheel goes nearer to what is under
-/// the pointer. Shift and drag is left to whoever turns the light, a click and a double click to whoever picks. Looking
+/// Left or middle drag orbits; right drag, Shift and middle drag, or Ctrl and left drag, pans; the wheel goes nearer to what is under
+/// the pointer. Shift and left drag is left to whoever turns the light, a click and a double click to whoever picks. Looking
 /// through a photo ends with the first movement, from where one stood: `bounds` (lower and upper corner of the scene)
 /// says what to turn about.
 pub fn navigate(response: &egui::Response, eye: &mut Eye, bounds: Option<(Vec3, Vec3)>) -> bool {
@@ -22,8 +22,9 @@ pub fn navigate(response: &egui::Response, eye: &mut Eye, bounds: Option<(Vec3, 
     }
     let (shift, command) = response.ctx.input(|input| (input.modifiers.shift, input.modifiers.command));
     let drag = Vec2::new(response.drag_delta().x, response.drag_delta().y) / size.y;
-    let primary = response.dragged_by(egui::PointerButton::Primary) && !shift;
-    let other = response.dragged_by(egui::PointerButton::Secondary) || response.dragged_by(egui::PointerButton::Middle);
+    let middle = response.dragged_by(egui::PointerButton::Middle);
+    let primary = response.dragged_by(egui::PointerButton::Primary) && !shift || middle && !shift;
+    let other = response.dragged_by(egui::PointerButton::Secondary) || middle;
     let wheel = if response.contains_pointer() {
         response.ctx.input(|input| (-input.smooth_scroll_delta().y / WHEEL_POINTS).exp() / input.zoom_delta().max(1e-3))
     } else {

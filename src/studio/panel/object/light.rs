@@ -31,14 +31,13 @@ struct Seen {
 /// Draws the panel.
 pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ObjectLightMemory) {
     let Some(environment) = model.object.light() else {
-        return empty(ui, "No light yet", "It appears after the first round");
+        return empty(ui, "No environment yet", "It appears after the first round");
     };
     if model.object.outcome.as_ref().is_some_and(|outcome| outcome.parts.estimate.light_seen.is_some()) {
         ui.horizontal(|ui| {
-            ui.selectable_value(&mut memory.shows_seen, false, "Radiance")
-                .on_hover_text("The light that was estimated");
-            ui.selectable_value(&mut memory.shows_seen, true, "Seen by the photos")
-                .on_hover_text("How much each direction matters to the photos: the rest is what the prior made of it");
+            ui.selectable_value(&mut memory.shows_seen, false, "Radiance").on_hover_text("The estimated environment");
+            ui.selectable_value(&mut memory.shows_seen, true, "Sensitivity")
+                .on_hover_text("How much each direction matters to the photos; the rest follows the prior");
         });
         if memory.shows_seen {
             return seen(ui, model, memory, &environment);
@@ -48,8 +47,8 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ObjectLightMemory) {
         memory.exposed = Some((Arc::clone(&environment), auto_exposure(&environment.radiance)));
     }
     let stops = memory.exposed.as_ref().map_or(0.0, |(_, stops)| *stops);
-    ui.label(RichText::new(format!("Exposed for itself: {stops:+.1} stops")).weak())
-        .on_hover_text("On top of the display's exposure: no photo tells the level of the light");
+    ui.label(RichText::new(format!("Auto-exposed: {stops:+.1} EV")).weak())
+        .on_hover_text("On top of the display exposure: the absolute scale is ambiguous");
     let own = model.edits.display;
     let display = DisplaySettings { exposure_stops: own.exposure_stops + stops, ..own };
     light::draw(ui, model, &mut memory.light, "Estimated environment", &environment, None, &display);
@@ -66,12 +65,12 @@ fn seen(ui: &mut Ui, model: &Model, memory: &mut ObjectLightMemory, environment:
     }
     let Some(Seen { picture, stops, .. }) = &memory.seen else { return };
     let share = 100.0 * found.unseen_share;
-    ui.label(RichText::new(format!("The photos tell next to nothing of {share:.0} % of all directions")).weak());
+    ui.label(RichText::new(format!("The photos hardly constrain {share:.0} % of all directions")).weak());
     let display = DisplaySettings { exposure_stops: *stops, ..DisplaySettings::default() };
     let source = Source::from(Arc::clone(picture));
     let overlay = Overlay { badge: "up", ..Overlay::default() };
     let height = (ui.available_width() / 2.0).min(ui.available_height()).max(60.0);
     ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
-        picture::show(ui, "What the photos see of the light", &source, &display, &mut memory.seen_view, &overlay);
+        picture::show(ui, "Sensitivity of the photos", &source, &display, &mut memory.seen_view, &overlay);
     });
 }

@@ -37,7 +37,7 @@ pub fn show(
     });
     memory.slice = memory.slice.min(look.lobes.len().saturating_sub(1));
     ui.horizontal_wrapped(|ui| {
-        ui.label("Difference angle").on_hover_text("Half of the angle between the light and the eye");
+        ui.label("Difference angle").on_hover_text("θd: half the angle between light and view direction");
         for (index, slice) in look.lobes.iter().enumerate() {
             ui.selectable_value(&mut memory.slice, index, format!("{:.0}°", slice.difference_degrees));
         }
@@ -54,7 +54,7 @@ fn curves(ui: &mut Ui, name: &str, look: &MaterialLook, behind: Option<&Material
     };
     Plot::new(format!("lobes of the {name}"))
         .set_margin_fraction(vec2(0.02, 0.08))
-        .x_axis_label("half angle, degrees")
+        .x_axis_label("θh, half angle (degrees)")
         .x_grid_spacer(uniform_grid_spacer(|_| [10.0, 30.0, 90.0]))
         .y_axis_label("reflectance, 1/sr")
         .y_axis_formatter(|mark: GridMark, _: &_| number(10f64.powf(mark.value)))

@@ -64,17 +64,17 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut MaterialsMemory) {
     let Some(library) = model.materials.library.clone() else { return };
     ui.horizontal_wrapped(|ui| {
         let mut pictures = !memory.without_pictures;
-        ui.checkbox(&mut pictures, "Pictures").on_hover_text("Spheres in place of dots");
+        ui.checkbox(&mut pictures, "Pictures").on_hover_text("Spheres instead of dots");
         memory.without_pictures = !pictures;
         act_button_named(ui, model, Act::PreviousMaterial, "Before");
         act_button_named(ui, model, Act::NextMaterial, "After");
         let [first, second] = library.map.explained;
         ui.label(RichText::new(format!("{:.0} % of the codes' variance", 100.0 * (first + second))).weak())
             .on_hover_text("The two main directions of sixteen; each place is the mean of a material's three channels");
-        ui.label(RichText::new("Click between materials for one between them").weak());
+        ui.label(RichText::new("Click between materials to interpolate").weak());
     });
     let (rect, response) = ui.allocate_exact_size(ui.available_size().max(vec2(120.0, 120.0)), Sense::click());
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Map of the materials"));
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Latent map"));
     ui.painter().rect_filled(rect, 3.0, ui.visuals().extreme_bg_color);
     let screen = Screen::new(&library.map, rect);
     let mut clicked = response.interact_pointer_pos().filter(|_| response.clicked()).map(|at| screen.place(at));

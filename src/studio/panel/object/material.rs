@@ -12,13 +12,13 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut LobesMemory) {
         return empty(
             ui,
             "No material chosen",
-            "Click one among the materials, or any place on the map of codes; or open a .binary file",
+            "Click a material, or any place on the latent map; or open a .binary file",
         );
     };
     ui.add(egui::Label::new(RichText::new(choice.words()).strong()).wrap());
     light(ui, model);
     let Some(shown) = model.materials.shown.clone() else {
-        ui.label(RichText::new("Being drawn").weak());
+        ui.label(RichText::new("Rendering…").weak());
         return;
     };
     let [red, green, blue] = shown.albedo;
@@ -31,7 +31,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut LobesMemory) {
 fn light(ui: &mut Ui, model: &mut Model) {
     let mut chosen = model.materials.light.clone();
     ui.horizontal_wrapped(|ui| {
-        let label = ui.label("Sphere under");
+        let label = ui.label("Preview under");
         let words = chosen.as_ref().map_or("Three lamps".into(), |name| name.label());
         let list = ComboBox::from_id_salt("light of the sphere").selected_text(words).show_ui(ui, |ui| {
             ui.selectable_value(&mut chosen, None, "Three lamps");

@@ -5,7 +5,8 @@ use crate::measured::Category;
 use crate::studio::act::Act;
 use crate::studio::layout::Panel;
 use crate::studio::model::Model;
-use crate::studio::model::materials::{Choice, DRAWING_TITLE, OpenedTile};
+use crate::studio::model::materials::{Choice, OpenedTile};
+use crate::studio::model::tasks::TaskKind;
 use crate::studio::panel::{act_button_named, empty};
 use crate::studio::picture::ThumbnailCache;
 use crate::studio::theme;
@@ -44,12 +45,12 @@ pub(super) fn is_ready(ui: &mut Ui, model: &mut Model) -> bool {
     if model.materials.library.is_some() {
         return true;
     }
-    if model.tasks.is_running(DRAWING_TITLE) {
-        empty(ui, "The materials are being drawn", "This takes some seconds");
+    if model.tasks.is_running(&TaskKind::DrawingMaterials) {
+        empty(ui, "Rendering the materials", "This takes a few seconds");
     } else {
-        empty(ui, "No materials yet", "They come with the program");
+        empty(ui, "No materials yet", "They ship with Patina");
         ui.vertical_centered(|ui| {
-            if ui.button("Draw the materials").clicked() {
+            if ui.button("Render the materials").clicked() {
                 model.load_materials();
             }
         });

@@ -24,9 +24,9 @@ type Term = (&'static str, fn(&ObjectiveRow) -> f64, &'static str);
 
 const TERMS: [Term; 4] = [
     ("Objective", ObjectiveRow::total, "The sum of the terms"),
-    ("Picture", |row| row.data, "Mean loss on the logarithm of re-render over photo"),
-    ("Light", |row| row.light_prior, "Prior of the light"),
-    ("Codes", |row| row.code_prior, "Prior of the codes"),
+    ("Data term", |row| row.data, "Mean loss on the logarithm of re-render over photo"),
+    ("Light", |row| row.light_prior, "Light prior"),
+    ("Material prior", |row| row.code_prior, "Prior on the latent codes"),
 ];
 
 /// Draws the panel.
@@ -35,16 +35,16 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ObjectiveMemory) {
     let tried = model.object.rows.len() - rows.len();
     let Some(last) = rows.last().copied() else {
         let hint = match tried {
-            0 => "The terms of the objective appear here once an estimation runs".to_owned(),
-            count => format!("{count} starts were followed at low resolution; the first round is under way"),
+            0 => "The terms of the objective appear here during an estimation".to_owned(),
+            count => format!("{count} initializations were optimized at low resolution; the first round is running"),
         };
-        return empty(ui, "No curve yet", &hint);
+        return empty(ui, "No data", &hint);
     };
     ui.horizontal_wrapped(|ui| {
-        ui.selectable_value(&mut memory.over_seconds, false, "Over rounds");
-        ui.selectable_value(&mut memory.over_seconds, true, "Over time");
+        ui.selectable_value(&mut memory.over_seconds, false, "X axis: Rounds");
+        ui.selectable_value(&mut memory.over_seconds, true, "X axis: Time");
         ui.separator();
-        ui.checkbox(&mut memory.logarithmic, "Logarithmic");
+        ui.checkbox(&mut memory.logarithmic, "Log axis");
         ui.separator();
         let colours = theme::palette(ui.visuals()).curves;
         for ((name, value, help), colour) in TERMS.iter().zip(colours) {
@@ -52,7 +52,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ObjectiveMemory) {
             ui.painter().circle_filled(rect.center(), 4.0, colour);
             ui.label(format!("{name} {:.4}", value(&last))).on_hover_text(*help);
         }
-        ui.label(RichText::new(format!("{tried} starts followed")).weak());
+        ui.label(RichText::new(format!("{tried} initializations")).weak());
     });
     plot(ui, &rows, memory);
 }

@@ -74,7 +74,7 @@ fn controls(ui: &mut Ui, model: &mut Model, memory: &mut PictureMemory, photo: &
         }
         ui.separator();
         ui.checkbox(&mut memory.masked, "Mask").on_hover_text("Hatches pixels that do not show the object");
-        if ui.button("Whole").on_hover_text("Shows the whole photo").clicked() {
+        if ui.button("Fit view").on_hover_text("Show the whole photo").clicked() {
             memory.view.fit();
             memory.error_view.fit();
         }

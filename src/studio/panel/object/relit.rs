@@ -4,8 +4,8 @@ use crate::image::RgbImage;
 use crate::image::display::DisplaySettings;
 use crate::studio::act::Act;
 use crate::studio::model::Model;
-use crate::studio::model::estimating::RELIGHT_TITLE;
 use crate::studio::model::object::RelitObject;
+use crate::studio::model::tasks::TaskKind;
 use crate::studio::panel::relight::colour_image;
 use crate::studio::panel::{act_button, act_button_named};
 use egui::{Rect, RichText, ScrollArea, Sense, TextureHandle, Ui, pos2, vec2};
@@ -32,10 +32,12 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut RelitMemory) {
     });
     let relit = model.object.relit.clone();
     if relit.is_empty() {
-        let hint = match (model.tasks.is_running(RELIGHT_TITLE), model.object.outcome.is_some()) {
-            (true, _) => "The pictures are being made",
+        let hint = match (model.tasks.is_running(&TaskKind::RelightingObject), model.object.outcome.is_some()) {
+            (true, _) => "Rendering…",
             (false, true) => "Press Relight",
-            (false, false) => "The object under the lights of the shelf appears when the estimation is done",
+            (false, false) => {
+                "The object under the environments of the library appears when the estimation is finished"
+            }
         };
         ui.label(RichText::new(hint).weak());
         return;
@@ -63,7 +65,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut RelitMemory) {
                 });
             }
         });
-        ui.label(RichText::new("Each is exposed for itself: no photo tells the level of a light").weak());
+        ui.label(RichText::new("Each is auto-exposed: the absolute scale is ambiguous").weak());
     });
 }
 

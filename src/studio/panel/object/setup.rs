@@ -40,20 +40,20 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut SetupMemory) {
         let live = model.object.status.is_live();
         run(ui, model);
         ui.add_enabled_ui(!live, |ui| {
-            heading(ui, "Photos of one object, in one light");
+            heading(ui, "Photos of one object under one environment");
             paths(ui, model, "Photo", PickFor::ObjectPhoto, &mut memory.photo);
             heading(ui, "Shape");
             shape(ui, model, memory);
             heading(ui, "Masks");
-            ui.label(RichText::new("One a photo, or none; white is object").weak());
+            ui.label(RichText::new("One per photo, or none; white is object").weak());
             paths(ui, model, "Mask", PickFor::ObjectMask, &mut memory.mask);
-            heading(ui, "Light");
+            heading(ui, "Environment");
             light(ui, model);
             heading(ui, "Estimation");
             settings(ui, model);
         });
         ui.add_space(6.0);
-        ui.label(RichText::new("Files can also be dropped on the window").weak());
+        ui.label(RichText::new("You can also drop files on the window").weak());
     });
 }
 
@@ -64,11 +64,11 @@ fn run(ui: &mut Ui, model: &mut Model) {
         true => {
             act_button_named(ui, model, Act::ObjectStop, "Stop estimation");
         }
-        false => start(ui, model, "Estimate light and reflectance"),
+        false => start(ui, model, "Start estimation"),
     });
     match &model.object.status {
         ObjectStatus::Idle => {
-            ui.label(RichText::new("What lit the object, and what is it made of?").weak());
+            ui.label(RichText::new("Estimates the environment and the reflectance of the object").weak());
         }
         ObjectStatus::Failed(why) => {
             ui.label(RichText::new(format!("Failed: {why}")).color(colours.error));
@@ -90,8 +90,8 @@ fn result(ui: &mut Ui, model: &mut Model) {
     if model.object.status == ObjectStatus::Ended {
         ui.label(RichText::new("Ended early: this is what it had reached").color(colours.warning));
     }
-    ui.label(format!("Began as {}", estimate.start));
-    ui.label(format!("Picture within {:.3} in logarithms", estimate.picture_log_rmse))
+    ui.label(format!("Best initialization: {}", estimate.start));
+    ui.label(format!("log-RMSE {:.3}", estimate.picture_log_rmse))
         .on_hover_text("Root mean square of the logarithm of re-render over photo, over the pixels of the fit");
     match &outcome.folder {
         Some(folder) => {
@@ -107,7 +107,7 @@ fn result(ui: &mut Ui, model: &mut Model) {
         act_button(ui, model, Act::ObjectReport);
         act_button(ui, model, Act::ObjectSave);
         let is_lost = outcome.folder.is_none();
-        if is_lost && ui.button("Forget the result").on_hover_text("Lets another estimation start").clicked() {
+        if is_lost && ui.button("Discard result").on_hover_text("Lets another estimation start").clicked() {
             model.object.outcome = None;
         }
     });
@@ -124,7 +124,7 @@ fn paths(ui: &mut Ui, model: &mut Model, what: &str, purpose: PickFor, typing: &
     for (index, path) in list.iter().enumerate() {
         ui.horizontal(|ui| {
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let button = ui.small_button("Take out").accessible_name(format!("Take out {name}"));
+            let button = ui.small_button("Remove").accessible_name(format!("Remove {name}"));
             if button.clicked() {
                 removed = Some(index);
             }
@@ -151,7 +151,7 @@ fn paths(ui: &mut Ui, model: &mut Model, what: &str, purpose: PickFor, typing: &
 
 fn browse(ui: &mut Ui, model: &mut Model, purpose: PickFor, what: &str) {
     let button = ui.button("Browse…").accessible_name(format!("Browse for {what}"));
-    if button.on_hover_text("Opens the system's file dialog, where there is one").clicked() {
+    if button.on_hover_text("Open the system's file dialog").clicked() {
         model.pick(purpose);
     }
 }
@@ -159,8 +159,8 @@ fn browse(ui: &mut Ui, model: &mut Model, purpose: PickFor, what: &str) {
 fn shape(ui: &mut Ui, model: &mut Model, memory: &mut SetupMemory) {
     let form = &mut model.edits.object;
     if !form.normals.is_empty() {
-        ui.label("By pictures of normals, as in the result that was opened");
-        let button = ui.button("Take another shape").on_hover_text("A sphere, or a mesh with its cameras");
+        ui.label("By normal maps, as in the result that was opened");
+        let button = ui.button("Use another shape").on_hover_text("A sphere, or a mesh with its cameras");
         if button.clicked() {
             form.normals.clear();
             form.is_sphere = form.mesh.is_empty();
@@ -200,12 +200,12 @@ fn light(ui: &mut Ui, model: &mut Model) {
     ui.label(
         RichText::new(match is_known {
             true => "Known: only the reflectance is estimated",
-            false => "Estimated; name an HDR map where it is known",
+            false => "Estimated; name an HDRI where it is known",
         })
         .weak(),
     );
-    path_field(ui, model, "Known light", PickFor::ObjectLight);
-    if is_known && ui.button("Estimate the light too").clicked() {
+    path_field(ui, model, "Known environment", PickFor::ObjectLight);
+    if is_known && ui.button("Estimate the environment too").clicked() {
         model.edits.object.light.clear();
     }
 }
@@ -219,14 +219,14 @@ fn settings(ui: &mut Ui, model: &mut Model) {
             ui.add(DragValue::new(&mut form.lobes).range(1..=3).speed(0.02)).labelled_by(label.id);
             ui.end_row();
         }
-        choice(ui, "Prior of the light", &mut form.prior, &PRIORS);
+        choice(ui, "Light prior", &mut form.prior, &PRIORS);
         let effort = form.effort;
-        choice(ui, "Effort", &mut form.effort, &Effort::NAMED);
+        choice(ui, "Quality", &mut form.effort, &Effort::NAMED);
         if form.effort != effort {
             (form.light_rows, form.pixels) = (None, None);
         }
         let usual = form.effort.settings();
-        let label = ui.label("Rows of the light").on_hover_text("The light is twice as wide as high");
+        let label = ui.label("Environment resolution").on_hover_text("The environment is twice as wide as high");
         let rows = form.light_rows.unwrap_or(usual.light_height);
         let list =
             ComboBox::from_id_salt("light rows").selected_text(rows.to_string()).width(130.0).show_ui(ui, |ui| {
@@ -237,7 +237,7 @@ fn settings(ui: &mut Ui, model: &mut Model) {
             });
         list.response.labelled_by(label.id);
         ui.end_row();
-        let label = ui.label("Pixels").on_hover_text("Pixels that are used, spread over the photos");
+        let label = ui.label("Pixels").on_hover_text("Pixels used, spread over the photos");
         let mut pixels = form.pixels.unwrap_or(usual.pixels);
         if ui.add(DragValue::new(&mut pixels).range(16..=100_000).speed(8.0)).labelled_by(label.id).changed() {
             form.pixels = Some(pixels);

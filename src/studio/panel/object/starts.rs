@@ -10,47 +10,45 @@ use egui::{Grid, RichText, ScrollArea, Ui};
 pub fn show(ui: &mut Ui, model: &mut Model) {
     let findings: Vec<Message> = model.object.findings.iter().map(Message::from).collect();
     let Some(outcome) = model.object.outcome.clone() else {
-        return empty(
-            ui,
-            "No result yet",
-            "Here it says which starts explain the photo as well, and what it leaves open",
-        );
+        return empty(ui, "No result yet", "Lists which initializations explain the photo, and what it leaves open");
     };
     let colours = theme::palette(ui.visuals());
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let (spread, gauge) = (&outcome.spread, &outcome.gauge);
-        heading(ui, "What the photo leaves open");
+        heading(ui, "Ambiguity");
         ui.label(match spread.starts.len() {
-            0 => "The starts were not followed to the end".into(),
-            1 => "One start alone explains the photo; the others are at least 12 nats behind".into(),
+            0 => "The initializations were not optimized to the end".into(),
+            1 => {
+                "One initialization alone explains the photo; all others have Δ log-evidence of 12 nats or more".into()
+            }
             count => {
                 let of = |what: &str, spread: Option<f64>| {
                     spread.map(|spread| format!("{spread:.2} in the logarithm of the {what}"))
                 };
-                let both = [of("light", spread.light), of("reflectance", spread.reflectance)];
+                let both = [of("environment", spread.light), of("reflectance", spread.reflectance)];
                 let both = both.into_iter().flatten().collect::<Vec<_>>().join(" and by ");
-                format!("{count} starts explain the photo about as well: they differ by {both}")
+                format!("{count} initializations explain the photo about equally well: they differ by {both}")
             }
         });
         let [red, green, blue] = gauge.largest_factor;
         ui.label(
             RichText::new(format!(
-                "No photo tells the level: reflectance may be multiplied by up to {red:.1} (red), {green:.1} (green), \
-             {blue:.1} (blue), and the light divided by it"
+                "Scale ambiguity: reflectance may be multiplied by up to {red:.1} (red), {green:.1} (green), \
+             {blue:.1} (blue), and the environment divided by it"
             ))
             .weak(),
         );
         if !outcome.starts.is_empty() {
-            heading(ui, "Starts that were followed");
+            heading(ui, "Initializations");
             Grid::new("starts").striped(true).num_columns(4).spacing([18.0, 4.0]).show(ui, |ui| {
-                for title in ["Start", "Nats behind", "Objective", ""] {
+                for title in ["Initialization", "Δ log-evidence (nats)", "Objective", ""] {
                     ui.label(RichText::new(title).weak());
                 }
                 ui.end_row();
                 for start in &outcome.starts {
                     ui.label(&start.name);
                     ui.label(format!("{:.1}", start.nats_behind)).on_hover_text(
-                        "Difference of the logarithm of the evidence to the best: likelihood under any light",
+                        "Difference of the log-evidence to the best initialization, marginalized over the environment",
                     );
                     ui.label(format!("{:.4}", start.objective)).on_hover_text("At low resolution");
                     ui.label(match start.is_as_good {
@@ -61,9 +59,9 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
                 }
             });
         }
-        heading(ui, "Noticed");
+        heading(ui, "Issues");
         if findings.is_empty() {
-            ui.label(RichText::new("Nothing").weak());
+            ui.label(RichText::new("No issues").weak());
         }
         for (index, message) in findings.iter().enumerate() {
             ui.push_id(index, |ui| messages::line(ui, model, message));

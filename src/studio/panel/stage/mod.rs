@@ -10,7 +10,7 @@ use crate::studio::act::Act;
 use crate::studio::layout::Panel;
 use crate::studio::model::edits::PhotoLook;
 use crate::studio::model::log::{Message, capitalised};
-use crate::studio::model::viewing::LAYERS_TITLE;
+use crate::studio::model::tasks::TaskKind;
 use crate::studio::model::{Cursor, FitStatus, Model};
 use crate::studio::stage::eye::Eye;
 use crate::studio::stage::{self, Layer, Stage, StageFrame};
@@ -60,7 +60,7 @@ const DEGREES_PER_POINT: f32 = 0.4;
 /// Draws the panel.
 pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut StageMemory) {
     if model.project.is_none() {
-        return super::empty(ui, "Nothing is open", "Open a scene or the built-in demo");
+        return super::empty(ui, "No project open", "Open a scene or the built-in demo");
     }
     let eye = model.eye_in_force();
     let moved = memory.last_eye.as_ref() != Some(&eye);
@@ -81,11 +81,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut StageMemory) {
     let traced = memory.traced.update(ui, model, &frame, size, settled);
     frame.content.traced = traced.picture;
     let Some(stage) = &memory.stage else {
-        return super::empty(
-            ui,
-            "Nothing can draw in 3-D here",
-            "Maps, curves, photos and saving pictures work all the same",
-        );
+        return super::empty(ui, "No 3-D rendering available", "Maps, curves, photos and renders still work");
     };
     let response = stage.show(ui, &frame);
     let findings = stage.status().findings;
@@ -113,7 +109,9 @@ fn interact(ui: &mut Ui, model: &mut Model, memory: &mut StageMemory, frame: &St
     {
         // What is gripped lies where the button went down: a quick hand is elsewhere once it counts as a drag.
         let from = ui.input(|input| input.pointer.press_origin()).unwrap_or(at);
-        memory.dragging = Some(grip(model, frame, rect, from, shift));
+        // The middle button always moves the eye.
+        let is_middle = response.dragged_by(egui::PointerButton::Middle);
+        memory.dragging = Some(if is_middle { Dragging::Eye } else { grip(model, frame, rect, from, shift) });
     }
     if response.dragged()
         && let (Some(dragging), Some(at)) = (memory.dragging, pointer)
@@ -192,8 +190,8 @@ fn hover_camera(ui: &mut Ui, model: &mut Model, response: &Response, index: usiz
     let Some(project) = &mut model.project else { return };
     let Some(view) = project.scene.as_ref().and_then(|scene| scene.views.get(index)) else { return };
     let error = project.view_errors.get(index).copied().flatten();
-    let error = error.map_or_else(|| "error not known yet".to_owned(), |rmse| format!("RMSE {rmse:.4}"));
-    let text = format!("{}\n{error}\nClick to look through it", view.name);
+    let error = error.map_or_else(|| "residual not computed yet".to_owned(), |rmse| format!("RMSE {rmse:.4}"));
+    let text = format!("{}\n{error}\nClick for its camera view", view.name);
     ui.ctx().set_cursor_icon(CursorIcon::PointingHand);
     response.clone().on_hover_text_at_pointer(text);
     if response.clicked() {
@@ -254,11 +252,11 @@ fn decorate(ui: &mut Ui, model: &Model, frame: &StageFrame, rect: Rect, traced: 
         handle(&painter, rect, share, colours.accent);
     }
     let mut left = match model.project.as_ref().and_then(|project| project.chosen_name()) {
-        Some(name) if model.switches.looking_through => format!("Through the camera of {name}"),
+        Some(name) if model.switches.looking_through => format!("Camera view: {name}"),
         _ => String::new(),
     };
     if lit && relight.turn_degrees != 0.0 {
-        let turned = format!("light turned by {:.0} degrees", relight.turn_degrees);
+        let turned = format!("environment rotated by {:.0}°", relight.turn_degrees);
         left = if left.is_empty() { capitalised(&turned) } else { format!("{left}, {turned}") };
     }
     caption(Align2::LEFT_BOTTOM, &left);
@@ -268,15 +266,15 @@ fn decorate(ui: &mut Ui, model: &Model, frame: &StageFrame, rect: Rect, traced: 
     let is_measured = model.edits.layer.is_quantity() && told.is_none();
     let right = match (quick, clay) {
         _ if is_untold => model.why_untold(),
-        _ if is_measured && frame.content.quantity.is_none() => match model.tasks.is_running(LAYERS_TITLE) {
-            true => "Being measured",
-            false => "Not measured: View, Measure photo error",
+        _ if is_measured && frame.content.quantity.is_none() => match model.tasks.is_running(&TaskKind::Residuals) {
+            true => "Computing residuals…",
+            false => "Not computed: View › Compute residuals",
         },
-        (_, true) if lit => "No materials yet: start the fit",
+        (_, true) if lit => "No materials yet. Press Start.",
         (true, _) if matches!(model.fit.status, FitStatus::Running | FitStatus::Pausing) => {
-            "Quick look without shadows; pause to see it traced"
+            "Raster preview (no shadows) · pause for path tracing"
         }
-        (true, _) if !model.switches.traced => "Quick look without shadows",
+        (true, _) if !model.switches.traced => "Raster preview (no shadows)",
         _ => traced,
     };
     caption(Align2::RIGHT_BOTTOM, right);

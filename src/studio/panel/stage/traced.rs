@@ -160,11 +160,13 @@ impl Traced {
     /// The picture of one side, or of both joined at the line.
     fn shown(&mut self, wipe: Option<f32>) -> TracedPicture {
         let side = |place: usize| self.sides[place].as_ref().and_then(|own| own.picture.clone());
-        let Some((first, samples)) = side(0) else { return TracedPicture { caption: "Tracing".into(), picture: None } };
+        let Some((first, samples)) = side(0) else {
+            return TracedPicture { caption: "Path tracing…".into(), picture: None };
+        };
         let caption = |samples: usize| match samples {
-            0 => "Tracing".to_owned(),
-            SAMPLES => format!("Path traced, {SAMPLES} paths a pixel"),
-            _ => format!("Path traced, {samples} of {SAMPLES} paths a pixel"),
+            0 => "Path tracing…".to_owned(),
+            SAMPLES => format!("Path traced · {SAMPLES} spp"),
+            _ => format!("Path traced · {samples}/{SAMPLES} spp"),
         };
         let Some(wipe) = wipe else { return TracedPicture { picture: Some(first), caption: caption(samples) } };
         let Some((second, other_samples)) = side(1) else {

@@ -1,0 +1,179 @@
+//! How far a job is, from its first step to its report: one share that never goes back, and the seconds that are left.
+//!
+//! Steps are weighed by the seconds they are expected to take, as the job tells them; what comes after the last step, by
+//! the ratio that finishing had to fitting on this machine before ([`Advance::learned_ratio`], kept between runs).
+
+use super::fit::FitStatus;
+use crate::job::{FinishingStage, Progress};
+use std::time::Instant;
+
+/// Seconds of finishing for a second of fitting, where no run has told it yet.
+pub const FIRST_RATIO: f64 = 0.25;
+/// Smallest and largest ratio that is believed.
+const RATIOS: (f64, f64) = (0.02, 4.0);
+/// Share of a step, or of the finishing, that passing time alone may claim.
+const MOST_BY_TIME: f64 = 0.9;
+
+/// How far a job is.
+#[derive(Clone, Debug)]
+pub struct Advance {
+    ratio: f64,
+    share: f64,
+    /// Seconds of the steps so far, those still expected, and those of one step; when that was told.
+    steps: Option<(f64, f64, f64, Instant)>,
+    finishing: Option<(FinishingStage, Instant)>,
+    learned: Option<f64>,
+}
+
+impl Default for Advance {
+    fn default() -> Self {
+        Advance::new(FIRST_RATIO)
+    }
+}
+
+impl Advance {
+    /// At the start of a job whose finishing is expected to take so many seconds for a second of fitting.
+    pub fn new(ratio: f64) -> Self {
+        let ratio = if ratio.is_finite() { ratio.clamp(RATIOS.0, RATIOS.1) } else { FIRST_RATIO };
+        Advance { ratio, share: 0.0, steps: None, finishing: None, learned: None }
+    }
+
+    /// The share of the whole job that is done, in [0, 1]; it never goes back.
+    pub fn share(&self) -> f32 {
+        self.share as f32
+    }
+
+    /// The same in whole percent, for window title and status bar alike.
+    pub fn percent(&self) -> u32 {
+        (100.0 * self.share) as u32
+    }
+
+    /// Seconds until the report is written; `None` while nothing is known.
+    pub fn seconds_left(&self) -> Option<f64> {
+        let (done, left, _, then) = self.steps?;
+        let finishing = self.ratio * (done + left);
+        let seconds = match &self.finishing {
+            Some((_, began)) => finishing - began.elapsed().as_secs_f64(),
+            None => left - then.elapsed().as_secs_f64() + finishing,
+        };
+        seconds.is_finite().then_some(seconds.max(0.0))
+    }
+
+    /// The ratio that a job which ended has shown; handed out once.
+    pub fn learned_ratio(&mut self) -> Option<f64> {
+        self.learned.take()
+    }
+
+    pub(super) fn stepped(&mut self, progress: &Progress) {
+        let (done, left) = (progress.row.seconds, progress.seconds_left);
+        let step = 1.0 / progress.steps_per_second.max(1e-9);
+        if done.is_finite() && left.is_finite() {
+            self.steps = Some((done, left.max(0.0), step, Instant::now()));
+            self.claim(done / self.whole(done, left));
+        }
+    }
+
+    pub(super) fn finishing(&mut self, stage: FinishingStage) {
+        let began = self.finishing.map_or_else(Instant::now, |(_, began)| began);
+        self.finishing = Some((stage, began));
+        self.claim(self.before_finishing() + (1.0 - self.before_finishing()) * f64::from(stage.share_before()));
+    }
+
+    pub(super) fn finished(&mut self) {
+        self.share = 1.0;
+        if let (Some((done, ..)), Some((_, began))) = (self.steps, self.finishing) {
+            self.learned = Some((began.elapsed().as_secs_f64() / done.max(1e-3)).clamp(RATIOS.0, RATIOS.1));
+        }
+    }
+
+    /// Time passes within a step, or within the finishing.
+    pub(super) fn tick(&mut self, status: &FitStatus) {
+        let Some((done, left, step, then)) = self.steps else { return };
+        match (status, self.finishing) {
+            (FitStatus::Running, None) => {
+                let within = then.elapsed().as_secs_f64().min(MOST_BY_TIME * step).min(left);
+                self.claim((done + within) / self.whole(done, left));
+            }
+            (FitStatus::Finishing(_), Some((_, began))) => {
+                let share = began.elapsed().as_secs_f64() / (self.ratio * (done + left)).max(1e-3);
+                let before = self.before_finishing();
+                self.claim(before + (1.0 - before) * share.min(MOST_BY_TIME));
+            }
+            _ => {}
+        }
+    }
+
+    fn whole(&self, done: f64, left: f64) -> f64 {
+        ((done + left.max(0.0)) * (1.0 + self.ratio)).max(1e-9)
+    }
+
+    fn before_finishing(&self) -> f64 {
+        1.0 / (1.0 + self.ratio)
+    }
+
+    fn claim(&mut self, share: f64) {
+        if share.is_finite() {
+            self.share = self.share.max(share.clamp(0.0, 0.99));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::LossRow;
+
+    fn progress(seconds: f64, seconds_left: f64) -> Progress {
+        let row = LossRow {
+            step: 1,
+            stage: "maps".into(),
+            seconds,
+            loss: 1.0,
+            image_loss: 1.0,
+            consistency: 0.0,
+            surface_rmse: None,
+            held_out_rmse: None,
+        };
+        Progress { row, steps_total: 10, steps_per_second: 1.0, seconds_left }
+    }
+
+    #[test]
+    fn the_share_covers_finishing_and_never_goes_back() {
+        let mut advance = Advance::new(0.25);
+        let mut before = 0;
+        // The expectation grows on the way: what was shown stays.
+        for (seconds, left) in [(10.0, 30.0), (20.0, 20.0), (30.0, 90.0), (40.0, 0.0)] {
+            advance.stepped(&progress(seconds, left));
+            assert!(advance.percent() >= before, "{} after {before}", advance.percent());
+            before = advance.percent();
+        }
+        assert_eq!(advance.percent(), 80, "a fifth is left for what comes after the last step");
+        let stages = [
+            FinishingStage::Maps,
+            FinishingStage::Views,
+            FinishingStage::Capture,
+            FinishingStage::Relighting,
+            FinishingStage::Report,
+        ];
+        for stage in stages {
+            advance.finishing(stage);
+            advance.tick(&FitStatus::Finishing(stage));
+            assert!(advance.percent() >= before && advance.percent() < 100);
+            before = advance.percent();
+        }
+        advance.finished();
+        assert_eq!(advance.percent(), 100);
+        assert!(advance.learned_ratio().is_some_and(|ratio| ratio > 0.0) && advance.learned_ratio().is_none());
+    }
+
+    #[test]
+    fn the_time_left_counts_finishing_and_nothing_is_said_before_the_first_step() {
+        let mut advance = Advance::new(0.5);
+        assert!(advance.seconds_left().is_none() && advance.percent() == 0);
+        advance.stepped(&progress(10.0, 30.0));
+        let left = advance.seconds_left().unwrap();
+        assert!((49.0..=50.0).contains(&left), "{left}");
+        advance.stepped(&progress(f64::NAN, f64::NAN));
+        assert!(advance.seconds_left().is_some(), "what is not a number changes nothing");
+    }
+}

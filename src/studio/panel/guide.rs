@@ -1,0 +1,39 @@
+//! The user guide in a window of its own, beside the work it explains.
+
+use crate::guide::Topic;
+use crate::studio::model::Model;
+use egui::{Context, ScrollArea, Window};
+use egui_commonmark::{CommonMarkCache, CommonMarkViewer};
+
+/// What the window keeps.
+pub struct GuideMemory {
+    topic: Topic,
+    cache: CommonMarkCache,
+}
+
+impl Default for GuideMemory {
+    fn default() -> Self {
+        GuideMemory { topic: Topic::Window, cache: CommonMarkCache::default() }
+    }
+}
+
+/// Draws the guide, if it is open.
+pub fn show(context: &Context, model: &mut Model, memory: &mut GuideMemory) {
+    if !model.guide {
+        return;
+    }
+    let mut is_open = true;
+    Window::new("User guide").open(&mut is_open).default_size([860.0, 620.0]).vscroll(false).show(context, |ui| {
+        ui.horizontal_wrapped(|ui| {
+            for topic in Topic::ALL {
+                ui.selectable_value(&mut memory.topic, topic, topic.title());
+            }
+        });
+        ui.separator();
+        // Each topic is scrolled for itself.
+        ScrollArea::vertical().id_salt(memory.topic.title()).auto_shrink(false).show(ui, |ui| {
+            CommonMarkViewer::new().show(ui, &mut memory.cache, memory.topic.text());
+        });
+    });
+    model.guide = is_open;
+}
