@@ -9,6 +9,7 @@
 //! | folder | what it holds |
 //! |---|---|
 //! | [`error`], [`files`] | errors with kind, place and remedy; files that are written whole or not at all |
+//! | [`guide`] | the guide: capture, formats, objective, benchmarks, limits |
 //! | [`math`] | random numbers, frames, the sphere, sampling tables, statistics, numbers with derivatives |
 //! | [`image`] | linear images, image files, metrics |
 //! | [`trace`] | rays and the bounding volume hierarchy |
@@ -73,6 +74,7 @@ pub mod error;
 pub mod export;
 pub mod files;
 pub mod fit;
+pub mod guide;
 pub mod image;
 pub mod insight;
 pub mod job;

@@ -3,18 +3,23 @@
 //! [`arguments`] is what can be typed, [`fit`] drives a job and shows its events, [`measure`] audits and benches,
 //! [`contest`] holds methods against each other, [`study`] runs studies, [`measured`] is for measured reflectance and
 //! [`neural`] for its neural model, [`object`] is object mode, [`gauge`] moves the scale of a run,
-//! [`turntable`] belongs to `relight`, [`commands`] holds
-//! the rest. Whatever is asked here can be asked of the library in the same words.
+//! [`turntable`] belongs to `relight`, [`guide`]
+//! prints the guide, [`completions`] the script for a shell, `hint` answers what was mistyped, [`commands`] holds the
+//! rest. Whatever is asked here can be asked of the library in the same words.
 
 pub mod arguments;
 pub mod commands;
+pub mod completions;
 pub mod contest;
 pub mod fit;
 pub mod gauge;
+pub mod guide;
+mod hint;
 pub mod measure;
 pub mod measured;
 pub mod neural;
 pub mod object;
+mod standard_output;
 pub mod study;
 pub mod turntable;
 
@@ -30,8 +35,13 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(usage) => {
-            let _ = usage.print();
-            return ExitCode::from(if usage.use_stderr() { 2 } else { 0 });
+            let code = ExitCode::from(if usage.use_stderr() { 2 } else { 0 });
+            match hint::of(&usage) {
+                Some(hint) => eprintln!("{hint}"),
+                // Fails only where nobody reads any more.
+                None => drop(hint::suggested(usage).print()),
+            }
+            return code;
         }
     };
     if let Some(threads) = arguments.threads {
@@ -59,6 +69,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Task::Study(StudyTask::Ibrdf(options))) => object::study(&options, json),
         Some(Task::Study(StudyTask::Mvcl(options))) => study::mvcl(&options, json),
         Some(Task::Measured(task)) => measured::run(&task, json),
+        Some(Task::Guide(options)) => guide::guide(&options, json),
+        Some(Task::Completions(options)) => completions::completions(&options),
         Some(Task::Studio(options)) => window(&options),
         None => window(&StudioOptions::default()),
     };

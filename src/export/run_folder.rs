@@ -133,7 +133,7 @@ impl RunFolder {
         let missing: Vec<&str> = RESULT_FILES.into_iter().filter(|name| !self.file(name).is_file()).collect();
         if let Some(first) = missing.first() {
             let how = if self.checkpoint_path().is_file() {
-                "the fit has not ended: go on with `patina resume RUN`"
+                "the fit has not ended: resume it with `patina resume RUN`"
             } else {
                 "make the run again with `patina fit SCENE -o RUN`"
             };

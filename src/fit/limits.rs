@@ -88,7 +88,7 @@ impl FitSettings {
         let unknowns = columns * rows;
         if !self.fixed_light && unknowns > MOST_UNKNOWNS_OF_LIGHT {
             let message = format!("{unknowns} unknowns of the light are more than the solver can hold");
-            return too_large("environment-height", message, "give an even number up to 64, or --method paper");
+            return too_large("environment-height", message, "give an even number up to 64, or --method adam");
         }
         let grid = self.solver_grid.min(self.map_size);
         let bytes = grid * grid * 2 * height * height;

@@ -6,11 +6,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
-    /// As in the paper: many small steps of Adam along gradients of the path tracer.
+    /// Adam only, as in the paper: many small steps along gradients of the path tracer.
     #[default]
+    #[serde(rename = "adam", alias = "paper")]
+    #[value(name = "adam", alias = "paper")]
     Paper,
-    /// A few large steps without noise: rays are traced once, then texels are solved in closed form and the light by
-    /// Gauss-Newton with the texels eliminated. Settings of Adam's steps do not matter to it.
+    /// A few large steps without noise: rays are traced once, texels are solved in closed form, and the environment by
+    /// Gauss-Newton with the texels eliminated. Settings of Adam's steps do not apply to it.
     Solver,
 }
 
@@ -47,6 +49,14 @@ const OF_ADAM: [&str; 18] = [
 mod tests {
     use super::*;
     use crate::fit::FitSettings;
+
+    #[test]
+    fn the_word_of_older_settings_files_is_still_read() {
+        for text in ["method = \"adam\"", "method = \"paper\""] {
+            assert_eq!(FitSettings::from_toml(text).unwrap().method, Method::Paper);
+        }
+        assert_eq!(FitSettings::default().get_text("method").unwrap(), "adam");
+    }
 
     #[test]
     fn what_is_adams_alone_are_settings() {

@@ -23,7 +23,9 @@ pub struct ReadSettings {
     pub background: BackgroundChoice,
     /// How the numbers of the photos are encoded; `auto` goes by the file: 8 bits are sRGB, floats are linear.
     pub encoding: ColourEncoding,
-    /// Photos are averaged over squares of this many pixels, in linear radiance; 1 keeps them.
+    /// Photos are averaged over squares of this many pixels, in linear radiance; 1 keeps them. Older settings files name
+    /// it `shrink`.
+    #[serde(rename = "downsample", alias = "shrink")]
     pub shrink: usize,
 }
 
@@ -46,8 +48,8 @@ impl ReadSettings {
     /// Checks the ranges.
     pub fn validate(&self) -> Result<()> {
         if self.shrink == 0 || self.shrink > 64 {
-            return Err(Error::new(ErrorKind::InvalidSetting, format!("shrink is {}", self.shrink))
-                .at(Place::Setting("shrink".into()))
+            return Err(Error::new(ErrorKind::InvalidSetting, format!("the factor is {}", self.shrink))
+                .at(Place::Setting("downsample".into()))
                 .remedy("give a whole number from 1 to 64"));
         }
         Ok(())

@@ -121,7 +121,7 @@ fn after_a_stop_a_new_run_takes_the_settings_that_a_checkpoint_does_not() {
 #[test]
 fn a_setting_changes_while_the_fit_runs_and_what_cannot_change_is_grey() {
     let mut studio = TestStudio::with_running_fit();
-    for fixed in ["Map size", "Quick", "Balanced", "Careful"] {
+    for fixed in ["Map size", "Draft", "Standard", "High quality"] {
         assert!(studio.is_grey(fixed), "{fixed}");
     }
     assert!(!studio.is_grey("Samples") && !studio.is_grey("Bounces"));
@@ -165,12 +165,12 @@ fn a_preset_sets_the_form_and_undo_brings_the_own_settings_back() {
     let mut studio = TestStudio::with_small_scene();
     let own = studio.model().edits.fit.clone();
     assert!(studio.says("Differs from the usual"));
-    studio.click("Quick");
+    studio.click("Draft");
     // The photos are small, and so are the maps that suit them.
     assert_eq!(studio.model().edits.fit, FitSettings { map_size: 256, ..FitSettings::preset(Preset::Quick) });
-    studio.click("Balanced");
+    studio.click("Standard");
     assert!(studio.says("Differs from the usual: method paper"), "the method is no matter of presets");
-    assert!(!studio.says("method paper,"), "all else of the balanced preset is the usual");
+    assert!(!studio.says("method adam,"), "all else of the balanced preset is the usual");
     studio.frames(4);
     studio.press(Modifiers::COMMAND, Key::Z);
     studio.press(Modifiers::COMMAND, Key::Z);

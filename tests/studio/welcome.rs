@@ -67,16 +67,12 @@ fn a_scene_of_linear_photos_is_given_to_the_solver_and_presets_leave_it_there() 
     let mut studio = TestStudio::opening(Some(small_scene().into()));
     studio.wait("the scene", |model| model.project.is_some());
     assert_eq!(studio.model().edits.fit.method, Method::Solver);
-    assert!(
-        studio.log().contains("The method is the solver, since all photos hold linear radiance"),
-        "{}",
-        studio.log()
-    );
+    assert!(studio.log().contains("Using the solver, since all photos hold linear radiance"), "{}", studio.log());
     studio.act(Act::PanelFit);
     studio.control("Method");
     assert!(!studio.says("Differs from the usual"), "what suits the scene is the usual there");
     assert!(studio.controls("Consistency").is_empty(), "the solver knows none");
-    studio.click("Careful");
+    studio.click("High quality");
     assert_eq!(
         studio.model().edits.fit,
         FitSettings { method: Method::Solver, map_size: 256, ..FitSettings::preset(Preset::Careful) }
