@@ -9,6 +9,7 @@
 //! | folder | what it holds |
 //! |---|---|
 //! | `error`, `files` | errors with kind, place and remedy; files that are written whole or not at all |
+//! | `guide` | the guide: capture, formats, objective, benchmarks, limits |
 //! | `math` | random numbers, frames, the sphere, sampling tables, statistics, numbers with derivatives |
 //! | `image` | linear images, image files, metrics |
 //! | `trace` | rays and the bounding volume hierarchy |
@@ -87,6 +88,8 @@
 #![allow(rustdoc::private_intra_doc_links)]
 // What only the lab or a test asks for is not dead; the build of the tests, lab included, finds what is.
 #![cfg_attr(not(test), allow(dead_code, unused_imports))]
+// Tests write files that are theirs alone, and directions that are no zero.
+#![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 mod atlas;
 #[cfg(feature = "cli")]

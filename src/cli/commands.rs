@@ -83,7 +83,7 @@ pub fn check(options: &CheckOptions, json: bool) -> Result<()> {
     }
     if report.is_fatal() {
         return Err(Error::new(ErrorKind::InvalidScene, "a fit of this scene cannot work")
-            .remedy("mend what is marked fatal above"));
+            .remedy("fix what is marked fatal above"));
     }
     Ok(())
 }

@@ -216,7 +216,7 @@ fn watch(job: JobHandle, folder: &RunFolder, stop: &AtomicBool, json: bool) -> R
             Event::Finished(data) => break Ok(data),
             Event::Stopped { steps_done } => {
                 break Err(Error::new(ErrorKind::Stopped, format!("stopped after {steps_done} steps"))
-                    .remedy(format!("go on with `patina resume {}`", folder.path().display())));
+                    .remedy(format!("resume with `patina resume {}`", folder.path().display())));
             }
             Event::Failed(error) => break Err(error),
             _ => {}

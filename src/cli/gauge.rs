@@ -1,4 +1,4 @@
-//! `patina gauge`.
+//! `patina rescale`, also known as `gauge`.
 
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::job::gauge::{Move, move_run};
@@ -6,13 +6,13 @@ use clap::Args;
 use glam::{Vec2, Vec3};
 use std::path::PathBuf;
 
-/// Options of `patina gauge`.
+/// Options of `patina rescale`.
 #[derive(Debug, Args)]
 #[command(group(clap::ArgGroup::new("by").required(true).args(["factor", "patch"])))]
 pub struct GaugeOptions {
     /// The run folder; it is only read.
     pub run: PathBuf,
-    /// Multiply reflectance by this factor, or by these three for red, green and blue; the light is divided by it.
+    /// Multiply reflectance by this factor, or by these three for red, green and blue; the environment is divided by it.
     #[arg(long, value_name = "R,G,B", value_delimiter = ',', num_args = 1)]
     pub factor: Vec<f32>,
     /// Give the diffuse map this reflectance at a place, as 0.25,0.75=0.18 (v is up); three values make it a colour.

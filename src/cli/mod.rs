@@ -2,8 +2,8 @@
 //!
 //! [`arguments`] is what can be typed, [`fit`] drives a job and shows its events, [`measured`] is for measured
 //! reflectance, [`object`] is object mode, [`gauge`] moves the scale of a run, [`export`] writes it for other
-//! programs, [`turntable`] belongs to `relight`,
-//! [`commands`] holds the rest; `say` writes lines where somebody listens, `threads` starts what everything works on.
+//! programs, [`turntable`] belongs to `relight`, [`guide`] prints the guide,
+//! [`completions`] the script for a shell, `hint` answers what was mistyped, [`commands`] holds the rest; `say` writes lines where somebody listens, `threads` starts what everything works on.
 //! Whatever is asked here can be asked of the library in the same words.
 
 /// A line on standard output; lost where nobody listens, see [`say`].
@@ -18,12 +18,16 @@ macro_rules! eprintln {
 
 pub mod arguments;
 pub mod commands;
+pub mod completions;
 pub mod export;
 pub mod fit;
 pub mod gauge;
+pub mod guide;
+mod hint;
 pub mod measured;
 pub mod object;
 mod say;
+mod standard_output;
 mod threads;
 pub mod turntable;
 
@@ -39,8 +43,13 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(usage) => {
-            let _ = usage.print();
-            return ExitCode::from(if usage.use_stderr() { 2 } else { 0 });
+            let code = ExitCode::from(if usage.use_stderr() { 2 } else { 0 });
+            match hint::of(&usage) {
+                Some(hint) => eprintln!("{hint}"),
+                // Fails only where nobody reads any more.
+                None => drop(hint::suggested(usage).print()),
+            }
+            return code;
         }
     };
     let json = arguments.json;
@@ -59,6 +68,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Task::Compare(options)) => commands::compare(&options, json),
         Some(Task::Object(options)) => object::object(&options, json),
         Some(Task::Measured(task)) => measured::run(&task, json),
+        Some(Task::Guide(options)) => guide::guide(&options, json),
+        Some(Task::Completions(options)) => completions::completions(&options),
         Some(Task::Studio(options)) => window(&options),
         None => window(&StudioOptions::default()),
     };

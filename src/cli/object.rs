@@ -23,7 +23,7 @@ use std::sync::atomic::AtomicBool;
 #[derive(Debug, Args)]
 #[command(group(clap::ArgGroup::new("shape").required(true).args(["mesh", "sphere", "normals"])))]
 pub struct ObjectOptions {
-    /// One photo or several of the same object under the same light: EXR, HDR, PFM, PNG or JPEG.
+    /// One photo or several of the same object under the same environment: EXR, HDR, PFM, PNG or JPEG.
     #[arg(required = true)]
     pub photos: Vec<PathBuf>,
     /// The mesh of the object: OBJ or PLY.
@@ -33,7 +33,7 @@ pub struct ObjectOptions {
     #[arg(long)]
     pub sphere: bool,
     /// Normals of the object in place of a mesh, one EXR or PFM a photo, of its size: unit vectors in the world (+y up,
-    /// +z towards the eye), zero beside the object; seen from infinitely far along -z.
+    /// +z towards the camera), zero beside the object; seen from infinitely far along -z.
     #[arg(long, num_args = 1..)]
     pub normals: Vec<PathBuf>,
     /// Cameras: a cameras.json that lists the photos, or one BlendedMVS camera file a photo.
@@ -42,7 +42,7 @@ pub struct ObjectOptions {
     /// Masks, one a photo: white is object.
     #[arg(long, num_args = 1..)]
     pub mask: Vec<PathBuf>,
-    /// The light is known: only the reflectance is estimated.
+    /// A known environment: only the reflectance is estimated.
     #[arg(long)]
     pub env: Option<PathBuf>,
     /// Model of the reflectance.
@@ -54,19 +54,19 @@ pub struct ObjectOptions {
     /// Lobes of the neural model.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=3))]
     pub lobes: u8,
-    /// Prior of the light.
+    /// Prior of the environment [default: deep].
     #[arg(long, value_enum)]
     pub prior: Option<LightPriorKind>,
-    /// How the light is improved.
+    /// How the environment is optimised.
     #[arg(long, value_enum)]
     pub method: Option<LightMethod>,
-    /// A coarse light, few pixels and few rounds.
+    /// A first look: a coarse environment, few pixels and few rounds.
     #[arg(long)]
     pub quick: bool,
     /// The schedule released with the paper, in place of the program's own.
     #[arg(long, conflicts_with = "quick")]
     pub released: bool,
-    /// Rows of the estimated light, 8 to 180; even with the deep prior.
+    /// Environment resolution in rows, 8 to 180; an even number with the deep prior.
     #[arg(long)]
     pub light_height: Option<usize>,
     /// Pixels that are used.
@@ -75,16 +75,16 @@ pub struct ObjectOptions {
     /// Added to radiance before the logarithm, over the exposure of the photos: dark pixels say less the larger it is.
     #[arg(long)]
     pub epsilon_share: Option<f64>,
-    /// Leave shadows out.
+    /// Do not trace shadows of the object on itself.
     #[arg(long)]
     pub no_shadows: bool,
-    /// Lights to show the object under.
+    /// Environments to relight the object under.
     #[arg(long, num_args = 1..)]
     pub relight: Vec<PathBuf>,
-    /// Which axis of mesh and cameras points up: auto, or one of +x -x +y -y +z -z.
+    /// Axis of mesh and cameras that points up: auto, or one of +x -x +y -y +z -z [default: auto].
     #[arg(long, allow_hyphen_values = true)]
     pub up: Option<Up>,
-    /// Where the cameras put pixel centres: auto, integer or half.
+    /// Pixel-centre convention of the cameras: auto, integer or half [default: auto].
     #[arg(long)]
     pub pixel_centre: Option<PixelCentre>,
     /// Seed of pixels and net.

@@ -14,8 +14,8 @@ use std::sync::atomic::AtomicBool;
 /// Options of the turntable.
 #[derive(Clone, Debug, Args)]
 pub struct TurntableOptions {
-    /// Make a turntable of so many frames under each light instead of single pictures: numbered PNG files of one turn,
-    /// from the first of the views.
+    /// Render a turntable of this many frames under each environment in place of single images: numbered PNG files of one
+    /// turn, from the first of the views.
     #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub turntable: Option<u32>,
     /// What turns.

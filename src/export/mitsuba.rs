@@ -75,8 +75,8 @@ fn scene(asset: &Asset, bsdf: &str) -> String {
     // A camera that sees all of it, from the front and a little above.
     let (low, high) = asset.mesh.bounds().unwrap_or((Vec3::NEG_ONE, Vec3::ONE));
     let (centre, radius) = (0.5 * (low + high), 0.5 * (high - low).length().max(1e-6));
-    let eye =
-        centre + Vec3::new(0.4, 0.35, 1.0).normalize() * (1.1 * radius / (0.5 * FIELD_OF_VIEW).to_radians().sin());
+    let eye = centre
+        + Vec3::new(0.4, 0.35, 1.0).normalize_or_zero() * (1.1 * radius / (0.5 * FIELD_OF_VIEW).to_radians().sin());
     let point = |p: Vec3| format!("{}, {}, {}", p.x, p.y, p.z);
     let light = match asset.light {
         Some(_) => {

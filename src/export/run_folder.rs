@@ -172,7 +172,7 @@ impl RunFolder {
         let missing: Vec<&str> = needed.iter().copied().filter(|name| !self.file(name).is_file()).collect();
         if let Some(first) = missing.first() {
             let how = if self.checkpoint_path().is_file() {
-                "the fit has not ended: go on with `patina resume RUN`"
+                "the fit has not ended: resume it with `patina resume RUN`"
             } else {
                 "make the run again with `patina fit SCENE -o RUN`"
             };

@@ -7,18 +7,18 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Method {
-    /// What suits the scene: the solver, unless there are no photos or a setting was chosen that means something to Adam
-    /// alone. Resolved once, before a fit begins, by [`Suited`](super::Suited); no run records it.
+    /// What suits the scene: the solver, unless there are no photos or a setting is given that applies to Adam only.
+    /// Resolved once, before a fit begins, by [`Suited`](super::Suited); no run records it.
     #[default]
     #[serde(rename = "auto")]
     #[value(name = "auto")]
     Automatic,
-    /// As in the paper (Joy and Poullis 2023): many small steps of Adam along gradients of the path tracer.
+    /// Adam only, as in the paper (Joy and Poullis 2023): many small steps along gradients of the path tracer.
     #[serde(alias = "paper")]
     #[value(alias = "paper")]
     Adam,
-    /// A few large steps without noise: rays are traced once, then texels are solved in closed form and the light by
-    /// Gauss-Newton with the texels eliminated. Settings of Adam's steps do not matter to it.
+    /// A few large steps without noise: rays are traced once, texels are solved in closed form, and the environment by
+    /// Gauss-Newton with the texels eliminated. Settings of Adam's steps do not apply to it.
     Solver,
 }
 
@@ -55,6 +55,14 @@ const OF_ADAM: [&str; 18] = [
 mod tests {
     use super::*;
     use crate::fit::FitSettings;
+
+    #[test]
+    fn the_word_of_older_settings_files_is_still_read() {
+        for text in ["method = \"adam\"", "method = \"paper\""] {
+            assert_eq!(FitSettings::from_toml(text).unwrap().method, Method::Adam);
+        }
+        assert_eq!(FitSettings::default().get_text("method").unwrap(), "auto");
+    }
 
     #[test]
     fn what_is_adams_alone_are_settings() {

@@ -5,12 +5,15 @@ use super::settings::FitSettings;
 /// How much work a fit may be.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, clap::ValueEnum)]
 pub enum Preset {
-    /// A first look within minutes: small maps, few steps, direct light only.
+    /// A first look: small maps, few steps, direct light only.
+    #[value(name = "draft", alias = "quick")]
     Quick,
     /// The defaults.
     #[default]
+    #[value(name = "standard", alias = "balanced")]
     Balanced,
-    /// For the last run: more steps and paths, three bounces, a gain for each photo.
+    /// For the final run: more steps and samples, three bounces, exposure compensation.
+    #[value(name = "high-quality", alias = "careful")]
     Careful,
 }
 

@@ -64,59 +64,58 @@ pub struct FitSettings {
     /// Seed of all random numbers.
     #[arg(long, default_value_t = FitSettings::default().seed)]
     pub seed: u64,
-    /// How maps and light are found. With `auto` a scene is given to the solver, unless a setting is chosen that means
-    /// something to Adam alone.
+    /// How maps and environment are estimated. With `auto` a scene is given to the solver, to Adam where a setting is given
+    /// that applies to Adam only.
     #[arg(long, value_enum, default_value_t)]
     pub method: Method,
-    /// Width and height of the maps in texels: a power of two, 16 to 8192. When not given, neither here nor by a settings
-    /// file, maps are made smaller where less holds what the photos resolve, but not below 256.
+    /// Width and height of the maps in texels: a power of two, 16 to 8192 [default: what the photos resolve, 256 to 2048].
     #[arg(long, default_value_t = FitSettings::default().map_size)]
     pub map_size: usize,
-    /// Height of the environment in texels, 2 to 1024; it is twice as wide. The solver seeks one of up to 64.
+    /// Height of the environment in texels, 2 to 1024, at most 64 by the solver; it is twice as wide.
     #[arg(long, default_value_t = FitSettings::default().environment_height)]
     pub environment_height: usize,
-    /// Two steps as in the paper, or one.
+    /// Order in which Adam frees the maps: in two steps as in the paper, or in one.
     #[arg(long, value_enum, default_value_t)]
     pub steps: Steps,
-    /// Optimiser steps of the first step: diffuse and light.
+    /// Optimiser steps of the first step: diffuse map and environment.
     #[arg(long, default_value_t = FitSettings::default().steps_diffuse)]
     pub steps_diffuse: usize,
-    /// Optimiser steps of the second step: all maps and light.
+    /// Optimiser steps of the second step: all maps and the environment.
     #[arg(long, default_value_t = FitSettings::default().steps_all)]
     pub steps_all: usize,
     /// Views in one optimiser step, at least 1.
     #[arg(long, default_value_t = FitSettings::default().views_per_step)]
     pub views_per_step: usize,
-    /// Pixels in one optimiser step over all its views; 0 takes every pixel. Consistency always takes every pixel.
+    /// Pixels in one optimiser step over all its views; 0 takes every pixel, and so does multi-view consistency.
     #[arg(long, default_value_t = FitSettings::default().pixels_per_step)]
     pub pixels_per_step: usize,
-    /// Paths a pixel in one optimiser step, 1 to 4096; an even number keeps the squared error unbiased.
+    /// Samples per pixel in one optimiser step, 1 to 4096; an even number keeps the squared error unbiased.
     #[arg(long, default_value_t = FitSettings::default().samples)]
     pub samples: usize,
-    /// Surface hits on the longest path, 1 to 16; 1 is direct light only.
+    /// Max bounces: surface hits on the longest path, 1 to 16; 1 is direct light only.
     #[arg(long, default_value_t = FitSettings::default().bounces)]
     pub bounces: usize,
-    /// Levels of coarse-to-fine, 1 to 6: each halves photographs and maps once more. 1 works at full size only.
+    /// Levels of Adam's coarse-to-fine, 1 to 6: each halves photos and maps once more; 1 works at full size only.
     #[arg(long, default_value_t = FitSettings::default().levels)]
     pub levels: usize,
     /// How samples are spread over a pixel.
     #[arg(long, value_enum, default_value_t)]
     pub pixel_filter: PixelFilter,
-    /// Multi-view gradient consistency, in the second of two steps or in the one step there is.
+    /// Multi-view gradient consistency, in the last of Adam's steps.
     #[arg(long, value_enum, default_value_t)]
     pub consistency: Consistency,
-    /// Background pixels as evidence for the light.
+    /// Background pixels as evidence for the environment.
     #[arg(long, value_enum, default_value_t)]
     pub background: BackgroundEvidence,
-    /// Fit a gain for each view, with mean logarithm zero. When neither it nor `--exposure=false` is given, photos of 8 bits
-    /// get gains where the check finds that their exposures differ.
+    /// Per-photo exposure compensation: one gain per photo, with mean logarithm zero; `--exposure=false` leaves it out
+    /// [default: auto: for 8-bit photos where the check finds that exposures differ].
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", default_value_t = false,
         action = clap::ArgAction::Set)]
     pub exposure: bool,
-    /// Where to begin.
+    /// Where Adam begins.
     #[arg(long, value_enum, default_value_t)]
     pub start: Start,
-    /// Keep the light as it is at the start; with `--env` on the command line, a light that is known.
+    /// Keep the environment as it is at the start; with `--env` on the command line, one that is known.
     #[arg(long)]
     pub fixed_light: bool,
     /// Step size of diffuse reflectance, 0 to 1.
@@ -128,48 +127,49 @@ pub struct FitSettings {
     /// Step size of the logarithm of the microfacet width, 0 to 1.
     #[arg(long, default_value_t = FitSettings::default().rate_roughness)]
     pub rate_roughness: f32,
-    /// Step size of the light, relative to its mean plus the texel's own radiance, 0 to 1.
+    /// Step size of the environment, relative to its mean plus the texel's own radiance, 0 to 1.
     #[arg(long, default_value_t = FitSettings::default().rate_light)]
     pub rate_light: f32,
-    /// Weight of the wish for a smooth light, for texels that no pixel says much of; 0 leaves it out.
+    /// Weight of the smoothness prior on the environment, for texels that few pixels constrain; 0 leaves it out.
     #[arg(long, default_value_t = FitSettings::default().light_smoothness)]
     pub light_smoothness: f32,
-    /// Step sizes fall along a cosine to this share at the end of each of the two steps.
+    /// Step sizes fall along a cosine to this share of themselves at the end of each of the two steps.
     #[arg(long, default_value_t = FitSettings::default().final_rate)]
     pub final_rate: f32,
     /// Optimiser steps over which the specular lobe is switched on.
     #[arg(long, default_value_t = FitSettings::default().lobe_ramp)]
     pub lobe_ramp: usize,
-    /// Memory for first hits that are traced once, in MiB; 0 draws their places anew in each step, which takes about as
+    /// Memory for first hits that are traced once, in MiB; 0 draws their positions anew in each step, which takes about as
     /// long and smooths edges better.
     #[arg(long, default_value_t = FitSettings::default().first_hits_mib)]
     pub first_hits_mib: usize,
-    /// Rounds of the solver on the light, 2 to 64: half of them on wide patches of sky, half with narrow ones where it is
-    /// bright.
+    /// Light iterations of the solver, 2 to 64: half of them on wide basis functions of the environment, half with narrow
+    /// ones where it is bright.
     #[arg(long, default_value_t = FitSettings::default().solver_rounds)]
     pub solver_rounds: usize,
-    /// Width and height of the solver's grid over the atlas at whose points rays are traced, 16 to 4096; at most the maps'
-    /// size is used. When not given: 128 with polishing, else 256.
+    /// Width and height of the solver's visibility grid over the atlas, 16 to 4096, at most that of the maps [default: 256,
+    /// or 128 with refinement].
     #[arg(long, default_value_t = FitSettings::default().solver_grid)]
     pub solver_grid: usize,
-    /// Sizes of photos and maps at which the solver works, 1 to 6, each half of the next: light and maps are found at the
-    /// smallest first, then made better. The full size counts where polishing makes its maps, too. A size with maps below
-    /// 128 x 128 texels is left out. When not given: 3 with polishing, else 2.
+    /// Levels of the solver's coarse-to-fine, 1 to 6, each half the size of the next; the full size counts where refinement
+    /// makes its maps, and levels with maps below 128 x 128 texels are left out [default: 2, or 3 with refinement].
     #[arg(long, default_value_t = FitSettings::default().solver_levels)]
     pub solver_levels: usize,
-    /// Whether views that took no part judge what lobes, light between surfaces and the light's resolution bought.
+    /// What becomes of the judgement of held-out views on lobes, interreflection and resolution of the environment.
     #[arg(long, value_enum, default_value_t)]
     pub solver_choices: Choosing,
-    /// Optimiser steps after the solver's maps, on all maps and the light, by the gradient of whole paths: for photos of
-    /// real places, whose edges, background and geometry the solver's model does not carry. The solver then leaves the
-    /// finest maps to them, and looks for one sun and hardly any metal. Where its model holds, they make maps worse. When
-    /// not given: 110 for 8-bit photos, else none.
+    /// Refinement steps after the solver: Adam on all maps and the environment along gradients of the path tracer [default:
+    /// 110 for 8-bit photos, else 0].
+    ///
+    /// They are for photos of real places, whose edges, background and geometry the solver's model does not carry. The
+    /// solver then leaves the finest maps to them, and believes in a single sun and hardly any metal. Where its model
+    /// holds, they make maps worse.
     #[arg(long, default_value_t = FitSettings::default().solver_polish)]
     pub solver_polish: usize,
-    /// Optimiser steps between two looks at the held-out views; 0 never looks.
+    /// Held-out evaluation interval in optimiser steps; 0 evaluates at the end only.
     #[arg(long, default_value_t = FitSettings::default().held_out_interval)]
     pub held_out_interval: usize,
-    /// Leave a photo out, by its name: it is neither fitted nor used to judge the fit. May be given more than once.
+    /// Exclude a photo by its name: it is neither fitted nor used for validation. May be given more than once.
     #[arg(long, value_name = "NAME")]
     pub exclude: Vec<String>,
 }

@@ -103,21 +103,22 @@ impl Suited {
         let mut told = Vec::new();
         if asked.method == Method::Automatic && settings.method == Method::Solver {
             let why = match (self.solver_polish, settings.solver_polish) {
-                (0, _) => ", since all photos hold linear radiance",
-                (_, 0) => "",
-                _ => ", its maps polished by whole paths",
+                (0, _) => ", since all photos hold linear radiance".into(),
+                (_, 0) => String::new(),
+                (_, steps) => format!(" with {steps} refinement steps of Adam"),
             };
-            told.push(format!("The method is the solver{why}; --method adam takes Adam"));
+            told.push(format!("Using the solver{why}; --method adam takes Adam only"));
         }
         if settings.exposure != asked.exposure {
             told.push(
-                "A gain is fitted for each photo, since their exposures differ; --exposure=false leaves it out".into(),
+                "Photo exposures differ: exposure compensation is on, a gain per photo; --exposure=false turns it off"
+                    .into(),
             );
         }
         if settings.map_size != asked.map_size {
             let (size, larger) = (settings.map_size, asked.map_size);
             told.push(format!(
-                "Maps of {size} x {size} texels are about what the photos resolve; --map-size {larger} takes larger ones"
+                "Map size set to {size} x {size} to match what the photos resolve; --map-size {larger} takes larger maps"
             ));
         }
         told
@@ -203,7 +204,7 @@ mod tests {
         let all = told(&usual, &[]);
         assert_eq!(all.len(), 3, "{all:?}");
         assert!(all[0].contains("solver") && all[1].contains("gain") && all[2].contains("512 x 512"), "{all:?}");
-        assert!(all[0].contains("polished") && !told(&usual, &["solver-polish"])[0].contains("polished"));
+        assert!(all[0].contains("110 refinement") && !told(&usual, &["solver-polish"])[0].contains("refinement"));
         let solver = FitSettings { method: Method::Solver, ..usual.clone() };
         assert_eq!(told(&solver, &["exposure", "map-size"]), Vec::<String>::new());
         let as_it_is = FitSettings { exposure: true, map_size: 256, ..solver };

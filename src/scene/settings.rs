@@ -34,7 +34,9 @@ pub struct ReadSettings {
     /// The chunk of a Metashape project, by label or number; none takes the one whose photos are here.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chunk: Option<String>,
-    /// Photos are averaged over squares of this many pixels, in linear radiance; 1 keeps them.
+    /// Photos are averaged over squares of this many pixels, in linear radiance; 1 keeps them. Older settings files name
+    /// it `shrink`.
+    #[serde(rename = "downsample", alias = "shrink")]
     pub shrink: usize,
 }
 
@@ -60,8 +62,8 @@ impl ReadSettings {
     /// Checks the ranges.
     pub fn validate(&self) -> Result<()> {
         if self.shrink == 0 || self.shrink > 64 {
-            return Err(Error::new(ErrorKind::InvalidSetting, format!("shrink is {}", self.shrink))
-                .at(Place::Setting("shrink".into()))
+            return Err(Error::new(ErrorKind::InvalidSetting, format!("the factor is {}", self.shrink))
+                .at(Place::Setting("downsample".into()))
                 .remedy("give a whole number from 1 to 64"));
         }
         Ok(())

@@ -6,6 +6,7 @@
 mod atlas;
 pub mod beside;
 mod capture;
+mod cli_guide;
 mod cli_process;
 mod cli_remedies;
 pub mod common;

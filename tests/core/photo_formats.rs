@@ -222,9 +222,11 @@ fn exr_of(
                 openexr::AnyChannel::new(*name, openexr::FlatSamples::F32(vec![*value; size.0 * size.1]))
             };
             let channels = openexr::AnyChannels::sort(channels.iter().map(channel).collect());
-            let mut attributes = openexr::LayerAttributes::default();
-            attributes.layer_name = (!name.is_empty()).then(|| (*name).into());
-            attributes.layer_position = openexr::Vec2(position.0, position.1);
+            let attributes = openexr::LayerAttributes {
+                layer_name: (!name.is_empty()).then(|| (*name).into()),
+                layer_position: openexr::Vec2(position.0, position.1),
+                ..Default::default()
+            };
             openexr::Layer::new(*size, attributes, openexr::Encoding::FAST_LOSSLESS, channels)
         })
         .collect();

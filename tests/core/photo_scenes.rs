@@ -74,7 +74,7 @@ fn a_white_matte_without_masks_is_set_aside_and_a_sky_is_kept() {
     assert!(told.severity == Severity::Warning && told.message.contains("white"), "{told}");
     for view in &scene.views {
         assert_eq!(view.states[(0, 0)], PixelState::Ignored);
-        assert!(view.states.pixels().iter().any(|state| *state == PixelState::Surface));
+        assert!(view.states.pixels().contains(&PixelState::Surface));
         assert!(!view.states.pixels().contains(&PixelState::SurfaceClipped), "all of the matte is found");
     }
     let (_keep, path) = folder();

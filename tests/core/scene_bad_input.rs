@@ -216,7 +216,7 @@ fn what_is_missing_is_said_at_once() {
         "no such folder",
     );
     let bad_setting = read(&empty, &ReadSettings { shrink: 0, ..Default::default() }).unwrap_err();
-    assert_error(&bad_setting, ErrorKind::InvalidSetting, "setting --shrink");
+    assert_error(&bad_setting, ErrorKind::InvalidSetting, "setting --downsample");
 }
 
 #[test]

@@ -3,9 +3,10 @@
 use std::path::Path;
 
 /// Rank of each top-level module. A module may use modules of lower rank, and of its own rank only where listed.
-const RANKS: [(&str, usize); 20] = [
+const RANKS: [(&str, usize); 21] = [
     ("error", 0),
     ("files", 0),
+    ("guide", 0),
     ("math", 1),
     ("image", 2),
     ("trace", 3),
@@ -26,8 +27,14 @@ const RANKS: [(&str, usize); 20] = [
     ("lab", 11),
 ];
 /// Pairs of the same rank in which the first may use the second.
-const ALLOWED_SIBLINGS: [(&str, &str); 5] =
-    [("files", "error"), ("material", "light"), ("insight", "export"), ("object", "insight"), ("cli", "studio")];
+const ALLOWED_SIBLINGS: [(&str, &str); 6] = [
+    ("files", "error"),
+    ("guide", "error"),
+    ("material", "light"),
+    ("insight", "export"),
+    ("object", "insight"),
+    ("cli", "studio"),
+];
 
 fn rank(module: &str) -> Option<usize> {
     RANKS.iter().find(|(name, _)| *name == module).map(|(_, rank)| *rank)

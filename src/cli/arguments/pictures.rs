@@ -13,7 +13,7 @@ fn finite(text: &str) -> Result<f32, String> {
     }
 }
 
-/// A whole number of paths a pixel.
+/// A number of samples per pixel.
 fn paths(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
         Ok(number @ 1..=65_536) => Ok(number),
@@ -34,7 +34,7 @@ fn hits(text: &str) -> Result<usize, String> {
 pub struct RelightOptions {
     /// The run folder.
     pub run: PathBuf,
-    /// Lights: HDR or EXR files, or `noon`, `evening`, `overcast`.
+    /// Environments: HDR, EXR or PFM files, or the built-in skies `noon`, `evening`, `overcast`.
     #[arg(long, required = true, num_args = 1..)]
     pub env: Vec<String>,
     /// The scene whose cameras are used; the scene of the run when not given.
@@ -43,25 +43,25 @@ pub struct RelightOptions {
     /// Names of the views; the first held-out ones when not given.
     #[arg(long, num_args = 1..)]
     pub views: Vec<String>,
-    /// Turn the light about the vertical, in degrees.
+    /// Rotate the environment about the up axis, in degrees.
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite)]
     pub rotate: f32,
-    /// Keep the light as strong as its file says; otherwise its mean is matched to that of the fitted light.
+    /// Keep the intensity of the file; otherwise the mean is normalised to that of the estimated environment.
     #[arg(long)]
     pub absolute: bool,
-    /// Paths a pixel.
+    /// Samples per pixel (spp).
     #[arg(long, default_value_t = 64, value_parser = paths)]
     pub samples: usize,
-    /// Surface hits on the longest path, 1 to 16.
+    /// Max bounces: surface hits on the longest path, 1 to 16.
     #[arg(long, default_value_t = 3, value_parser = hits)]
     pub bounces: usize,
-    /// Shrink pictures by this whole factor.
-    #[arg(long, default_value_t = 1)]
+    /// Downsample images by this whole factor.
+    #[arg(long = "downsample", alias = "shrink", value_name = "FACTOR", default_value_t = 1)]
     pub shrink: usize,
-    /// Exposure of the PNG files, in stops.
+    /// Exposure of the PNG files, in EV (stops).
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite)]
     pub exposure: f32,
-    /// Hide the light behind the surface.
+    /// Do not show the environment as background.
     #[arg(long)]
     pub hide_background: bool,
     /// Give parts of the surface a measured reflectance: a `.binary` file, the result folder of `patina object`, or the
@@ -74,10 +74,10 @@ pub struct RelightOptions {
     /// Masks over the texture maps, white where the material of the same place in the list holds.
     #[arg(long, requires = "material")]
     pub region: Vec<PathBuf>,
-    /// A turntable instead of single pictures.
+    /// A turntable in place of single images.
     #[command(flatten)]
     pub turntable: crate::cli::turntable::TurntableOptions,
-    /// Folder of the pictures; `relight` in the run folder when not given.
+    /// Folder of the images; `relight` in the run folder when not given.
     #[arg(short, long)]
     pub output: Option<PathBuf>,
 }
@@ -85,7 +85,7 @@ pub struct RelightOptions {
 /// A layer of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Layer {
-    /// The picture under the run's light.
+    /// The image under the run's environment.
     Shaded,
     /// Diffuse reflectance.
     Diffuse,
@@ -93,7 +93,7 @@ pub enum Layer {
     Specular,
     /// Roughness r = a^2.
     Roughness,
-    /// Shading normal in the world.
+    /// Shading normal in world space.
     Normal,
     /// Share of the pixel that the surface covers.
     Coverage,
@@ -115,25 +115,25 @@ pub struct RenderOptions {
     /// Names of the views; all when not given.
     #[arg(long, num_args = 1..)]
     pub views: Vec<String>,
-    /// Another light than the run's own, as a file or a built-in sky.
+    /// Another environment than the run's own: a file or a built-in sky.
     #[arg(long)]
     pub env: Option<String>,
-    /// Paths a pixel.
+    /// Samples per pixel (spp).
     #[arg(long, default_value_t = 64, value_parser = paths)]
     pub samples: usize,
-    /// Surface hits on the longest path, 1 to 16.
+    /// Max bounces: surface hits on the longest path, 1 to 16.
     #[arg(long, default_value_t = 3, value_parser = hits)]
     pub bounces: usize,
     /// Seed of the random numbers.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Hide the light behind the surface.
+    /// Do not show the environment as background.
     #[arg(long)]
     pub hide_background: bool,
     /// How the scene is read.
     #[command(flatten)]
     pub read: ReadOptions,
-    /// Folder of the pictures; `render` in the run folder when not given.
+    /// Folder of the images; `render` in the run folder when not given.
     #[arg(short, long)]
     pub output: Option<PathBuf>,
 }
@@ -143,12 +143,12 @@ pub struct RenderOptions {
 pub struct CompareOptions {
     /// The run folder.
     pub run: PathBuf,
-    /// The scene with the photographs.
+    /// The scene with the photos.
     pub scene: PathBuf,
-    /// Paths a pixel.
+    /// Samples per pixel (spp).
     #[arg(long, default_value_t = 32, value_parser = paths)]
     pub samples: usize,
-    /// Surface hits on the longest path, 1 to 16; that of the run when not given.
+    /// Max bounces: surface hits on the longest path, 1 to 16; those of the run when not given.
     #[arg(long, value_parser = hits)]
     pub bounces: Option<usize>,
     /// How the scene is read.

@@ -1,5 +1,6 @@
 //! What can be typed to read and fit scenes. The text of each field is its help.
 
+use super::groups;
 use crate::atlas::KeepUv;
 use crate::fit::{FitSettings, Method, Preset};
 use crate::scene::settings::{BackgroundChoice, ColourEncoding, MaskUse, PixelCentre, Up};
@@ -12,13 +13,13 @@ pub struct DemoOptions {
     /// The run folder.
     #[arg(short, long, default_value = "patina-demo")]
     pub output: PathBuf,
-    /// Seed of the cameras, the photographs and the fit.
+    /// Seed of the cameras, the photos and the fit.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// A TOML file of fit settings that differ from the demo's, such as `consistency = "exact"`.
     #[arg(long)]
     pub settings: Option<PathBuf>,
-    /// How maps and light are found.
+    /// How maps and environment are estimated [default: solver].
     #[arg(long, value_enum)]
     pub method: Option<Method>,
 }
@@ -26,29 +27,29 @@ pub struct DemoOptions {
 /// How a scene is read.
 #[derive(Clone, Debug, Default, Args)]
 pub struct ReadOptions {
-    /// Which axis of the data set points up: auto, or one of +x -x +y -y +z -z.
-    #[arg(long, allow_hyphen_values = true)]
+    /// Axis of the data set that points up: auto, or one of +x -x +y -y +z -z [default: auto].
+    #[arg(long, help_heading = groups::SCENE, allow_hyphen_values = true)]
     pub up: Option<Up>,
-    /// Where the data set puts pixel centres: auto, integer or half.
-    #[arg(long)]
+    /// Pixel-centre convention of the data set: auto, integer or half [default: auto].
+    #[arg(long, help_heading = groups::SCENE)]
     pub pixel_centre: Option<PixelCentre>,
-    /// Keep every n-th view out of the fit, to judge it; 0 keeps none.
-    #[arg(long)]
+    /// Hold out every Nth photo for validation; 0 holds out none [default: 8].
+    #[arg(long, help_heading = groups::SCENE, value_name = "N")]
     pub hold_out_every: Option<usize>,
-    /// Read at most so many views.
-    #[arg(long)]
+    /// Read at most this many photos, spread evenly over the list; 0 reads all [default: 0].
+    #[arg(long, help_heading = groups::SCENE, value_name = "N")]
     pub max_views: Option<usize>,
-    /// Shrink photographs by this whole factor on reading.
-    #[arg(long)]
+    /// Downsample photos by this whole factor, 1 to 64 [default: 1].
+    #[arg(long = "downsample", alias = "shrink", help_heading = groups::SCENE, value_name = "FACTOR")]
     pub shrink: Option<usize>,
-    /// What pixels without surface show: auto, environment or black.
-    #[arg(long)]
+    /// What pixels without surface show: auto, environment or black [default: auto].
+    #[arg(long, help_heading = groups::SCENE)]
     pub scene_background: Option<BackgroundChoice>,
-    /// Whether masks of the photographs are used: use or ignore.
-    #[arg(long)]
+    /// Masks of the photos: use or ignore [default: use].
+    #[arg(long, help_heading = groups::SCENE)]
     pub masks: Option<MaskUse>,
-    /// How the numbers of the photographs are encoded: auto, srgb or linear.
-    #[arg(long)]
+    /// Colour encoding of the photos: auto, srgb or linear [default: auto].
+    #[arg(long, help_heading = groups::SCENE)]
     pub encoding: Option<ColourEncoding>,
     /// Which layer of OpenEXR photographs is read, such as ViewLayer.Combined or Combined; the layer of radiance when not
     /// given.
@@ -114,7 +115,7 @@ pub struct CheckOptions {
     /// The scene: a folder with photos, cameras and a mesh (COLMAP, transforms.json, Metashape, BlendedMVS, exchange) or a
     /// `scene.toml`.
     pub scene: PathBuf,
-    /// Folder for the pictures with outlines; none are made without it.
+    /// Folder for the photos with mesh outlines; none are drawn without it.
     #[arg(short, long)]
     pub output: Option<PathBuf>,
     /// How the scene is read.
@@ -128,25 +129,25 @@ pub struct FitOptions {
     /// The scene: a folder with photos, cameras and a mesh (COLMAP, transforms.json, Metashape, BlendedMVS, exchange) or a
     /// `scene.toml`.
     pub scene: PathBuf,
-    /// The run folder.
-    #[arg(short, long)]
+    /// The run folder to write. A result that is there is set aside in `earlier` until the new one is whole.
+    #[arg(short, long, value_name = "RUN", help_heading = groups::OUTPUT)]
     pub output: PathBuf,
-    /// A settings file as in a run folder; options on the command line win.
-    #[arg(long)]
+    /// A settings file as in a run folder; options on the command line take precedence.
+    #[arg(long, value_name = "FILE", help_heading = groups::METHOD)]
     pub settings: Option<PathBuf>,
-    /// A light that is known: start from this map (HDR, EXR, PFM).
-    #[arg(long)]
+    /// Start from this environment (HDR, EXR, PFM); with --fixed-light it is taken as known.
+    #[arg(long, value_name = "FILE", help_heading = groups::LIGHT)]
     pub env: Option<PathBuf>,
-    /// Keep texture coordinates the mesh came with: auto, keep or rebuild.
-    #[arg(long)]
+    /// Texture coordinates that the mesh came with: auto, keep or rebuild [default: auto].
+    #[arg(long, help_heading = groups::SCENE)]
     pub uv: Option<KeepUv>,
     /// How the scene is read.
     #[command(flatten)]
     pub read: ReadOptions,
-    /// A whole set of settings to begin with; options on the command line win.
-    #[arg(long, value_enum, conflicts_with = "settings")]
+    /// A set of settings to begin with; options on the command line take precedence [default: standard].
+    #[arg(long, value_enum, conflicts_with = "settings", help_heading = groups::METHOD)]
     pub preset: Option<Preset>,
-    /// How the maps are fitted.
+    /// How maps and environment are fitted.
     #[command(flatten)]
     pub fit: TypedSettings,
 }
@@ -185,11 +186,11 @@ impl FromArgMatches for TypedSettings {
 
 impl Args for TypedSettings {
     fn augment_args(command: clap::Command) -> clap::Command {
-        FitSettings::augment_args(command)
+        groups::arrange(FitSettings::augment_args(command))
     }
 
     fn augment_args_for_update(command: clap::Command) -> clap::Command {
-        FitSettings::augment_args_for_update(command)
+        groups::arrange(FitSettings::augment_args_for_update(command))
     }
 }
 

@@ -10,12 +10,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Choosing {
-    /// They are not asked.
+    /// Held-out views are not asked.
     Off,
-    /// The report says it; maps stay as the evidence of the pixels made them.
+    /// The report says what they choose; maps stay as the evidence of the pixels made them.
     #[default]
+    #[serde(rename = "report", alias = "tell")]
+    #[value(name = "report", alias = "tell")]
     Tell,
-    /// Maps take it over: regions without a lobe that is borne out lose it, others share one.
+    /// Maps follow: regions lose a lobe that is not borne out, or share one.
     Apply,
 }
 

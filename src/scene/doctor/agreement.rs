@@ -330,7 +330,7 @@ fn pairs_of(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], a: usize) -> Vec<Pa
                     in_b.push((place.y as usize * camera.width + place.x as usize) as u32);
                 }
             }
-            (in_a.len() >= FEWEST_SHARED).then(|| Pair { cameras: [a, b], pixels: [in_a, in_b] })
+            (in_a.len() >= FEWEST_SHARED).then_some(Pair { cameras: [a, b], pixels: [in_a, in_b] })
         })
         .collect()
 }

@@ -80,6 +80,8 @@ impl Sub for Dual {
     }
 }
 
+// Derivatives of a product and a quotient are sums.
+#[allow(clippy::suspicious_arithmetic_impl)]
 impl Mul for Dual {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
@@ -88,6 +90,8 @@ impl Mul for Dual {
     }
 }
 
+// Derivatives of a product and a quotient are sums.
+#[allow(clippy::suspicious_arithmetic_impl)]
 impl Div for Dual {
     type Output = Self;
     fn div(self, other: Self) -> Self {

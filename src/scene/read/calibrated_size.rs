@@ -62,7 +62,7 @@ fn common_factor(views: &[SourceView], loaded: &[LoadedPhoto], centre_shift: f64
         factors.push((across * down).sqrt());
     }
     let middle = quantile(&factors, 0.5);
-    let is_other = middle > OWN_FACTOR || middle < 1.0 / OWN_FACTOR;
+    let is_other = !(1.0 / OWN_FACTOR..=OWN_FACTOR).contains(&middle);
     (is_other && factors.iter().all(|factor| (factor / middle - 1.0).abs() < SPREAD)).then_some(middle)
 }
 

@@ -23,7 +23,7 @@ pub fn navigate(response: &egui::Response, eye: &mut Eye, bounds: Option<(Vec3, 
     let (shift, command) = response.ctx.input(|input| (input.modifiers.shift, input.modifiers.command));
     let drag = Vec2::new(response.drag_delta().x, response.drag_delta().y) / size.y;
     let middle = response.dragged_by(egui::PointerButton::Middle);
-    let primary = response.dragged_by(egui::PointerButton::Primary) && !shift || middle && !shift;
+    let primary = !shift && (middle || response.dragged_by(egui::PointerButton::Primary));
     let other = response.dragged_by(egui::PointerButton::Secondary) || middle;
     let wheel = if response.contains_pointer() {
         response.ctx.input(|input| (-input.smooth_scroll_delta().y / WHEEL_POINTS).exp() / input.zoom_delta().max(1e-3))
