@@ -222,7 +222,10 @@ mod tests {
 
     fn state() -> FitState {
         FitState {
-            plan: crate::fit::schedule::stages(&crate::fit::FitSettings::default()),
+            plan: crate::fit::schedule::stages(&crate::fit::FitSettings {
+                method: crate::fit::Method::Adam,
+                ..Default::default()
+            }),
             stage: 1,
             step_in_stage: 2,
             step: 7,

@@ -148,22 +148,25 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
 
 /// Columns between two cells.
 const GAP: usize = 2;
-/// A column is not made narrower than this to fit a table into the width.
+/// A column is not made narrower than this to fit a table into the width, nor than its longest word.
 const NARROWEST: usize = 8;
 
 fn table(lines: &[&str], width: usize, out: &mut String) {
     let rows: Vec<Vec<String>> = lines.iter().map(|line| cells(line)).filter(|row| !is_rule(row)).collect();
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let mut widths = vec![1; columns];
+    let (mut widths, mut least) = (vec![1; columns], vec![NARROWEST; columns]);
     for row in &rows {
         for (column, cell) in row.iter().enumerate() {
+            let longest = cell.split_whitespace().map(|word| word.chars().count()).max().unwrap_or(0);
             widths[column] = widths[column].max(cell.chars().count());
+            least[column] = least[column].max(longest);
         }
     }
-    // The widest column gives way until all fit.
+    // The widest column that can gives way until all fit.
     while widths.iter().sum::<usize>() + GAP * columns.saturating_sub(1) > width {
-        let Some(widest) = widths.iter_mut().max().filter(|widest| **widest > NARROWEST) else { break };
-        *widest -= 1;
+        let can_give = (0..columns).filter(|&column| widths[column] > least[column]);
+        let Some(widest) = can_give.max_by_key(|&column| widths[column]) else { break };
+        widths[widest] -= 1;
     }
     for (number, row) in rows.iter().enumerate() {
         let pieces: Vec<Vec<String>> = row.iter().zip(&widths).map(|(cell, width)| wrapped(cell, *width)).collect();

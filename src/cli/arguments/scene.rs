@@ -129,24 +129,24 @@ pub struct FitOptions {
     /// The scene: a folder with photos, cameras and a mesh (COLMAP, transforms.json, Metashape, BlendedMVS, exchange) or a
     /// `scene.toml`.
     pub scene: PathBuf,
-    /// The run folder to write. A result that is there is set aside in `earlier` until the new one is whole.
-    #[arg(short, long, value_name = "RUN", help_heading = groups::OUTPUT)]
-    pub output: PathBuf,
-    /// A settings file as in a run folder; options on the command line take precedence.
-    #[arg(long, value_name = "FILE", help_heading = groups::METHOD)]
-    pub settings: Option<PathBuf>,
-    /// Start from this environment (HDR, EXR, PFM); with --fixed-light it is taken as known.
-    #[arg(long, value_name = "FILE", help_heading = groups::LIGHT)]
-    pub env: Option<PathBuf>,
-    /// Texture coordinates that the mesh came with: auto, keep or rebuild [default: auto].
-    #[arg(long, help_heading = groups::SCENE)]
-    pub uv: Option<KeepUv>,
     /// How the scene is read.
     #[command(flatten)]
     pub read: ReadOptions,
+    /// Texture coordinates that the mesh came with: auto, keep or rebuild [default: auto].
+    #[arg(long, help_heading = groups::SCENE)]
+    pub uv: Option<KeepUv>,
+    /// Start from this environment (HDR, EXR, PFM); with --fixed-light it is taken as known.
+    #[arg(long, value_name = "FILE", help_heading = groups::LIGHT)]
+    pub env: Option<PathBuf>,
     /// A set of settings to begin with; options on the command line take precedence [default: standard].
     #[arg(long, value_enum, conflicts_with = "settings", help_heading = groups::METHOD)]
     pub preset: Option<Preset>,
+    /// A settings file as in a run folder; options on the command line take precedence.
+    #[arg(long, value_name = "FILE", help_heading = groups::METHOD)]
+    pub settings: Option<PathBuf>,
+    /// The run folder to write. A result that is there is set aside in `earlier` until the new one is whole.
+    #[arg(short, long, value_name = "RUN", help_heading = groups::OUTPUT)]
+    pub output: PathBuf,
     /// How maps and environment are fitted.
     #[command(flatten)]
     pub fit: TypedSettings,
