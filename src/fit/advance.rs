@@ -2,10 +2,10 @@
 
 use super::adam::TexelRates;
 use super::fitter::Fitter;
-use super::gradient::StepSums;
 use super::light_prior;
 use super::schedule::{Stage, StageKind};
 use super::settings::Start;
+use super::step_sums::StepSums;
 use crate::math::sphere::solid_angle_of_texel;
 
 /// Step size of the logarithm of a view's gain.

@@ -5,10 +5,8 @@
 
 use super::evidence;
 use super::fitter::Fitter;
-use super::held_out::held_out_targets;
-use super::schedule::revised;
 use super::settings::{FitSettings, Method};
-use super::state::FitState;
+use super::targets::held_out_targets;
 use super::views::{ViewUse, training_views, uses_of};
 use crate::error::{Error, ErrorKind, Place, Result};
 
@@ -58,7 +56,7 @@ impl Fitter {
         let training = training_views(&uses, &settings)?;
         evidence::check(&self.scene, &training, &settings)?;
         let stage_before = self.stage().map(|stage| (stage.kind, stage.photo_level));
-        replan(&mut self.state, &settings)?;
+        self.state.replan(&settings)?;
 
         // Nothing fails from here on.
         if uses != self.uses {
@@ -80,19 +78,4 @@ impl Fitter {
         self.settings = settings;
         Ok(())
     }
-}
-
-/// Puts the plan of other numbers of steps into a state; the state is as it was when that fails.
-pub(super) fn replan(state: &mut FitState, settings: &FitSettings) -> Result<()> {
-    let plan = revised(settings, &state.plan, state.stage, state.step_in_stage)?;
-    // A fit that had ended goes on in its last stage when that was made longer.
-    if let (true, Some(last)) = (state.stage >= state.plan.len(), state.plan.last()) {
-        let number = state.plan.len() - 1;
-        if plan.get(number).is_some_and(|stage| stage.steps > last.steps) {
-            state.stage = number;
-            state.step_in_stage = last.steps;
-        }
-    }
-    state.plan = plan;
-    Ok(())
 }

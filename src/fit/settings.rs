@@ -1,7 +1,6 @@
 //! Every choice of a fit, once: the command line, the settings file and the window read this structure.
 
 pub use super::method::Method;
-use super::solver::settings::Choosing;
 use crate::error::{Error, ErrorKind, Result};
 use crate::render::first_hits::PixelFilter;
 use serde::{Deserialize, Serialize};
@@ -55,6 +54,19 @@ pub enum Steps {
     TwoStep,
     /// Everything from the start.
     OneStep,
+}
+
+/// What becomes of what views that took no part say of the model's freedoms, see [`super::solver::choice`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Choosing {
+    /// They are not asked.
+    Off,
+    /// The report says it; maps stay as the evidence of the pixels made them.
+    #[default]
+    Tell,
+    /// Maps take it over: regions without a lobe that is borne out lose it, others share one.
+    Apply,
 }
 
 /// Settings of a fit. Defaults are the balanced preset.
