@@ -271,7 +271,7 @@ impl Fitter {
 
     /// What happened that the user should know, as findings.
     pub fn findings(&self) -> Vec<Finding> {
-        let events = self.state.events.iter().map(|event| Finding::new(Severity::Note, "fit-event", event.clone()));
+        let events = self.state.events.iter().map(|event| Finding::new(Severity::Note, "fit-event", event.to_string()));
         let counts = self.state.non_finite.iter().map(|(name, count)| {
             Finding::new(
                 Severity::Warning,

@@ -1,6 +1,7 @@
 //! What a fit changes, and its history: all that a checkpoint holds.
 
 use super::adam::Moments;
+use super::event::FitEvent;
 use super::schedule::{Stage, revised};
 use super::settings::FitSettings;
 use crate::error::Result;
@@ -67,7 +68,7 @@ pub struct FitState {
     /// Non-finite numbers by name and count.
     pub non_finite: Vec<(String, u64)>,
     /// What happened that the user should know.
-    pub events: Vec<String>,
+    pub events: Vec<FitEvent>,
     /// Seconds of work so far.
     pub seconds: f64,
 }
