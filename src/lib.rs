@@ -131,6 +131,7 @@ pub use cli::run as run_command_line;
 pub use error::{Error, ErrorKind, Finding, Place, Result, Severity};
 pub use export::RunFolder;
 pub use fit::{FitSettings, Fitter, LossRow, Method, Preset, StepOutcome, ViewUse};
+pub use image::file::keep_decoders_quiet;
 pub use image::{GreyImage, Image, RgbImage};
 pub use job::demo::write_folder as write_demo_folder;
 pub use job::open::{OpenStage, OpenedRun, OpenedScene, open_demo, open_scene, resume, start_new, view_run};

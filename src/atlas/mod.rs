@@ -141,8 +141,6 @@ pub struct Atlas {
 /// setting is out of range, when coordinates are to be kept that cannot be, and when the charts do not fit on the map.
 pub fn build(mesh: &Mesh, settings: &AtlasSettings, progress: &(dyn Fn(f32) + Sync)) -> Result<Atlas> {
     settings.validate()?;
-    // Charts are solved side by side: parallel solves inside them would only wait for each other.
-    faer::set_global_parallelism(faer::Par::Seq);
     let cleaned = clean::dissolve_degenerate(mesh, settings.dissolve_distance)?;
     let mut findings = cleaned.findings();
     progress(0.05);

@@ -119,7 +119,7 @@ fn chosen_views(scene: &Scene, names: &[String], otherwise: impl Fn(&Scene) -> V
 }
 
 /// Says that a picture is written: its path, or an event with it.
-pub(super) fn tell_written(path: &Path, json: bool) {
+fn tell_written(path: &Path, json: bool) {
     match json {
         true => println!("{}", serde_json::json!({"event": "written", "path": path})),
         false => println!("{}", path.display()),
@@ -186,7 +186,9 @@ pub fn relight(options: &RelightOptions, json: bool) -> Result<()> {
             let folder = output.join(format!("turntable_{stem}"));
             let (turn, exposure, picture) = (&options.turntable, options.exposure, &picture_settings);
             let regions = regions.as_ref();
-            super::turntable::write(&folder, &surface, &lit, regions, &start, turn, frames, picture, exposure, json)?;
+            let written =
+                super::turntable::write(&folder, &surface, &lit, regions, &start, turn, frames, picture, exposure)?;
+            written.iter().for_each(|path| tell_written(path, json));
             continue;
         }
         for &view in &views {

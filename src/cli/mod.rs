@@ -40,6 +40,7 @@ use std::process::ExitCode;
 /// Runs the program on its arguments, the program's name first. Exit codes: 0 done, 1 an error, 2 arguments that are
 /// not understood, 3 stopped by the user.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    crate::image::file::keep_decoders_quiet();
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(usage) => {

@@ -8,7 +8,7 @@ use crate::render::regions::Regions;
 use crate::render::{Parameters, Surface};
 use crate::scene::Camera;
 use clap::Args;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 /// Options of the turntable.
@@ -35,7 +35,7 @@ fn size_of(text: &str) -> std::result::Result<(usize, usize), String> {
     }
 }
 
-/// Writes a turntable and prints its files.
+/// Writes a turntable; returns the paths of its files.
 pub fn write(
     folder: &Path,
     surface: &Surface,
@@ -46,8 +46,7 @@ pub fn write(
     frames: u32,
     picture: &PictureSettings,
     exposure_stops: f32,
-    json: bool,
-) -> Result<()> {
+) -> Result<Vec<PathBuf>> {
     let settings = TurntableSettings {
         frames: frames as usize,
         size: options.size.unwrap_or((start.width, start.height)),
@@ -56,8 +55,5 @@ pub fn write(
     };
     let display = DisplaySettings { exposure_stops, ..Default::default() };
     let stop = AtomicBool::new(false);
-    for path in write_turntable(folder, surface, lit, regions, &settings, picture, &display, &stop, &|_| {})? {
-        super::commands::tell_written(&path, json);
-    }
-    Ok(())
+    write_turntable(folder, surface, lit, regions, &settings, picture, &display, &stop, &|_| {})
 }

@@ -1,11 +1,12 @@
 //! From a summed gradient to moved numbers, and away from a start that has none.
 
 use super::adam::TexelRates;
+use super::event::FitEvent;
 use super::fitter::Fitter;
-use super::gradient::StepSums;
 use super::light_prior;
 use super::schedule::{Stage, StageKind};
 use super::settings::Start;
+use super::step_sums::StepSums;
 use crate::math::sphere::solid_angle_of_texel;
 
 /// Step size of the logarithm of a view's gain.
@@ -29,14 +30,10 @@ impl Fitter {
         let maps = norm(&mut work.gradient.texels.levels[0].texels.iter().flat_map(|texel| texel[..7].iter().copied()));
         let light = norm(&mut work.gradient.light.iter().flatten().copied());
         let black = self.state.light.iter().all(|radiance| *radiance == [0.0; 3]);
-        if !black || maps > 0.0 || self.state.events.iter().any(|event| event.contains("saddle")) {
+        if !black || maps > 0.0 || self.state.events.iter().any(FitEvent::is_of_saddle) {
             return false;
         }
-        self.state.events.push(format!(
-            "The start of diffuse 0 and light 0 is a saddle: the gradient by the maps is exactly zero (norm {maps}), by \
-             the light its norm is {light:.3e}. It was left by the measured start: light from the photographs, one grey \
-             for the surface."
-        ));
+        self.state.events.push(FitEvent::saddle_left(maps, light));
         let values = self.measured_start();
         self.begin_from(values, None);
         true

@@ -5,35 +5,74 @@
 
 use super::evidence;
 use super::fitter::Fitter;
-use super::held_out::held_out_targets;
-use super::schedule::revised;
 use super::settings::{FitSettings, Method};
-use super::state::FitState;
+use super::targets::held_out_targets;
 use super::views::{ViewUse, training_views, uses_of};
 use crate::error::{Error, ErrorKind, Place, Result};
 
-/// Settings that cannot change: shapes, random numbers and the order of stages hang on them.
-const FIXED: [&str; 11] = [
-    "seed",
-    "method",
-    "map-size",
-    "environment-height",
-    "levels",
-    "steps",
-    "start",
-    "solver-choices",
-    "solver-rounds",
-    "solver-grid",
-    "solver-levels",
-];
-/// Settings that what a stage keeps between its steps was made for.
-const OF_STAGE_WORK: [&str; 7] =
-    ["exclude", "samples", "pixel-filter", "views-per-step", "pixels-per-step", "consistency", "first-hits-mib"];
+/// How far a change of a setting reaches while a fit runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Reach {
+    /// The whole fit, so that it cannot change: shapes, random numbers and the order of stages hang on it.
+    Fit,
+    /// What a stage keeps between its steps, which is made anew.
+    StageWork,
+    /// The steps to come.
+    NextSteps,
+}
+
+/// Defines [`reach_of`]: a setting that is not listed does not compile.
+macro_rules! reaches {
+    ($($setting:ident: $reach:ident,)*) => {
+        /// How far a change of a setting reaches, by its name on the command line; `None` for unknown names.
+        fn reach_of(name: &str) -> Option<Reach> {
+            let FitSettings { $($setting: _),* } = FitSettings::default();
+            let reaches = [$((stringify!($setting), Reach::$reach)),*];
+            reaches.into_iter().find(|(setting, _)| setting.replace('_', "-") == name).map(|(_, reach)| reach)
+        }
+    };
+}
+
+reaches! {
+    seed: Fit,
+    method: Fit,
+    map_size: Fit,
+    environment_height: Fit,
+    steps: Fit,
+    steps_diffuse: NextSteps,
+    steps_all: NextSteps,
+    views_per_step: StageWork,
+    pixels_per_step: StageWork,
+    samples: StageWork,
+    bounces: NextSteps,
+    levels: Fit,
+    pixel_filter: StageWork,
+    consistency: StageWork,
+    background: NextSteps,
+    exposure: NextSteps,
+    start: Fit,
+    fixed_light: NextSteps,
+    rate_diffuse: NextSteps,
+    rate_specular: NextSteps,
+    rate_roughness: NextSteps,
+    rate_light: NextSteps,
+    light_smoothness: NextSteps,
+    final_rate: NextSteps,
+    lobe_ramp: NextSteps,
+    first_hits_mib: StageWork,
+    solver_rounds: Fit,
+    solver_grid: Fit,
+    solver_levels: Fit,
+    solver_choices: Fit,
+    solver_polish: NextSteps,
+    held_out_interval: NextSteps,
+    exclude: StageWork,
+}
 
 impl FitSettings {
     /// Whether a setting, by its name on the command line, may change while a fit runs. `false` for unknown names.
     pub fn changes_mid_run(name: &str) -> bool {
-        !FIXED.contains(&name) && FitSettings::default().get(name).is_ok()
+        reach_of(name).is_some_and(|reach| reach != Reach::Fit)
     }
 }
 
@@ -49,7 +88,7 @@ impl Fitter {
         }
         settings.validate()?;
         let changed: Vec<String> = self.settings.differences(&settings).into_iter().map(|(name, _, _)| name).collect();
-        if let Some(name) = changed.iter().find(|name| FIXED.contains(&name.as_str())) {
+        if let Some(name) = changed.iter().find(|name| reach_of(name) == Some(Reach::Fit)) {
             return Err(Error::new(ErrorKind::InvalidSetting, "this cannot change while a fit runs")
                 .at(Place::Setting(name.clone()))
                 .remedy("start a new run with it"));
@@ -58,7 +97,7 @@ impl Fitter {
         let training = training_views(&uses, &settings)?;
         evidence::check(&self.scene, &training, &settings)?;
         let stage_before = self.stage().map(|stage| (stage.kind, stage.photo_level));
-        replan(&mut self.state, &settings)?;
+        self.state.replan(&settings)?;
 
         // Nothing fails from here on.
         if uses != self.uses {
@@ -68,7 +107,7 @@ impl Fitter {
             }
         }
         let stage_moved = self.stage().map(|stage| (stage.kind, stage.photo_level)) != stage_before;
-        if stage_moved || changed.iter().any(|name| OF_STAGE_WORK.contains(&name.as_str())) {
+        if stage_moved || changed.iter().any(|name| reach_of(name) == Some(Reach::StageWork)) {
             self.work = None;
         }
         // The solver's cache hangs on many of them; it is traced anew in a few seconds.
@@ -80,19 +119,4 @@ impl Fitter {
         self.settings = settings;
         Ok(())
     }
-}
-
-/// Puts the plan of other numbers of steps into a state; the state is as it was when that fails.
-pub(super) fn replan(state: &mut FitState, settings: &FitSettings) -> Result<()> {
-    let plan = revised(settings, &state.plan, state.stage, state.step_in_stage)?;
-    // A fit that had ended goes on in its last stage when that was made longer.
-    if let (true, Some(last)) = (state.stage >= state.plan.len(), state.plan.last()) {
-        let number = state.plan.len() - 1;
-        if plan.get(number).is_some_and(|stage| stage.steps > last.steps) {
-            state.stage = number;
-            state.step_in_stage = last.steps;
-        }
-    }
-    state.plan = plan;
-    Ok(())
 }

@@ -5,6 +5,7 @@
 //! eight bytes with a checksum over all before them.
 
 use super::adam::Moments;
+use super::event::FitEvent;
 use super::schedule::Stage;
 use super::state::{FitState, LossRow};
 use crate::error::{Error, ErrorKind, Place, Result};
@@ -35,7 +36,7 @@ struct Header {
     views: usize,
     losses: Vec<LossRow>,
     non_finite: Vec<(String, u64)>,
-    events: Vec<String>,
+    events: Vec<FitEvent>,
     seconds: f64,
 }
 
@@ -249,7 +250,7 @@ mod tests {
                 held_out_rmse: Some(0.1),
             }],
             non_finite: vec![("x".into(), 3)],
-            events: vec!["left a saddle".into()],
+            events: vec![FitEvent::saddle_left(0.0, 1.0 / 3.0), FitEvent::Told("of another version".into())],
             seconds: 12.3,
         }
     }

@@ -1,6 +1,6 @@
 //! What a fit finds out on the way, for whoever watches it. No step reads it and no checkpoint holds it.
 
-use super::gradient::StepSums;
+use super::step_sums::StepSums;
 use crate::image::{GreyImage, Image};
 use std::sync::Arc;
 

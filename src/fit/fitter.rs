@@ -5,22 +5,20 @@
 //! interrupted.
 
 use super::adam::Moments;
-use super::change::replan;
 use super::evidence;
 use super::figures::LiveFigures;
 use super::gauge::GaugeRule;
-use super::held_out::held_out_targets;
 use super::schedule::{Stage, stages};
 use super::settings::{FitSettings, Method, Start};
 use super::solver::light_evidence::LightKnown;
 use super::solver::scene::foretold_gains;
 use super::solver::{Choices, LobeTails, SolverScene};
+use super::stage_work::StageWork;
 use super::start;
 use super::state::{FitState, LossRow};
 use super::suited::Suited;
-use super::targets::{Target, targets};
+use super::targets::{Target, held_out_targets, targets};
 use super::views::{ViewUse, training_views, unknown_names, uses_of};
-use super::work::StageWork;
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::light::Environment;
 use crate::material::MaterialMaps;
@@ -139,7 +137,7 @@ impl Fitter {
             state.plan = stages(&fitter.settings);
         }
         if state.stage <= state.plan.len() {
-            replan(&mut state, &fitter.settings).map_err(|error| foreign(&format!(": {}", error.message())))?;
+            state.replan(&fitter.settings).map_err(|error| foreign(&format!(": {}", error.message())))?;
         }
         // At the border of two stages the maps still have the size of the stage before.
         let stage = state.plan.get(state.stage).or(state.plan.last());
@@ -273,7 +271,7 @@ impl Fitter {
 
     /// What happened that the user should know, as findings.
     pub fn findings(&self) -> Vec<Finding> {
-        let events = self.state.events.iter().map(|event| Finding::new(Severity::Note, "fit-event", event.clone()));
+        let events = self.state.events.iter().map(|event| Finding::new(Severity::Note, "fit-event", event.to_string()));
         let counts = self.state.non_finite.iter().map(|(name, count)| {
             Finding::new(
                 Severity::Warning,

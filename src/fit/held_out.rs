@@ -2,27 +2,13 @@
 
 use super::fitter::Fitter;
 use super::schedule::Stage;
-use super::targets::Target;
-use super::views::ViewUse;
 use crate::light::EnvironmentSampler;
 use crate::render::PathArena;
 use crate::render::accumulate::{PassKey, estimate_pixel};
 use crate::render::first_hits::CameraRays;
-use crate::scene::Scene;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
-
-/// Pixels of a held-out view that the curve looks at.
-const HELD_OUT_PIXELS: usize = 20_000;
-
-/// The held-out views of a scene, shrunk to a size at which looking at them costs little.
-pub(super) fn held_out_targets(scene: &Scene, uses: &[ViewUse]) -> Vec<Target> {
-    (0..scene.views.len())
-        .filter(|&view| uses[view] == ViewUse::HeldOut)
-        .map(|view| Target::new(scene, view, scene.views[view].camera.level_within(HELD_OUT_PIXELS)))
-        .collect()
-}
 
 impl Fitter {
     /// Writes the error over the held-out views into the last line of the history, when it is due there. `false` when

@@ -5,7 +5,7 @@
 //! [`consistency`] compares the gradients of views, [`adam`] moves the numbers, and [`fitter`] is the loop body: one
 //! call, one step. Its parts stand in the order they run: `evidence` looks at what is given, `work` prepares a stage,
 //! `batch` picks views and pixels, `gradient` adds them up, `weigh` applies consistency, `advance` moves the numbers,
-//! `held_out` judges them. [`state`] is all they change.
+//! `held_out` judges them. [`state`] is all they change, [`event`] what it tells of.
 //! `change` takes other settings between two steps, [`views`] leaves photos out, [`figures`] are for who watches.
 //! [`describe`] lists, reads and sets each setting by name, [`presets`] are whole sets of them.
 //! [`solver`] is the other method, `solver_step` does its steps, [`suited`] says which of both a scene
@@ -21,6 +21,7 @@ mod change;
 pub mod checkpoint;
 pub mod consistency;
 pub mod describe;
+pub mod event;
 mod evidence;
 pub mod figures;
 pub mod fitter;
@@ -36,8 +37,10 @@ pub mod schedule;
 pub mod settings;
 pub mod solver;
 mod solver_step;
+mod stage_work;
 pub mod start;
 pub mod state;
+mod step_sums;
 pub mod suited;
 pub mod targets;
 pub mod views;

@@ -4,6 +4,7 @@ use super::settings::FitSettings;
 
 /// How much work a fit may be.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, clap::ValueEnum)]
+#[non_exhaustive]
 pub enum Preset {
     /// A first look: small maps, few steps, direct light only.
     #[value(name = "draft", alias = "quick")]

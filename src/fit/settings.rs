@@ -1,7 +1,6 @@
 //! Every choice of a fit, once: the command line, the settings file and the window read this structure.
 
 pub use super::method::Method;
-use super::solver::settings::Choosing;
 use crate::error::{Error, ErrorKind, Result};
 use crate::render::first_hits::PixelFilter;
 use serde::{Deserialize, Serialize};
@@ -55,6 +54,21 @@ pub enum Steps {
     TwoStep,
     /// Everything from the start.
     OneStep,
+}
+
+/// What becomes of what views that took no part say of the model's freedoms, see [`super::solver::choice`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Choosing {
+    /// Held-out views are not asked.
+    Off,
+    /// The report says what they choose; maps stay as the evidence of the pixels made them.
+    #[default]
+    #[serde(rename = "report", alias = "tell")]
+    #[value(name = "report", alias = "tell")]
+    Tell,
+    /// Maps follow: regions lose a lobe that is not borne out, or share one.
+    Apply,
 }
 
 /// Settings of a fit. Defaults are the balanced preset.

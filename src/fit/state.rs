@@ -1,7 +1,10 @@
 //! What a fit changes, and its history: all that a checkpoint holds.
 
 use super::adam::Moments;
-use super::schedule::Stage;
+use super::event::FitEvent;
+use super::schedule::{Stage, revised};
+use super::settings::FitSettings;
+use crate::error::Result;
 use crate::material::texels::Texel;
 use serde::{Deserialize, Serialize};
 
@@ -65,12 +68,27 @@ pub struct FitState {
     /// Non-finite numbers by name and count.
     pub non_finite: Vec<(String, u64)>,
     /// What happened that the user should know.
-    pub events: Vec<String>,
+    pub events: Vec<FitEvent>,
     /// Seconds of work so far.
     pub seconds: f64,
 }
 
 impl FitState {
+    /// Takes over the plan of other numbers of steps; the state is as it was when that fails.
+    pub(super) fn replan(&mut self, settings: &FitSettings) -> Result<()> {
+        let plan = revised(settings, &self.plan, self.stage, self.step_in_stage)?;
+        // A fit that had ended goes on in its last stage when that was made longer.
+        if let (true, Some(last)) = (self.stage >= self.plan.len(), self.plan.last()) {
+            let number = self.plan.len() - 1;
+            if plan.get(number).is_some_and(|stage| stage.steps > last.steps) {
+                self.stage = number;
+                self.step_in_stage = last.steps;
+            }
+        }
+        self.plan = plan;
+        Ok(())
+    }
+
     /// Keeps what a round on the light left open of its scale, as a number a checkpoint can hold.
     pub(super) fn keep_light_scale_deviation(&mut self, deviation: f64) {
         self.light_scale_deviation = Some(deviation.min(f64::MAX));

@@ -1,9 +1,13 @@
 //! The photographs at the resolution of a stage.
 
+use super::views::ViewUse;
 use crate::image::Image;
 use crate::scene::{Camera, PixelState, Scene, View};
 use glam::Vec3;
 use rayon::prelude::*;
+
+/// Pixels of a held-out view that the curve looks at.
+const HELD_OUT_PIXELS: usize = 20_000;
 
 /// A photograph at the resolution of a stage.
 #[derive(Clone, Debug)]
@@ -98,6 +102,14 @@ impl Target {
 /// Targets of the given views, made in parallel.
 pub fn targets(scene: &Scene, views: &[usize], level: usize) -> Vec<Target> {
     views.par_iter().map(|&view| Target::new(scene, view, level)).collect()
+}
+
+/// The held-out views of a scene, shrunk to a size at which looking at them costs little.
+pub(super) fn held_out_targets(scene: &Scene, uses: &[ViewUse]) -> Vec<Target> {
+    (0..scene.views.len())
+        .filter(|&view| uses[view] == ViewUse::HeldOut)
+        .map(|view| Target::new(scene, view, scene.views[view].camera.level_within(HELD_OUT_PIXELS)))
+        .collect()
 }
 
 fn shrink(source: &View, camera: &Camera, factor: usize) -> Shrunk {

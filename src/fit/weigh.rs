@@ -3,10 +3,10 @@
 use super::batch::pixels_of_visit;
 use super::consistency::{Agreement, ViewGradient, released_factor};
 use super::fitter::Fitter;
-use super::gradient::StepSums;
 use super::schedule::Stage;
 use super::settings::Consistency;
-use super::work::StageWork;
+use super::stage_work::StageWork;
+use super::step_sums::StepSums;
 use crate::light::EnvironmentSampler;
 use crate::material::texels::{Texel, TexelPyramid};
 use crate::math::real::Dual;

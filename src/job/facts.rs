@@ -1,15 +1,30 @@
 //! What the report says beside its scores.
 
-use super::outcome::loss_rows;
 use super::prepare::{Prepared, RunSettings};
 use crate::atlas::AtlasQuality;
 use crate::error::{Finding, Severity};
-use crate::export::RunResult;
+use crate::export::{LossRow, RunResult};
 use crate::fit::settings::BackgroundEvidence;
+use crate::fit::state::FitState;
 use crate::fit::{Fitter, ViewUse};
 use crate::image::Image;
 use crate::insight::report::data::{Fact, NonFiniteCount, ReportData, SettingLine, TexelCounts};
 use crate::scene::{Background, Scene};
+
+/// The loss history as the run folder keeps it.
+pub fn loss_rows(state: &FitState) -> Vec<LossRow> {
+    let row = |row: &crate::fit::LossRow| LossRow {
+        step: row.step as u64,
+        stage: row.stage.clone(),
+        seconds: row.seconds,
+        loss: row.loss,
+        image_loss: row.image_loss,
+        mvcl: row.consistency,
+        surface_rmse: row.surface_rmse,
+        held_out_rmse: row.held_out_rmse,
+    };
+    state.losses.iter().map(row).collect()
+}
 
 pub(super) fn describe(
     fitter: &Fitter,

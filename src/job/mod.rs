@@ -58,6 +58,7 @@ use std::sync::Arc;
 
 /// What a watcher may ask of a job.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Command {
     /// Hold after the step in progress.
     Pause,
@@ -77,6 +78,7 @@ pub enum Command {
 /// What a job tells. Progress is dropped when nobody reads it; everything else is kept for the reader. The fit never
 /// waits for one.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub enum Event {
     /// The fit begins or goes on.
     Started {

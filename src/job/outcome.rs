@@ -2,7 +2,7 @@
 
 use super::against_truth::truth_errors;
 use super::explained;
-use super::facts::describe;
+use super::facts::{describe, loss_rows};
 use super::pictures::parameters;
 use super::prepare::{Prepared, RunSettings, covered, timed};
 use super::shown::{exposure_of, go_on, relit_strips, score_views};
@@ -10,8 +10,7 @@ use super::solver_told::SolverTold;
 use super::{Event, FinishingStage};
 use crate::atlas::{dilate, nearest_covered};
 use crate::error::Result;
-use crate::export::{LossRow, RunFolder, RunResult};
-use crate::fit::state::FitState;
+use crate::export::{RunFolder, RunResult};
 use crate::fit::views::views_of;
 use crate::fit::{Fitter, ViewUse};
 use crate::image::{GreyImage, Image};
@@ -23,20 +22,6 @@ use crate::insight::{capture, coverage, memory};
 use crate::material::MaterialMaps;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
-/// The loss history as the run folder keeps it.
-pub fn loss_rows(state: &FitState) -> Vec<LossRow> {
-    let row = |row: &crate::fit::LossRow| LossRow {
-        step: row.step as u64,
-        stage: row.stage.clone(),
-        seconds: row.seconds,
-        loss: row.loss,
-        image_loss: row.image_loss,
-        mvcl: row.consistency,
-        surface_rmse: row.surface_rmse,
-        held_out_rmse: row.held_out_rmse,
-    };
-    state.losses.iter().map(row).collect()
-}
 
 /// Renders, scores and writes everything into the run folder; returns what the report says. What is wrong with the capture
 /// is told on the way, as events.

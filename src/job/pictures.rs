@@ -3,7 +3,7 @@
 use crate::error::{Finding, Result};
 use crate::export::RunResult;
 use crate::light::Environment;
-use crate::light::sky::{SkySettings, sun_and_sky};
+use crate::light::sky::{BuiltInSky, sun_and_sky};
 use crate::material::MaterialMaps;
 use crate::material::texels::{PyramidWeights, TexelPyramid, texels_from_maps};
 use crate::render::picture::{Picture, PictureSettings, render};
@@ -37,15 +37,9 @@ pub struct OpenedLight {
 
 /// A light by its file, or by the name of a built-in sky: `noon`, `evening` or `overcast`.
 pub fn light_of(name: &str, height: usize) -> Result<OpenedLight> {
-    let sky = match name {
-        "noon" => Some(SkySettings::noon()),
-        "evening" => Some(SkySettings::evening()),
-        "overcast" => Some(SkySettings::overcast()),
-        _ => None,
-    };
-    match sky {
+    match BuiltInSky::of_name(name) {
         Some(sky) => {
-            let environment = sun_and_sky(2 * height, height, &sky);
+            let environment = sun_and_sky(2 * height, height, &sky.settings());
             Ok(OpenedLight { name: name.into(), environment, findings: Vec::new() })
         }
         None => {

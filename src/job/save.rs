@@ -3,7 +3,7 @@
 //! A disk that is full for an hour, or a folder that somebody moved, must not cost a fit: what cannot be written is a
 //! warning and is tried again, and the last whole checkpoint stays.
 
-use super::outcome;
+use super::facts::loss_rows;
 use super::prepare::RunSettings;
 use crate::error::{Error, Finding, Result, Severity};
 use crate::export::RunFolder;
@@ -61,7 +61,7 @@ impl Saver {
         self.folder.write_settings(settings)?;
         let path = self.folder.checkpoint_path();
         checkpoint::write(&path, fitter.state())?;
-        self.folder.write_loss(&outcome::loss_rows(fitter.state()))?;
+        self.folder.write_loss(&loss_rows(fitter.state()))?;
         Ok(path)
     }
 

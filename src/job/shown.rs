@@ -10,6 +10,7 @@ use crate::fit::{Fitter, ViewUse};
 use crate::image::{Image, RgbImage};
 use crate::insight::report::{RelitPicture, RelitStrip, ViewPictures};
 use crate::insight::scores::{ViewScores, mean_of, score_halves};
+use crate::light::sky::BuiltInSky;
 use crate::render::picture::{Picture, PictureSettings, render};
 use crate::render::{Parameters, Surface};
 use crate::scene::{Background, PixelState, Scene};
@@ -179,8 +180,8 @@ pub(super) fn relit_strips(
         PictureSettings { background_visible: true, ..picture_settings(scene, settings, RELIT_SAMPLES) };
     let turned = |degrees: f32| (format!("the fitted light turned by {degrees} degrees"), degrees.to_radians());
     let mut lights = Vec::new();
-    for name in ["noon", "evening", "overcast"] {
-        let sky = light_of(name, settings.fit.environment_height.max(64))?;
+    for sky in BuiltInSky::ALL {
+        let sky = light_of(sky.name(), settings.fit.environment_height.max(64))?;
         lights.push((format!("built-in sky: {}", sky.name), matched(&sky.environment, &result.environment).0));
     }
     for (name, radians) in [turned(90.0), turned(180.0)] {

@@ -166,7 +166,7 @@ impl Worker {
                 StepOutcome::Stepped(row) => {
                     let state = self.fitter.state();
                     for event in &state.events[told_events..] {
-                        self.teller.send(Event::Finding(Finding::new(Severity::Note, "fit-event", event.clone())));
+                        self.teller.send(Event::Finding(Finding::new(Severity::Note, "fit-event", event.to_string())));
                     }
                     told_events = state.events.len();
                     self.teller.send(Event::Progress(self.progress(row)));

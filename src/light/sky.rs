@@ -36,6 +36,45 @@ pub struct SkySettings {
     pub irradiance: f32,
 }
 
+/// The skies that are built in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum BuiltInSky {
+    /// A clear day with a high sun.
+    Noon,
+    /// A low sun in haze.
+    Evening,
+    /// Clouds alone.
+    Overcast,
+}
+
+impl BuiltInSky {
+    /// All of them, in the order in which they are shown.
+    pub const ALL: [BuiltInSky; 3] = [BuiltInSky::Noon, BuiltInSky::Evening, BuiltInSky::Overcast];
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            BuiltInSky::Noon => "noon",
+            BuiltInSky::Evening => "evening",
+            BuiltInSky::Overcast => "overcast",
+        }
+    }
+
+    /// The sky of a name; `None` where no sky has it.
+    pub fn of_name(name: &str) -> Option<Self> {
+        BuiltInSky::ALL.into_iter().find(|sky| sky.name() == name)
+    }
+
+    /// What it is made of.
+    pub fn settings(self) -> SkySettings {
+        match self {
+            BuiltInSky::Noon => SkySettings::noon(),
+            BuiltInSky::Evening => SkySettings::evening(),
+            BuiltInSky::Overcast => SkySettings::overcast(),
+        }
+    }
+}
+
 impl SkySettings {
     /// A clear day with a high sun.
     pub fn noon() -> Self {

@@ -33,7 +33,6 @@ pub mod model;
 pub mod nodes;
 pub mod pass;
 pub mod product;
-mod product_wide;
 pub mod sampler;
 pub mod source;
 pub mod spline;

@@ -3,14 +3,6 @@
 //! One thread works on one product. Who wants several threads splits the batch into chunks of a fixed size and adds the
 //! results in order, so that bits do not depend on how many threads there are.
 
-use super::product_wide::Strided;
-use std::cell::RefCell;
-
-thread_local! {
-    /// Where the right side of a product is packed.
-    static PACKED: RefCell<Vec<f32>> = const { RefCell::new(Vec::new()) };
-}
-
 /// A matrix that lies row by row in a slice.
 #[derive(Clone, Copy, Debug)]
 pub struct Rows<'a> {
@@ -47,7 +39,7 @@ impl<'a> Rows<'a> {
 }
 
 /// `into = left * right`, or `into += left * right` when `add`. `into` lies row by row. Panics when shapes do not fit.
-pub fn multiply<'a>(left: Rows<'a>, right: Rows<'a>, into: &mut [f32], add: bool) {
+pub fn multiply(left: Rows, right: Rows, into: &mut [f32], add: bool) {
     let ((rows, inner), (also_inner, columns)) = (left.shape(), right.shape());
     assert_eq!(inner, also_inner, "inner sizes of a product");
     assert_eq!(into.len(), rows * columns, "size of a product");
@@ -61,18 +53,6 @@ pub fn multiply<'a>(left: Rows<'a>, right: Rows<'a>, into: &mut [f32], add: bool
         return;
     }
     let (left_strides, right_strides) = (left.strides(), right.strides());
-    if super::product_wide::is_offered() {
-        let of = |matrix: Rows<'a>| {
-            let (row, column) = if matrix.transposed { (1, matrix.columns) } else { (matrix.columns, 1) };
-            Strided { values: matrix.values, row, column }
-        };
-        if !add {
-            into.fill(0.0);
-        }
-        return PACKED.with_borrow_mut(|packed| {
-            super::product_wide::multiply_add((rows, inner, columns), of(left), of(right), into, packed);
-        });
-    }
     // SAFETY: the three slices hold as many numbers as shapes and strides reach, checked above and in `Rows::new`;
     // `into` is borrowed mutably, so it overlaps neither of the others.
     unsafe {

@@ -3,8 +3,8 @@
 //! Near the mirror direction a texel is split into up to 8 x 8 parts, so that narrow lobes are integrated and not hit or
 //! missed. Parts are handed out by the batch: their angles are found side by side, in vector registers.
 
+use super::angles::angles;
 use super::geometry::ObjectPixel;
-use super::nodes::angles;
 use super::settings::MOST_ROWS;
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::math::sphere;

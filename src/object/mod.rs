@@ -20,6 +20,7 @@
 //! nodes and nothing else. What this folder refuses to do: light that bounces between parts of the object, spatially
 //! varying reflectance (that is `fit`), and anything that needs a window or a thread of its own.
 
+pub mod angles;
 pub mod directions;
 pub mod evidence;
 pub mod geometry;

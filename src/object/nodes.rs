@@ -4,7 +4,6 @@
 //! values; between a few thousand nodes that lie close where highlights are, the value is linear.
 
 use super::directions::{BATCH, PartBatch};
-use crate::math::arc::{arc_of_quarter, arc_of_upper_half};
 use crate::measured::coordinates::HalfDifference;
 use crate::measured::model::ReflectanceModel;
 use glam::{Vec3, Vec3A};
@@ -273,25 +272,6 @@ fn above_surface(point: HalfDifference) -> HalfDifference {
     let steep = point.theta_half.tan() * point.phi_difference.cos().abs();
     let limit = if steep > 1e-12 { (1.0 / steep).atan() } else { std::f64::consts::FRAC_PI_2 };
     HalfDifference { theta_difference: point.theta_difference.min(SHARE_OF_HORIZON * limit), ..point }
-}
-
-/// Half and difference angles of a pair of unit directions at a unit normal, without a frame, in `f32`.
-#[inline(always)]
-pub fn angles(normal: Vec3, to_light: Vec3, to_eye: Vec3) -> (f32, f32, f32) {
-    let sum = to_light + to_eye;
-    let half = sum * (sum.length_squared().max(1e-20)).sqrt().recip();
-    let (half_cosine, light_cosine) = (half.dot(normal), to_light.dot(half));
-    let across = normal.cross(half);
-    let half_sine = across.length();
-    let theta_half = arc_of_quarter(half_sine, half_cosine.max(0.0));
-    // Half of the angle between the two directions, from their difference: exact near 0.
-    let theta_difference = arc_of_quarter(0.5 * (to_light - to_eye).length(), light_cosine.max(0.0));
-    // Tangent and bitangent of the half vector, both times the sine of theta_half.
-    let (x, y) = (light_cosine * half_cosine - to_light.dot(normal), to_light.dot(across));
-    // Reciprocity makes phi and phi + pi one: the lower half of the plane is turned onto the upper.
-    let (x, y) = if y < 0.0 { (-x, -y) } else { (x, y) };
-    let azimuth = arc_of_upper_half(y, x);
-    (theta_half, theta_difference, if azimuth >= PI { 0.0 } else { azimuth })
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ use super::observations::ObjectView;
 use super::page::{self, Shown};
 use super::picture::render;
 use super::progress::write_rows;
-use super::result_read::ObjectInputs;
+use super::result_read::{MARK, ObjectInputs, SEEN};
 use super::settings::ObjectSettings;
 use super::split::{Gauge, SplitSpread};
 use super::starts::StartedModel;
@@ -28,11 +28,6 @@ use crate::image::file;
 use crate::light::Environment;
 use crate::measured::table::MeasuredBrdf;
 use std::path::Path;
-
-/// Name of the file that marks a result of object mode.
-pub const MARK: &str = "object.json";
-/// Name of the file that says what the photos see of the light.
-pub const SEEN: &str = "environment_seen.exr";
 
 /// Makes the folder, or takes an empty one or one of an earlier estimation.
 ///

@@ -5,7 +5,6 @@ use super::nodes::NodeGrid;
 use super::prior::LogLight;
 use super::progress::read_rows;
 use super::read::ObjectFiles;
-use super::result_folder::{MARK, SEEN};
 use super::seen::LightSeen;
 use super::settings::ObjectSettings;
 use super::split::SplitSpread;
@@ -15,6 +14,10 @@ use crate::image::file;
 use crate::light::Environment;
 use std::path::{Path, PathBuf};
 
+/// Name of the file that marks a result of object mode.
+pub const MARK: &str = "object.json";
+/// Name of the file that says what the photos see of the light.
+pub const SEEN: &str = "environment_seen.exr";
 /// Darkest radiance of a light that was read, so that it has a logarithm.
 const FLOOR: f32 = 1e-12;
 

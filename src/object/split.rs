@@ -40,7 +40,8 @@ impl Gauge {
 
 /// Share of light from one direction that leaves again, by a fine sum over the hemisphere.
 pub fn albedo(grid: &NodeGrid, table: &NodeTable, theta: f32) -> [f64; 3] {
-    use super::nodes::{angles, weights};
+    use super::angles::angles;
+    use super::nodes::weights;
     use glam::Vec3;
     let eye = Vec3::new(theta.sin(), 0.0, theta.cos());
     let (rows, columns) = (128, 256);

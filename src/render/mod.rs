@@ -26,6 +26,7 @@ pub mod measured_regions;
 pub mod packet;
 pub mod path;
 pub mod picture;
+pub mod picture_settings;
 pub mod progressive;
 pub mod regions;
 pub mod sums;

@@ -9,7 +9,7 @@
 use super::accumulate::{PassKey, estimate_pixel};
 use super::first_hits::CameraRays;
 use super::path::{PathArena, PathSettings, PathTracer};
-use super::picture::PictureSettings;
+use super::picture_settings::PictureSettings;
 use super::sums::Parameters;
 use super::surface::Surface;
 use crate::image::resize::enlarge;

@@ -27,7 +27,7 @@ fn the_start_of_the_paper_is_left_and_named() {
         let fitter = trial.fitted(FitSettings { start: Start::Paper, steps, ..quick() });
         let events = &fitter.state().events;
         assert_eq!(events.len(), 1, "{events:?}");
-        assert!(events[0].contains("saddle") && events[0].contains("norm"), "{events:?}");
+        assert!(events[0].is_of_saddle() && events[0].to_string().contains("norm"), "{events:?}");
         assert_learned(&fitter);
         assert!(mean_of(fitter.state(), 0) > 0.0 && mean_light(fitter.state()) > 0.0);
     }

@@ -3,7 +3,7 @@
 //! Of a cell, a texel, a block or a group of texels. The deviation of a part from its whole is eliminated before parts are
 //! added up.
 
-use super::block::{BlockPrior, PixelTerms};
+use super::pixel_terms::{BlockPrior, PixelTerms};
 
 /// A 2 x 2 system in (rho, F0) and its constant: the six sums of a channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

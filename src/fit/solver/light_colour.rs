@@ -73,9 +73,9 @@ fn specular_of(work: &BlockWork, c: usize, noise: f64) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::block::{MOST_NODES, PixelTerms};
-    use super::super::lobe_widths::WidthStencil;
-    use super::super::round::{BlockWork, log_widths, open_prior};
+    use super::super::lobe_widths::{MOST_NODES, WidthStencil, log_widths};
+    use super::super::pixel_terms::PixelTerms;
+    use super::super::round::{BlockWork, open_prior};
     use super::*;
     use crate::math::random::SequentialRandom;
 

@@ -1,6 +1,5 @@
 //! A round on the light: some blocks are solved under the light as it is, and their rows move it.
 
-use super::block::BlockPrior;
 use super::eliminate::BlockRows;
 use super::estimate::Estimate;
 use super::gains::gains_after;
@@ -10,6 +9,7 @@ use super::light_shape::{LightShape, bright_texels};
 use super::light_step::{Gauge, LightPrior, solve_channel};
 use super::light_suns::narrow_scales;
 use super::normal_equations::NormalEquations;
+use super::pixel_terms::BlockPrior;
 use super::plan;
 use super::report::{ErrorSums, StepReport, median};
 use super::round::{BlockWork, Round, open_prior};

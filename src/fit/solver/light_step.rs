@@ -164,7 +164,8 @@ fn mean_weights(shape: &LightShape) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::light_suns::{Suns, narrow_scales};
+    use super::super::light_suns::narrow_scales;
+    use super::super::settings::Suns;
     use super::*;
 
     #[test]

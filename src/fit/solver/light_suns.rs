@@ -2,6 +2,7 @@
 
 use super::light_shape::LightShape;
 use super::light_step::usual_radiance;
+use super::settings::Suns;
 use crate::math::sphere::{direction_of_texel, solid_angle_of_texel};
 use glam::Vec3;
 
@@ -9,18 +10,6 @@ use glam::Vec3;
 const NARROW_GROWTH: f64 = 10.0;
 /// A sun, with what is bright around it, reaches so far from its brightest texel, in degrees.
 const SUN_RADIUS_DEGREES: f32 = 20.0;
-
-/// How many suns are looked for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Suns {
-    /// Wherever the light is bright: lamps are suns as well.
-    #[default]
-    Any,
-    /// One at most, where the light is brightest, as daylight has it. Of photographs, whose mesh and cameras are not quite
-    /// right, many small suns explain some of what is wrong: under a cloudy sky `saharov_bmvs` had twenty, up to 20 times
-    /// as bright as the sky and coloured, where one is 2 to 3 times as bright.
-    One,
-}
 
 /// What narrow hats are believed to be (one standard deviation), over the usual radiance of their channel, by the light
 /// before the step, given with its coefficients. Where all channels are bright there is a sun, and it may be much

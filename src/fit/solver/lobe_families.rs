@@ -13,7 +13,7 @@
 //! has keep half of what is believed.
 
 use super::estimate::Estimate;
-use super::lobe_prior::{LobeFamily, LobeKind, LobePrior, SurfaceKinds};
+use super::lobe_prior::{LobeFamily, LobeKind, LobePrior, REACH, SurfaceKinds};
 use super::lobe_scene::SceneLobes;
 use crate::material::texels::Texel;
 
@@ -35,8 +35,6 @@ const KNOWN_SPECULAR: (f32, f32) = (0.25, 0.015);
 const SIZE: (f64, f64) = (0.12, 0.3);
 /// Least standard deviations of a family: of F0 relative to itself, of diffuse reflectance, of the logarithm of the width.
 const LEAST: (f64, f64, f64) = (0.08, 0.06, 0.15);
-/// Standard deviations from its middle within which a family's widths are looked at.
-pub(super) const REACH: f64 = 3.0;
 /// Texels that each cluster is begun from, of which the best is taken.
 const SEEDS: usize = 64;
 /// Rounds in which clusters find their middle.

@@ -6,6 +6,9 @@
 //! The logarithm of the width is normal. Kinds that have the same belief of it make a family: one of them holds for any
 //! scene, others may come from what the scene has shown elsewhere ([`super::lobe_families`]).
 
+/// Standard deviations from its middle within which a family's widths are looked at.
+pub(super) const REACH: f64 = 3.0;
+
 /// What is believed of a kind of surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LobeKind {

@@ -7,8 +7,7 @@
 //! is a step of expectation maximisation each time that maps are made (Dempster, Laird and Rubin 1977).
 
 use super::estimate::Estimate;
-use super::lobe_families::REACH;
-use super::lobe_prior::{LobeFamily, LobeKind};
+use super::lobe_prior::{LobeFamily, LobeKind, REACH};
 
 /// Least standard deviation of the logarithm of the width over a scene. Maps that lean on what is believed differ too little.
 const LEAST_WIDTH_SPREAD: f64 = 0.2;

@@ -3,9 +3,9 @@
 //! Sums of a texel, or of a group; those of groups add up. Of a pixel `y = rho e + F0 s` only `s` and `y` change with the
 //! width, so that the square of `e` is there once.
 
-use super::block::{MOST_NODES, PixelTerms};
 use super::cell_sums::System;
-use super::lobe_widths::{LOBE_WIDTHS, weighed_stencils};
+use super::lobe_widths::{LOBE_WIDTHS, MOST_NODES, weighed_stencils};
+use super::pixel_terms::PixelTerms;
 use crate::math::vector::doubles::{DOUBLES, Doubles, versions_of_doubles};
 
 /// Widths go four by four; the last four have one that is not there.

@@ -8,8 +8,7 @@
 //! with clusters), and so do the few pixels that count as independent.
 
 use super::choice::clustered::ClusteredMean;
-use super::lobe_widths::{KeptStencil, WidthStencil};
-use super::round::log_widths;
+use super::lobe_widths::{KeptStencil, WidthStencil, log_widths};
 use super::tile::{Tile, TilePixel};
 
 /// How many times as wide as its lobe a tail is.

@@ -4,14 +4,21 @@
 //! F0 that is off by half: weighed at integrated widths alone, metals of the exchange scene `toys` came out with F0 .3
 //! for .5. Integrals are smooth in the logarithm of the width, so those between follow from four neighbours (Lagrange).
 
-use super::block::MOST_NODES;
-use super::round::log_widths;
 use std::ops::Range;
 
+/// Most widths that are looked at.
+pub const MOST_NODES: usize = 10;
+/// Widths that are looked at: evenly in the logarithm, closer where lobes are wide.
+pub const WIDTHS: [f32; MOST_NODES] = [0.02, 0.04, 0.075, 0.12, 0.18, 0.26, 0.37, 0.52, 0.73, 1.0];
 /// First integrated width after which there are halves; below, lobes are narrow and few pixels see them.
 const FIRST_HALVED: usize = 4;
 /// Number of widths at which lobes are weighed.
 pub const LOBE_WIDTHS: usize = 2 * MOST_NODES - 1 - FIRST_HALVED;
+
+/// Logarithms of [`WIDTHS`].
+pub fn log_widths() -> [f64; MOST_NODES] {
+    WIDTHS.map(|width| f64::from(width).ln())
+}
 
 /// Integrated widths and weights that make up the integral at another: four in a row, or as many as are known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

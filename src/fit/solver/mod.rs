@@ -54,6 +54,7 @@ pub mod maps;
 pub mod non_negative;
 pub mod normal_equations;
 pub mod observations;
+pub mod pixel_terms;
 pub mod plan;
 pub mod report;
 pub mod round;

@@ -1,9 +1,9 @@
 //! What a step of the solver did, for the curve and for whoever watches.
 
-use super::block::PixelTerms;
 use super::choice::Choices;
 use super::estimate::Estimate;
 use super::lobe_tails::LobeTails;
+use super::pixel_terms::PixelTerms;
 use super::round::{BlockWork, Round};
 use super::scene::SolverScene;
 use crate::render::cached::{CachedTransport, LightPlanes, PointLight};

@@ -1,17 +1,17 @@
 //! What a round does with a block: light at its pixels, its unknowns, and its rows for the light.
 
-use super::block::{BlockPrior, BlockSolution, MOST_NODES, PixelTerms, solve_block};
+use super::block::{BlockSolution, solve_block};
 use super::eliminate::BlockRows;
 use super::light_shape::LightShape;
+use super::lobe_widths::{MOST_NODES, WIDTHS, log_widths};
 use super::observations::{Observation, Observations};
+use super::pixel_terms::{BlockPrior, PixelTerms};
 use super::plan::Block;
 use crate::math::sum_of_products;
 use crate::render::cached::irradiance::add_irradiance_row;
-use crate::render::cached::lobe_sum::{LobeSums, add_lobe_row, lobe_sums, lobe_with_derivative, wide_from};
+use crate::render::cached::lobe_place::{LobeSums, wide_from};
+use crate::render::cached::lobe_sum::{add_lobe_row, lobe_sums, lobe_with_derivative};
 use crate::render::cached::{CachedTransport, LightPlanes, PointLight, SeenLight, ShadingPoint, ViewFootprints};
-
-/// Widths that are looked at: evenly in the logarithm, closer where lobes are wide.
-pub const WIDTHS: [f32; MOST_NODES] = [0.02, 0.04, 0.075, 0.12, 0.18, 0.26, 0.37, 0.52, 0.73, 1.0];
 
 /// What all blocks of a round share.
 pub struct Round<'a> {
@@ -57,11 +57,6 @@ pub fn open_prior(mean_radiance: f32, openness: f64) -> BlockPrior {
         noise: 0.05 * f64::from(mean_radiance).max(1e-6),
         spread: 0.1,
     }
-}
-
-/// Logarithms of [`WIDTHS`].
-pub fn log_widths() -> [f64; MOST_NODES] {
-    WIDTHS.map(|width| f64::from(width).ln())
 }
 
 impl Round<'_> {

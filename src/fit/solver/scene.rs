@@ -89,8 +89,6 @@ impl SolverScene {
         traced: Option<CachedTransport>,
         stop: &AtomicBool,
     ) -> Result<Option<Self>> {
-        // Blocks are solved side by side: parallel factorisations inside them would only wait for each other.
-        faer::set_global_parallelism(faer::Par::Seq);
         let cached = CachedSettings {
             grid: settings.grid.min(settings.map_size),
             bounce_rays: settings.bounce_rays,

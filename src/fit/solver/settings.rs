@@ -1,29 +1,24 @@
 //! What can be chosen in the solver.
 
-use super::light_suns::Suns;
 use super::lobe_prior::SurfaceKinds;
 use super::lobe_tree::LobeSharing;
-use crate::fit::settings::{BackgroundEvidence, FitSettings};
-use serde::{Deserialize, Serialize};
-
-/// What becomes of what views that took no part say of the model's freedoms, see [`super::choice`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "lowercase")]
-pub enum Choosing {
-    /// Held-out views are not asked.
-    Off,
-    /// The report says what they choose; maps stay as the evidence of the pixels made them.
-    #[default]
-    #[serde(rename = "report", alias = "tell")]
-    #[value(name = "report", alias = "tell")]
-    Tell,
-    /// Maps follow: regions lose a lobe that is not borne out, or share one.
-    Apply,
-}
+use crate::fit::settings::{BackgroundEvidence, Choosing, FitSettings};
 
 /// [`SolverSettings::light_variation`] of photographs. Held-out pictures after the best factor of `saharov_bmvs` and
 /// `herzjesu8_bmvs` with 0.3, 0.5 and 0.7: 25.56, 25.36, 25.25 dB and 28.97, 29.02, 29.00 dB.
 const PHOTOGRAPHED_LIGHT_VARIATION: f64 = 0.5;
+
+/// How many suns are looked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Suns {
+    /// Wherever the light is bright: lamps are suns as well.
+    #[default]
+    Any,
+    /// One at most, where the light is brightest, as daylight has it. Of photographs, whose mesh and cameras are not quite
+    /// right, many small suns explain some of what is wrong: under a cloudy sky `saharov_bmvs` had twenty, up to 20 times
+    /// as bright as the sky and coloured, where one is 2 to 3 times as bright.
+    One,
+}
 
 /// Settings of the solver.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -14,6 +14,21 @@ pub(super) struct TexelTerms {
     pub(super) slope: f64,
 }
 
+/// Part of a pixel that one texel is: the pixel, and what multiplies the texel's unknowns per channel.
+pub(super) struct Part {
+    pub(super) pixel: u32,
+    pub(super) arriving: [f32; 3],
+    pub(super) base: [f32; 3],
+    pub(super) slope: [f32; 3],
+}
+
+impl Part {
+    pub(super) fn terms(&self, c: usize) -> TexelTerms {
+        let [arriving, base, slope] = [self.arriving[c], self.base[c], self.slope[c]].map(f64::from);
+        TexelTerms { arriving, base, slope }
+    }
+}
+
 /// Sums over the pixels that show a texel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct TexelSystem {

@@ -5,10 +5,10 @@
 //! send, and what is left tells of the lobe of the one texel (`tile_lobes`). At the end all that is unknown of the texels
 //! is solved together (`tile_texels`), by pixels among which highlights are no outliers (`tile_highlights`).
 
-use super::block::PixelTerms;
 use super::lobe_evidence::LobeBelief;
 use super::lobe_prior::LobePrior;
 use super::lobe_tree::LobeSharing;
+use super::pixel_terms::PixelTerms;
 use super::round::{BlockWork, Round};
 use std::ops::Range;
 

@@ -4,8 +4,7 @@
 //! the pixel hardly counts. It never tells, then, that F0 there is higher. Once lobes have their widths it can be asked
 //! whether F0 alone would explain such a pixel; if so it counts.
 
-use super::lobe_widths::KeptStencil;
-use super::round::log_widths;
+use super::lobe_widths::{KeptStencil, log_widths};
 use super::tile::{Tile, forgiven};
 
 /// Least radiance of a lobe of F0 = 1 over that of a white diffuse surface in the same place for a highlight. Where lobes

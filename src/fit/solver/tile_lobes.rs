@@ -7,8 +7,7 @@ use super::lobe_evidence::LobeBelief;
 use super::lobe_prior::LobePrior;
 use super::lobe_sums::{LobeSumsOfGroup, WidthWeights};
 use super::lobe_tree::{LobeSharing, TreeTexel, beliefs};
-use super::lobe_widths::{KeptStencil, LOBE_WIDTHS, weighed_log_widths};
-use super::round::log_widths;
+use super::lobe_widths::{KeptStencil, LOBE_WIDTHS, log_widths, weighed_log_widths};
 use super::tile::{TILE, Tile};
 use std::time::Instant;
 
@@ -122,8 +121,8 @@ impl Tile {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::block::PixelTerms;
     use super::super::lobe_widths::WidthStencil;
+    use super::super::pixel_terms::PixelTerms;
     use super::super::tile::TilePixel;
     use super::*;
     use crate::math::random::SequentialRandom;

@@ -3,9 +3,8 @@
 //! Of each texel half of the views say how far it is from what is shared, and the other half say it again. What both agree
 //! in, over all texels, is texture; noise and errors of single views are not.
 
-use super::texel_system::TexelSystem;
+use super::texel_system::{Part, TexelSystem};
 use super::tile::Tile;
-use super::tile_texels::Part;
 
 /// Least and most standard deviation of a texel's F0 from that of those it shares its lobe with; without evidence it is the
 /// least. With the least in all tiles gilded stripes of the demo's knot are too dull (specular map .1577 for .1533), with .1
@@ -107,7 +106,7 @@ impl Tile {
 
 #[cfg(test)]
 mod tests {
-    use super::super::block::PixelTerms;
+    use super::super::pixel_terms::PixelTerms;
     use super::super::tile_lobes::tests::{TRUTH, tile};
     use super::*;
 

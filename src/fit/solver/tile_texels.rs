@@ -8,9 +8,8 @@
 //! them then.
 
 use super::lobe_evidence::LobeBelief;
-use super::lobe_widths::{KeptStencil, WidthStencil};
-use super::round::log_widths;
-use super::texel_system::{TexelSystem, TexelTerms};
+use super::lobe_widths::{KeptStencil, WidthStencil, log_widths};
+use super::texel_system::{Part, TexelSystem};
 use super::tile::{SWEEPS, Tile};
 use super::tile_spread::Spread;
 
@@ -24,21 +23,6 @@ const PASSES: usize = 2;
 const WIDTH_REACH: [f64; 2] = [0.2, 0.3];
 /// Half of the distance of the logarithms of widths between which slopes are taken.
 const STEP: f64 = 0.02;
-
-/// Part of a pixel that one texel is: the pixel, and what multiplies the texel's unknowns per channel.
-pub(super) struct Part {
-    pub(super) pixel: u32,
-    arriving: [f32; 3],
-    base: [f32; 3],
-    slope: [f32; 3],
-}
-
-impl Part {
-    pub(super) fn terms(&self, c: usize) -> TexelTerms {
-        let [arriving, base, slope] = [self.arriving[c], self.base[c], self.slope[c]].map(f64::from);
-        TexelTerms { arriving, base, slope }
-    }
-}
 
 impl Tile {
     /// Solves all texels from what is believed of their lobes. What lobes send has to be set before, and is set anew.

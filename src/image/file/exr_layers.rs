@@ -4,7 +4,7 @@
 //! is radiance. Renderers write albedo, normals and the like beside it in the same way, so that the names decide: those that
 //! mean the whole picture come first, those that mean a part of it are never taken without being asked for.
 
-use super::source::implausible;
+use super::format::implausible;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use std::path::Path;
 

@@ -1,4 +1,7 @@
-//! A decoder that panics on a damaged file becomes an error, without a word on the terminal.
+//! A decoder that panics on a damaged file becomes an error; in our programs without a word on the terminal.
+//!
+//! What a panic writes is up to the hook of the process, which is not the library's: [`keep_decoders_quiet`] is for
+//! programs. Where nobody calls it, the message of the decoder's panic appears beside the error.
 
 use crate::error::{Error, ErrorKind, Place, Result};
 use std::cell::Cell;
@@ -10,21 +13,25 @@ thread_local! {
     static SILENT: Cell<bool> = const { Cell::new(false) };
 }
 
+/// Lets panics of guarded decoders pass without a word from now on, in the whole process; every other panic is passed on
+/// to the hook that was there before. For programs, at their start.
+pub fn keep_decoders_quiet() {
+    static INSTALL: Once = Once::new();
+    INSTALL.call_once(|| {
+        let previous = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |information| {
+            if !SILENT.with(Cell::get) {
+                previous(information);
+            }
+        }));
+    });
+}
+
 /// Restores the thread's previous state when dropped, also while unwinding.
 struct Silence(bool);
 
 impl Silence {
     fn start() -> Self {
-        static INSTALL: Once = Once::new();
-        // The hook is the process's: ours passes on every panic that does not come from a guarded decoder.
-        INSTALL.call_once(|| {
-            let previous = std::panic::take_hook();
-            std::panic::set_hook(Box::new(move |information| {
-                if !SILENT.with(Cell::get) {
-                    previous(information);
-                }
-            }));
-        });
         Silence(SILENT.with(|silent| silent.replace(true)))
     }
 }

@@ -9,7 +9,7 @@
 //! what is left after dividing by their products.
 
 use super::colour::{Primaries, is_identity, rec709_from_xyz_d65};
-use super::source::{Source, malformed, too_large};
+use super::format::{Source, malformed, too_large};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::{Image, RgbImage};
 use glam::{DMat3, DVec2, Vec3};

@@ -14,6 +14,7 @@
 mod colour;
 mod exif;
 mod exr_layers;
+mod format;
 mod guard;
 mod hdr;
 mod jpeg;
@@ -27,8 +28,10 @@ mod source;
 mod stored;
 mod tiff;
 
+pub use format::Format;
+pub use guard::keep_decoders_quiet;
 pub use photo::{Encoding, PhotoFile, PhotoOptions, PhotoPixels, swaps_sides, turned};
-pub use source::{Format, read_header};
+pub use source::read_header;
 
 use super::{GreyImage, Image, RgbImage, transfer};
 use crate::error::{Error, ErrorKind, Place, Result};
@@ -36,14 +39,14 @@ use crate::files::{write_atomically, write_bytes};
 use ::image::ExtendedColorType;
 use ::image::codecs::{hdr::HdrEncoder, jpeg::JpegEncoder, png::PngEncoder};
 use ::image::{ImageEncoder, ImageError};
+use format::Source;
 use glam::Vec3;
-use source::Source;
 use std::path::Path;
 
 /// A photo with all that its file says of it. Values are not checked: they may be negative or not finite.
 ///
 /// # Errors
-/// Missing, unreadable, damaged or cut short (with the byte), more than [`LARGEST_PIXEL_COUNT`](source::LARGEST_PIXEL_COUNT) pixels, a kind that is not
+/// Missing, unreadable, damaged or cut short (with the byte), more than [`LARGEST_PIXEL_COUNT`](format::LARGEST_PIXEL_COUNT) pixels, a kind that is not
 /// read, inks for colours; for OpenEXR a layer that is not there, or layers whose names do not say which is radiance.
 pub fn read_photo(path: &Path, options: &PhotoOptions) -> Result<PhotoFile> {
     photo_of(&Source::open(path)?, options)

@@ -7,9 +7,9 @@
 
 use super::colour::{Primaries, is_identity};
 use super::exr_layers::{self, Layer, Part, Placed};
+use super::format::{Source, implausible, malformed, too_large};
 use super::guard::guarded;
 use super::photo::{PhotoFile, PhotoPixels};
-use super::source::{Source, implausible, malformed, too_large};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::{GreyImage, Image, RgbImage};
 use exr::prelude as openexr;
@@ -32,7 +32,7 @@ pub fn size(reader: &mut (impl BufRead + Seek), path: &Path, length: u64) -> Res
     for header in headers.iter().filter(|header| !header.deep) {
         let (width, height) = (header.layer_size.width() as u64, header.layer_size.height() as u64);
         let pixels = width.saturating_mul(height);
-        if pixels > super::source::LARGEST_PIXEL_COUNT {
+        if pixels > super::format::LARGEST_PIXEL_COUNT {
             return Err(too_large(path, format!("the file claims {width} x {height} pixels")));
         }
         let sample_bytes: usize =
@@ -64,7 +64,7 @@ pub fn size(reader: &mut (impl BufRead + Seek), path: &Path, length: u64) -> Res
     };
     let window = header.shared_attributes.display_window.size;
     let (width, height) = (window.width(), window.height());
-    if (width as u64).saturating_mul(height as u64) > super::source::LARGEST_PIXEL_COUNT {
+    if (width as u64).saturating_mul(height as u64) > super::format::LARGEST_PIXEL_COUNT {
         return Err(too_large(path, format!("the file claims {width} x {height} pixels")));
     }
     let largest = headers.iter().filter(|header| !header.deep).max_by_key(|header| header.layer_size.area());

@@ -3,7 +3,7 @@
 //! Debevec 2001, "PFM Portable FloatMap Image Format". The magnitude of the scale factor is ignored, as most readers
 //! do; its sign tells the byte order.
 
-use super::source::{Source, malformed};
+use super::format::{Source, malformed};
 use crate::error::{Error, Result};
 use crate::image::{GreyImage, Image, RgbImage};
 use glam::Vec3;

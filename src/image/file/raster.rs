@@ -1,8 +1,8 @@
 //! PNG and JPEG through the `image` crate.
 
+use super::format::{Format, Source, malformed, too_large};
 use super::guard::guarded;
 use super::jpeg;
-use super::source::{Format, Source, malformed, too_large};
 use super::stored::{Samples, Stored, refused};
 use super::{exif, png};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
@@ -12,7 +12,7 @@ use std::io::{BufRead, Cursor, Seek};
 use std::path::Path;
 
 /// What a decoder may allocate: 16 bits of four channels of the largest image.
-const LARGEST_ALLOCATION: u64 = super::source::LARGEST_PIXEL_COUNT * 8;
+const LARGEST_ALLOCATION: u64 = super::format::LARGEST_PIXEL_COUNT * 8;
 
 /// (width, height) from the header alone.
 pub fn size(reader: &mut (impl BufRead + Seek), path: &Path, format: Format) -> Result<(usize, usize)> {

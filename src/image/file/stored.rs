@@ -1,9 +1,9 @@
 //! Pixels as PNG, JPEG and TIFF hold them, before curves and matrices; and the way from there to linear Rec. 709.
 
 use super::colour::{ColourSpace, Curve};
+use super::format::{Format, Source};
 use super::photo::{Encoding, PhotoFile, PhotoPixels};
 use super::profile::{self, Profile};
-use super::source::{Format, Source};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::{GreyImage, Image, RgbImage};
 use glam::Vec3;
@@ -71,7 +71,7 @@ impl Stored {
             || !(1..=4).contains(&self.channels)
             || (width, height) != (source.header.width, source.header.height)
         {
-            return Err(super::source::implausible(
+            return Err(super::format::implausible(
                 &source.path,
                 format!("the decoded image is not the {width} x {height} of its header"),
             ));

@@ -2,10 +2,10 @@
 //!
 //! The first picture of the file is read. A file with a smaller preview in that place is a camera's raw file and refused.
 
+use super::format::{Source, implausible, malformed, too_large};
 use super::guard::guarded;
-use super::source::{Source, implausible, malformed, too_large};
 use super::stored::{Samples, Stored, refused};
-use super::{exif, source};
+use super::{exif, format};
 use crate::error::{Error, ErrorKind, Place, Result};
 use std::io::{BufRead, Cursor, Read, Seek};
 use std::path::Path;
@@ -34,7 +34,7 @@ pub fn read_header(reader: &mut (impl BufRead + Seek), path: &Path, length: u64)
     let mut bytes = Vec::new();
     reader.take(length).read_to_end(&mut bytes).map_err(cannot)?;
     if exif::is_raw(&bytes) {
-        return Err(source::raw_file(path));
+        return Err(format::raw_file(path));
     }
     let outcome = guarded(path, || Ok(header_of(&mut Cursor::new(bytes.as_slice()))))?;
     let (header, colour) = outcome.map_err(|error| explain(error, path))?;
@@ -48,7 +48,7 @@ pub fn read_header(reader: &mut (impl BufRead + Seek), path: &Path, length: u64)
     };
     let pixels = (header.width as u64).saturating_mul(header.height as u64);
     let decoded = pixels.saturating_mul(channels * u64::from(colour.bit_depth().div_ceil(8)));
-    if pixels > source::LARGEST_PIXEL_COUNT {
+    if pixels > format::LARGEST_PIXEL_COUNT {
         return Err(too_large(path, format!("the file claims {} x {} pixels", header.width, header.height)));
     }
     if decoded / BEST_RATIO > length {

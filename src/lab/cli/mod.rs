@@ -19,6 +19,7 @@ use std::process::ExitCode;
 
 /// Runs the lab on its arguments, the program's name first. Exit codes as those of [`crate::cli::run`].
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    crate::image::file::keep_decoders_quiet();
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(usage) => {

@@ -1,3 +1,4 @@
+use super::super::angles::angles;
 use super::*;
 use crate::math::random::SequentialRandom;
 use glam::DVec3;

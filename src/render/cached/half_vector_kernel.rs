@@ -3,9 +3,9 @@
 //!
 //! Written once over [`Vector`]; [`super::half_vector`] chooses the version at run time.
 
-use super::half_vector::{Places, place_count, places};
+use super::half_vector_places::{Places, place_count, places};
 use super::light_basis::LightBasis;
-use super::lobe_sum::{LobePlace, LobeSums};
+use super::lobe_place::{LobePlace, LobeSums};
 use crate::math::frame::Frame;
 use crate::math::vector::elementary::exp_minus_one;
 use crate::math::vector::{Vector, WIDEST, dot};

@@ -3,7 +3,7 @@
 //! Written once over [`Vector`]; [`super::lobe_sum`] chooses the version at run time.
 
 use super::light_basis::LightBasis;
-use super::lobe_sum::{LobePlace, LobeSums};
+use super::lobe_place::{LobePlace, LobeSums};
 use crate::math::vector::Vector;
 use std::f32::consts::{LN_2, PI};
 

@@ -12,83 +12,18 @@
 //! convolved with that of the normals: a lobe that is wider by their variance ([`LobePlace::width_seen`]).
 
 use super::half_vector;
+use super::half_vector_places::place_count;
 use super::light_basis::LightBasis;
 use super::lobe_kernel::{MOST_AT_ONCE, row_in, sums_in};
-use super::seen_light::SeenLight;
+use super::lobe_place::{LobePlace, LobeSums, wide_from};
 use crate::math::vector::versions;
-use glam::Vec3;
-
-/// Lobes of at least this microfacet width, for a light of 32 rows, are summed over hats. The standard deviation of
-/// reflected directions is then 20 degrees, 3.6 texels: one value a hat errs by 1 % at the peak of the lobe.
-const WIDE_AT_32_ROWS: f32 = 0.25;
-
-/// The narrowest lobe that is summed over the hats of this basis.
-pub fn wide_from(basis: &LightBasis) -> f32 {
-    (WIDE_AT_32_ROWS * 32.0 / basis.height as f32).min(1.0)
-}
-
-/// Where a lobe is integrated: unit normal and unit direction towards the viewer, above its horizon.
-#[derive(Clone, Copy, Debug)]
-pub struct LobePlace<'a> {
-    /// Unit shading normal.
-    pub normal: Vec3,
-    /// Unit direction towards the viewer.
-    pub to_viewer: Vec3,
-    /// Visible shares of the hats.
-    pub shares: &'a [u8],
-    /// The light that is seen in the hats, from other surface as well.
-    pub seen: &'a SeenLight,
-    /// Variance of the normal over the footprint, of both axes together, in squared radians.
-    pub normal_variance: f32,
-}
-
-impl LobePlace<'_> {
-    /// The width of the lobe as the footprint sees it, for one of this microfacet width.
-    ///
-    /// Slopes of the normalised Blinn-Phong distribution have a variance of `a^2 / (1 - a^2)` over both axes (with the
-    /// exponent `2/a^2 - 2`, one over it along each); that of the normals is added. Widths up to 1 stay below it. After
-    /// Toksvig 2005 ("Mipmapping normal maps"), with the variance taken from the geometry in place of a map.
-    #[inline(always)]
-    pub fn width_seen(&self, width: f32) -> f32 {
-        let added = self.normal_variance * (1.0 - width * width).max(0.0);
-        ((width * width + added) / (1.0 + added)).sqrt()
-    }
-
-    /// Derivative of the logarithm of [`LobePlace::width_seen`] by that of the width.
-    #[inline(always)]
-    fn slope_of_width_seen(&self, width: f32) -> f32 {
-        let added = self.normal_variance * (1.0 - width * width).max(0.0);
-        width * width / ((width * width + added) * (1.0 + added))
-    }
-}
-
-/// Integrals of one lobe of one width, and their derivatives by the logarithm of the width.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LobeSums {
-    /// `S0 - S5` per channel: times F0.
-    pub base: [f32; 3],
-    /// `S5` per channel.
-    pub grazing: [f32; 3],
-    /// Derivative of `base` by the logarithm of the width; zero where it was not asked for.
-    pub d_base: [f32; 3],
-    /// Derivative of `grazing`.
-    pub d_grazing: [f32; 3],
-}
-
-impl LobeSums {
-    /// What a lobe of this F0 sends, in radiance per channel.
-    #[inline]
-    pub fn radiance(&self, specular: [f32; 3]) -> [f32; 3] {
-        [0, 1, 2].map(|c| specular[c] * self.base[c] + self.grazing[c])
-    }
-}
 
 /// The sums of a lobe at several widths, which rise, without derivatives. `sums` is as long as `widths`.
 pub fn lobe_sums(basis: &LightBasis, place: &LobePlace, widths: &[f32], sums: &mut [LobeSums]) {
     let narrow = widths.partition_point(|&width| place.width_seen(width) < wide_from(basis));
     for (sum, &width) in sums.iter_mut().zip(&widths[..narrow]) {
         let width = place.width_seen(width);
-        *sum = half_vector::lobe_sums(basis, place, width, half_vector::place_count(basis, width));
+        *sum = half_vector::lobe_sums(basis, place, width, place_count(basis, width));
     }
     for (sums, widths) in sums[narrow..].chunks_mut(MOST_AT_ONCE).zip(widths[narrow..].chunks(MOST_AT_ONCE)) {
         let mut seen = [0.0; MOST_AT_ONCE];
@@ -111,7 +46,7 @@ pub fn lobe_with_derivative(basis: &LightBasis, place: &LobePlace, width: f32) -
         sums[0]
     } else {
         const STEP: f32 = 0.01;
-        let count = half_vector::place_count(basis, width);
+        let count = place_count(basis, width);
         let at = |width: f32| half_vector::lobe_sums(basis, place, width, count);
         let (sum, below, above) = (at(width), at(width * (-STEP).exp()), at(width * STEP.exp()));
         let slope = |above: f32, below: f32| (above - below) / (2.0 * STEP);
@@ -157,11 +92,13 @@ versions! {
 mod tests {
     use super::super::half_vector_kernel;
     use super::super::light_basis::LightPlanes;
+    use super::super::seen_light::SeenLight;
     use super::*;
     use crate::material::{LobeGeometry, Material};
     use crate::math::random::SequentialRandom;
     use crate::math::sphere::{direction_of_texel, solid_angle_of_texel};
     use crate::math::vector::Plain;
+    use glam::Vec3;
 
     fn light_of(basis: &LightBasis, seed: u64) -> LightPlanes {
         let mut random = SequentialRandom::new(seed);
@@ -317,7 +254,7 @@ mod tests {
                 sums_in::<Plain, true>(&basis, &place, &[width_seen], &mut plain);
                 plain[0].d_base = plain[0].d_base.map(|slope| slope * place.slope_of_width_seen(width));
             } else {
-                let count = half_vector::place_count(&basis, width_seen);
+                let count = place_count(&basis, width_seen);
                 plain[0] = half_vector_kernel::sums_in::<Plain>(&basis, &place, width_seen, count);
                 // Its derivative is a difference of sums.
                 plain[0].d_base = sums.d_base;

@@ -5,6 +5,7 @@
 //! [`LobeGeometry::new`](crate::material::LobeGeometry) and [`tap_of_direction`](crate::math::sphere::tap_of_direction) say
 //! for one; the tests of this folder hold it against them.
 
+use super::lanes::Lanes;
 use super::light_cells::LightCells;
 use crate::light::EnvironmentSampler;
 use crate::math::random::{SampleStream, next_pairs};
@@ -12,9 +13,6 @@ use crate::math::vector::elementary::{angle, ln_one_minus, one_minus_exp, sine_a
 use crate::math::vector::{Vector, WIDEST, dot, versions};
 use crate::render::taps::Taps;
 use std::f32::consts::{LOG2_E, PI};
-
-/// One number of each path.
-pub(super) type Lanes = [f32; WIDEST];
 
 /// Where paths have met the surface.
 #[derive(Clone, Debug, Default)]

@@ -1,6 +1,6 @@
 //! Directions drawn from the light for all paths of a packet: the table is looked up path by path, the rest is arithmetic.
 
-use super::kernel::Lanes;
+use super::lanes::Lanes;
 use crate::light::EnvironmentSampler;
 use crate::math::vector::Vector;
 use crate::math::vector::elementary::{angle, sine_and_cosine_of_turns};

@@ -8,6 +8,7 @@
 //! by path: find the point that was hit, cast the shadow ray and the next ray, and write the record ([`PathVertex`]).
 
 mod kernel;
+mod lanes;
 mod light_cells;
 #[cfg(test)]
 mod tests;

@@ -3,8 +3,9 @@
 //! A picture is known by its `Arc`: a new picture is a new `Arc`, so nothing needs to compare pixels. Only weak
 //! references are kept: showing a picture does not keep it alive.
 
+use super::levels::Levels;
 use super::overlay::{Compare, LineSpace, Lines, Overlay};
-use super::paint::{Inks, Levels, Painting};
+use super::paint::{Inks, Painting};
 use super::source::Source;
 use super::view::Frame;
 use crate::image::display::DisplaySettings;

@@ -10,6 +10,7 @@
 
 mod cache;
 pub mod histogram;
+pub mod levels;
 mod lines;
 mod marks;
 pub mod overlay;

@@ -3,13 +3,13 @@
 //! Enlarged, a pixel shows the texel under its centre; made smaller, the mean of linear values over the area it
 //! covers. Only the visible part is computed. A texel without a value is hatched.
 
+use super::levels::Levels;
 use super::lines;
 use super::overlay::{Compare, Lines};
 use super::rows::{Layer, Mask, Row};
 use super::source::{Source, Value};
 use super::view::{Frame, PixelRect};
 use crate::image::Image;
-use crate::image::area::Pyramid;
 use crate::image::display::{DisplaySettings, PreparedDisplay, bytes_of_colour};
 use crate::math::luminance;
 use eframe::egui::{Color32, ColorImage};
@@ -30,26 +30,6 @@ pub struct Inks {
     pub period: u32,
     /// Width of hatch lines in screen pixels, at least 1; lines over the picture are half as wide again.
     pub line: u32,
-}
-
-/// Coarser levels of a source.
-#[derive(Clone, Debug)]
-pub enum Levels {
-    /// Of colours.
-    Colour(Arc<Pyramid<Vec3>>),
-    /// Of numbers.
-    Numbers(Arc<Pyramid<f32>>),
-}
-
-impl Levels {
-    /// The levels of a source; nothing is computed yet.
-    pub fn of(source: &Source) -> Self {
-        let (width, height) = source.size();
-        match source {
-            Source::Colour(_) => Levels::Colour(Arc::new(Pyramid::new(width, height))),
-            Source::Numbers { .. } => Levels::Numbers(Arc::new(Pyramid::new(width, height))),
-        }
-    }
 }
 
 /// What is to be painted.

@@ -1,6 +1,6 @@
 //! Values under rows of screen pixels: a picture, a layer of numbers or a mask, read at the resolution of the screen.
 
-use super::paint::Levels;
+use super::levels::Levels;
 use super::source::{Source, Value};
 use super::view::Frame;
 use crate::image::Image;

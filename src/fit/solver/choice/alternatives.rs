@@ -6,18 +6,30 @@
 //! what judges must not have taken part. Without light from other surface lobes stay as they were found with it: they
 //! would be integrated anew otherwise, which is what takes the time.
 
-use super::super::block::MOST_NODES;
 use super::super::lobe_evidence::LobeBelief;
 use super::super::lobe_prior::LobePrior;
 use super::super::lobe_tree::LobeSharing;
+use super::super::lobe_widths::MOST_NODES;
 use super::super::tile::{Tile, forgiven, least_noise};
-use super::apply::ChosenLobe;
 use super::student::StudentNoise;
 use super::{ALTERNATIVES, Alternative};
 use std::time::Instant;
 
 /// A lobe as maps hold it: F0 per channel, logarithm of the width.
 pub type Lobe = [f32; 4];
+
+/// What lobes send of a pixel under the alternatives that regions may choose instead of lobes of their own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChosenLobe {
+    /// Index of the observation.
+    pub observation: u32,
+    /// Radiance of the one lobe of the region.
+    pub one: [f32; 3],
+    /// Radiance of F0 0 and the widest lobe.
+    pub none: [f32; 3],
+    /// Radiance of lobes of their own.
+    pub own: [f32; 3],
+}
 
 /// What the alternatives of all tiles are solved with.
 #[derive(Clone, Copy)]

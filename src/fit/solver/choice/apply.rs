@@ -8,21 +8,8 @@ use super::super::diffuse_system::DiffuseRow;
 use super::super::lobe_evidence::LobeBelief;
 use super::super::tile::Tile;
 use super::Alternative;
-use super::alternatives::TileAlternatives;
+use super::alternatives::{ChosenLobe, TileAlternatives};
 use super::choices::Choices;
-
-/// What lobes send of a pixel under the alternatives that regions may choose instead of lobes of their own.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ChosenLobe {
-    /// Index of the observation.
-    pub observation: u32,
-    /// Radiance of the one lobe of the region.
-    pub one: [f32; 3],
-    /// Radiance of F0 0 and the widest lobe.
-    pub none: [f32; 3],
-    /// Radiance of lobes of their own.
-    pub own: [f32; 3],
-}
 
 /// What is kept of a tile so that its choice can be taken over.
 pub struct Undecided {

@@ -1,0 +1,39 @@
+//! What can be chosen of a picture.
+
+use super::first_hits::PixelFilter;
+
+/// How a picture is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PictureSettings {
+    /// Samples a pixel in one group.
+    pub samples: usize,
+    /// Independent groups; two or more give a variance.
+    pub groups: usize,
+    /// How samples are spread over a pixel.
+    pub filter: PixelFilter,
+    /// Number of surface hits on the longest path, at most [`MAX_BOUNCES`](super::path::MAX_BOUNCES).
+    pub max_bounces: usize,
+    /// Strength of the specular lobe as a whole, in [0, 1].
+    pub lobe_strength: f32,
+    /// Whether the environment shows behind the surface.
+    pub background_visible: bool,
+    /// Whether the back of a triangle reflects like its front; otherwise it is black.
+    pub two_sided: bool,
+    /// Seed of the random numbers.
+    pub seed: u64,
+}
+
+impl Default for PictureSettings {
+    fn default() -> Self {
+        PictureSettings {
+            samples: 64,
+            groups: 1,
+            filter: PixelFilter::Box,
+            max_bounces: 3,
+            lobe_strength: 1.0,
+            background_visible: true,
+            two_sided: false,
+            seed: 1,
+        }
+    }
+}
