@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
 # Drives the real window under Xvfb as a person would, by keys, and takes a picture of every panel.
 #
-#   bash tests/studio_screenshots.sh OUT [SCENE] [SECONDS OF FIT]
+#   bash tests/studio_screenshots.sh OUT [SCENE] [SECONDS OF FIT] [smoke]
+#
+# With `smoke` it opens, fits, relights and closes, in a minute or so.
 #
 # With README_PICTURES=screenshots the README's pictures of the window are made of them.
 #
@@ -48,7 +50,7 @@ title() { xdotool getwindowname "$(xdotool search --onlyvisible --class patina |
 wait_for_title() { # pattern of grep -E, seconds
   for _ in $(seq "$(( $2 * 2 ))"); do
     alive
-    if title | grep -qE -- "$1"; then return 0; fi
+    if title | grep -qiE -- "$1"; then return 0; fi
     sleep 0.5
   done
   echo "the title never held '$1': $(title)"
@@ -70,11 +72,21 @@ picture 02_scene_is_read 3
 for _ in $(seq 600); do
   act 'Start fit'
   sleep 2
-  case "$(title)" in *fitting*) break ;; esac
+  case "$(title)" in *[Ff]itting*|*Finished*) break ;; esac
 done
-wait_for_title 'fitting' 300
+wait_for_title "fitting|Finished" 300
 sleep "$fit_seconds"
 picture 03_fitting
+if [ "${4:-}" = smoke ]; then
+  act 'Environment panel'; picture 04_environment
+  act 'Scores panel'; picture 05_scores
+  keys Right; picture 06_next_environment 2
+  keys F1; picture 07_keys 2; keys Escape
+  act 'Stop fit'
+  wait_for_title 'Stopped|Finished' 300
+  picture 08_stopped
+fi
+if [ "${4:-}" != smoke ]; then
 act 'Diffuse'; picture 04_stage_diffuse
 act 'Roughness'; picture 05_stage_roughness
 act 'Shaded'
@@ -119,12 +131,13 @@ act 'Show residuals'
 picture 26_photo_error 30
 act 'Shaded'
 for theme in 27 28 29; do act 'Cycle theme'; picture "${theme}_theme" 3; done
-if title | grep -q paused; then
+if title | grep -qi paused; then
   act 'Pause'; sleep 3
   act 'Stop fit'
 fi
 wait_for_title 'Stopped|Finished' 300
 picture 30_stopped
+fi
 # From here on the window may go: that is what is asked for.
 alive() { return 0; }
 act 'Quit'
