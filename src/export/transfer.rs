@@ -198,7 +198,8 @@ fn turned_to(own: &Mesh, mut onto: Mesh, findings: &mut Vec<Finding>) -> Result<
         let (Some((own_low, own_high)), Some((low, high))) = (own.bounds(), onto.bounds()) else { return 0.0 };
         let (a, b) = (*turn * low, *turn * high);
         let (low, high) = (a.min(b), a.max(b));
-        let pad = 1e-3 * (own_high - own_low).length();
+        // Flat things have boxes without a depth.
+        let pad = 1e-2 * (own_high - own_low).length();
         let common = (own_high.min(high) - own_low.max(low) + pad).max(Vec3::ZERO);
         let union = own_high.max(high) - own_low.min(low) + pad;
         (common / union).element_product()

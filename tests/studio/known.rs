@@ -59,7 +59,7 @@ fn look_at_the_light(studio: &mut TestStudio) {
         assert!(studio.model().hovered_value.contains(word), "{word}: {}", studio.model().hovered_value);
     }
     studio.click("Radiance");
-    studio.control("Environment");
+    studio.control("Environment map");
 }
 
 #[test]

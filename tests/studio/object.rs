@@ -78,7 +78,7 @@ fn a_photo_of_a_sphere_becomes_light_and_reflectance_on_the_screen_and_on_disk()
     studio.control("Photo of the object");
     studio.wait("a row", |model| model.object.rows.iter().any(|row| row.round > 0));
     studio.wait("a look", |model| model.object.look.is_some() || model.object.outcome.is_some());
-    for label in ["Re-render of the object", "Sphere of the estimated reflectance", "Estimated environment"] {
+    for label in ["Re-render of the object", "Sphere of the estimated reflectance", "Estimated environment map"] {
         studio.control(label);
     }
     assert!(!studio.says("No data"));
@@ -294,7 +294,7 @@ fn the_library_is_shown_and_the_map_of_codes_can_be_clicked_through() {
             gap(at(a)).total_cmp(&gap(at(b)))
         })
         .unwrap();
-    let rect: Rect = studio.control("Latent map").rect().shrink(26.0);
+    let rect: Rect = studio.control("Map of the latent codes").rect().shrink(26.0);
     let at = rect.lerp_inside(eframe::egui::vec2(widest[0] as f32, 1.0 - widest[1] as f32));
     studio.click_at(at);
     studio.wait("what lies between", |model| model.materials.shown.as_ref().unwrap().parts.len() > 1);
@@ -341,7 +341,7 @@ fn a_measured_table_is_opened_and_shown_before_the_library() {
 #[test]
 fn both_workspaces_keep_what_is_theirs() {
     let mut studio = TestStudio::with_small_scene();
-    studio.click_first("Object mode");
+    studio.click_first("Single object");
     assert!(studio.says("No photo yet"));
     studio.act(Act::Start);
     assert!(studio.log().contains("this is for scenes"), "{}", studio.log());

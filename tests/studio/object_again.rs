@@ -40,7 +40,7 @@ fn a_finished_result_is_opened_again_from_its_folder() {
         "Photo of the object",
         "Re-render of the object",
         "Sphere of the estimated reflectance",
-        "Estimated environment",
+        "Estimated environment map",
     ] {
         again.control(label);
     }
@@ -71,7 +71,7 @@ fn a_finished_result_is_opened_again_from_its_folder() {
     std::fs::remove_file(studio.folder.path().join("ball.exr")).unwrap();
     again.model().open(elsewhere);
     again.wait_for_word("the photos cannot be read any more");
-    again.control("Estimated environment");
+    again.control("Estimated environment map");
     assert!(again.says("No photo yet"), "{}", again.log());
 
     // A folder that is damaged is an error with a remedy, and what was open stays.

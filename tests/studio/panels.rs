@@ -79,11 +79,11 @@ fn the_fitted_light_stands_against_the_true_one() {
     let mut studio = TestStudio::with_finished_run();
     studio.show(Panel::Light);
     assert!(studio.says("16 x 8 texels, mean radiance"));
-    for picture in ["Environment", "Mirror ball", "Grey ball"] {
+    for picture in ["Environment map", "Mirror ball", "Grey ball"] {
         studio.control(picture);
     }
     studio.click("Against ground truth");
-    studio.control("Environment divider");
+    studio.control("Environment map divider");
 }
 
 #[test]

@@ -313,7 +313,7 @@ fn object_mode_is_drawn_with_its_result_and_its_library() {
     picture(&mut studio, "object_materials");
     studio.act(Act::PanelMaterialMap);
     let map = picture(&mut studio, "object_map");
-    let rect = studio.control("Latent map").rect();
+    let rect = studio.control("Map of the latent codes").rect();
     let colours: std::collections::HashSet<_> = part(&map, rect, 1.0).into_iter().collect();
     assert!(colours.len() > 500, "{} colours on the map", colours.len());
     for (theme, word) in THEMES {

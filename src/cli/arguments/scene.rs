@@ -53,13 +53,13 @@ pub struct ReadOptions {
     pub encoding: Option<ColourEncoding>,
     /// Which layer of OpenEXR photographs is read, such as ViewLayer.Combined or Combined; the layer of radiance when not
     /// given.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, help_heading = groups::SCENE, value_name = "NAME")]
     pub layer: Option<String>,
     /// The mesh, where the scene's folder holds none or another is meant.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = groups::SCENE, value_name = "FILE")]
     pub mesh: Option<PathBuf>,
     /// The chunk of a Metashape project, by label or number.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, help_heading = groups::SCENE, value_name = "NAME")]
     pub chunk: Option<String>,
 }
 

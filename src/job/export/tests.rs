@@ -27,6 +27,7 @@ fn run(parent: &Path, with_light: bool, with_lobe: bool) -> PathBuf {
     folder.write_result(&RunResult { maps, environment, mesh, times_seen }).unwrap();
     let mut settings = RunSettings::default();
     if !with_lobe {
+        settings.fit.method = crate::fit::Method::Adam;
         settings.fit.steps_all = 0;
     }
     assert_eq!(settings.fit.has_lobe(), with_lobe);

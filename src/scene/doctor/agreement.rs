@@ -130,7 +130,9 @@ fn correlation(values: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
         yy += (y - mean_y).powi(2);
         xy += (x - mean_x) * (y - mean_y);
     }
-    (xx > 0.0 && yy > 0.0).then(|| xy / (xx * yy).sqrt())
+    // What rounding of the mean leaves of a constant is no variation.
+    let least = |mean: f64| 1e-20 * count * (1.0 + mean * mean);
+    (xx > least(mean_x) && yy > least(mean_y)).then(|| xy / (xx * yy).sqrt())
 }
 
 /// Measures how the photos agree, and names those that do not belong to their cameras.

@@ -32,6 +32,17 @@ pub struct Matte {
 
 /// Looks for one colour behind what all photos show.
 pub fn find(photos: &[LoadedPhoto]) -> Option<Matte> {
+    // Photos that show nothing else hold no object: that is told as what it is.
+    let shows_more = |photo: &LoadedPhoto| {
+        let width = photo.states.width().max(1);
+        let step = (photo.states.pixels().len() / SAMPLES).max(1);
+        let mut colours =
+            (0..photo.states.pixels().len()).step_by(step).map(|at| colour_at(&photo.photo, at / width, at % width));
+        colours.next().is_some_and(|first| colours.any(|other| !same(first, other)))
+    };
+    if !photos.iter().any(shows_more) {
+        return None;
+    }
     let has_mask = |photo: &&LoadedPhoto| photo.states.pixels().iter().any(|state| state.is_background());
     let masked: Vec<&LoadedPhoto> = photos.iter().filter(has_mask).collect();
     let is_masked = 2 * masked.len() > photos.len();

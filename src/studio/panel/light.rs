@@ -46,7 +46,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut LightMemory) {
     }
     let truth = model.shelf.find(&LightName::Truth).map(|light| Arc::clone(&light.environment));
     let display = model.edits.display;
-    draw(ui, model, memory, "Environment", &environment, truth, &display);
+    draw(ui, model, memory, "Environment map", &environment, truth, &display);
 }
 
 /// Draws an environment under a label in a display of its own, beside a truth where one is known.

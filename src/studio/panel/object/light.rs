@@ -51,7 +51,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ObjectLightMemory) {
         .on_hover_text("On top of the display exposure: the absolute scale is ambiguous");
     let own = model.edits.display;
     let display = DisplaySettings { exposure_stops: own.exposure_stops + stops, ..own };
-    light::draw(ui, model, &mut memory.light, "Estimated environment", &environment, None, &display);
+    light::draw(ui, model, &mut memory.light, "Estimated environment map", &environment, None, &display);
 }
 
 /// Draws how much each direction matters, exposed for itself.

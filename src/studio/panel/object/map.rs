@@ -74,7 +74,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut MaterialsMemory) {
         ui.label(RichText::new("Click between materials to interpolate").weak());
     });
     let (rect, response) = ui.allocate_exact_size(ui.available_size().max(vec2(120.0, 120.0)), Sense::click());
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Latent map"));
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Map of the latent codes"));
     ui.painter().rect_filled(rect, 3.0, ui.visuals().extreme_bg_color);
     let screen = Screen::new(&library.map, rect);
     let mut clicked = response.interact_pointer_pos().filter(|_| response.clicked()).map(|at| screen.place(at));
