@@ -124,14 +124,9 @@ pub fn dot<V: Vector>(a: [V; 3], b: [V; 3]) -> V {
 
 /// Portable Rust, eight numbers.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(all(target_arch = "aarch64", not(test)), expect(dead_code, reason = "every such processor has more"))]
 pub struct Plain([f32; 8]);
 
 /// 1.5 * 2^23: adding it leaves the nearest whole number in the low bits.
-#[cfg_attr(
-    all(target_arch = "aarch64", not(test)),
-    expect(dead_code, reason = "only the plain version asks for it there")
-)]
 pub(super) const MAGIC: f32 = 12_582_912.0;
 
 impl Vector for Plain {
