@@ -21,3 +21,16 @@ pub fn has_adapter() -> bool {
     }
     found
 }
+
+/// What the window shows. The harness waits for a picture no longer than some seconds, which a software adapter on a busy
+/// machine may need more of: it is asked again then, since how long a picture takes decides nothing.
+pub fn rendered<State>(harness: &mut egui_kittest::Harness<'_, State>) -> Result<image::RgbaImage, String> {
+    const MOST_TIMES: usize = 40;
+    for _ in 1..MOST_TIMES {
+        match harness.render() {
+            Err(reason) if reason.contains("timed out") => {}
+            other => return other,
+        }
+    }
+    harness.render()
+}

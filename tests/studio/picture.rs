@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+use super::adapter::rendered;
 use eframe::egui::{self, Event, Modifiers, MouseWheelUnit, PointerButton, Pos2, Shape, TouchPhase, pos2, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
@@ -139,7 +140,7 @@ fn words(harness: &Harness<Caller>) -> Vec<String> {
 
 /// The colour at a point of the rendered window.
 fn pixel(harness: &mut Harness<Caller>, position: Pos2, pixels_per_point: f32) -> [u8; 3] {
-    let image = harness.render().unwrap();
+    let image = rendered(harness).unwrap();
     let [red, green, blue, _] =
         image.get_pixel((position.x * pixels_per_point) as u32, (position.y * pixels_per_point) as u32).0;
     [red, green, blue]
@@ -148,7 +149,7 @@ fn pixel(harness: &mut Harness<Caller>, position: Pos2, pixels_per_point: f32) -
 /// Keeps a picture to look at where the environment asks for it.
 fn keep(harness: &mut Harness<'_, impl Sized>, name: &str) {
     if let Ok(folder) = std::env::var("PATINA_PICTURES") {
-        harness.render().unwrap().save(format!("{folder}/picture_{name}.png")).unwrap();
+        rendered(harness).unwrap().save(format!("{folder}/picture_{name}.png")).unwrap();
     }
 }
 
@@ -325,7 +326,7 @@ fn what_was_not_seen_is_hatched_and_has_no_value() {
     let mut harness = window(Caller::new(Source::numbers(Arc::new(image), scale)), 1.0);
     hover(&mut harness, pos2(50.0, 50.0));
     assert!(harness.state().answer().description().unwrap().contains("no value"));
-    let rendered = harness.render().unwrap();
+    let rendered = rendered(&mut harness).unwrap();
     let colours: std::collections::BTreeSet<[u8; 4]> = (20..60).map(|x| rendered.get_pixel(x, 200).0).collect();
     assert_eq!(colours.len(), 2, "a ground and a line: {colours:?}");
     keep(&mut harness, "unseen");

@@ -1,7 +1,7 @@
 //! The window as it is seen, drawn by whatever adapter there is. Properties of pixels are held, not the pixels: every
 //! adapter rounds in its own way.
 
-use super::adapter::has_adapter;
+use super::adapter::{has_adapter, rendered};
 use super::object::write_sphere_photo;
 use super::support::{Key, Modifiers, Role, TestStudio, finished_run};
 use eframe::egui::{Event, PointerButton, Pos2, Rect};
@@ -32,9 +32,9 @@ fn picture(studio: &mut TestStudio, name: &str) -> RgbaImage {
     // What was uploaded for one frame is on the screen in the next.
     for _ in 0..3 {
         studio.frames(1);
-        studio.harness.render().unwrap();
+        rendered(&mut studio.harness).unwrap();
     }
-    let picture = studio.harness.render().unwrap();
+    let picture = rendered(&mut studio.harness).unwrap();
     if let Some(folder) = std::env::var_os("PATINA_WINDOW_PICTURES") {
         picture.save(PathBuf::from(folder).join(format!("window_{name}.png"))).unwrap();
     }

@@ -53,7 +53,7 @@ pub fn try_pixels(
 ) -> Result<Image<[u8; 3]>, String> {
     change(&mut harness.state_mut().frame);
     harness.step();
-    let picture = harness.render()?;
+    let picture = crate::window_tests::adapter::rendered(harness)?;
     let (width, height) = (picture.width() as usize, picture.height() as usize);
     Ok(Image::from_pixels(width, height, picture.pixels().map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect()))
 }
