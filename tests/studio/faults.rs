@@ -1,6 +1,6 @@
 //! What goes wrong while the window is open: it lives, says so with a remedy, and the last checkpoint stays.
 
-use super::support::{ENDLESS, Role, TestStudio, small_scene, write_small_scene};
+use super::support::{ENDLESS, Role, TestStudio, write_small_scene};
 use patina::files::{temporary_beside, write_bytes};
 use patina::studio::act::Act;
 use patina::studio::act::availability::availability;
@@ -8,7 +8,6 @@ use patina::studio::model::FitStatus;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
 
 /// Pauses and waits until the worker holds; its checkpoint is written then.
 fn pause(studio: &mut TestStudio) {
@@ -262,15 +261,7 @@ fn what_is_no_scene_leaves_the_open_one_and_its_fit_alone() {
 
 #[test]
 fn a_preparation_that_is_cancelled_leaves_a_scene_that_says_so() {
-    let mut studio = TestStudio::new();
-    studio.model().open(small_scene().into());
-    // News are taken in by hand: with the scene, nothing can have come that was prepared of it.
-    let began = Instant::now();
-    while studio.model().project.is_none() {
-        assert!(began.elapsed() < Duration::from_secs(240), "{}", studio.log());
-        std::thread::sleep(Duration::from_millis(5));
-        studio.model().poll();
-    }
+    let mut studio = TestStudio::with_scene_just_read();
     studio.model().tasks.stop_those_of_scene();
     studio.frames(3);
     // The button is grey rather than dead, and says what helps.

@@ -1,6 +1,6 @@
 //! The one state that labels follow, the one bar over a job, messages that come and go, and the guide.
 
-use super::support::{Key, Modifiers, TestStudio, small_scene};
+use super::support::{Key, Modifiers, TestStudio};
 use eframe::egui::OutputCommand;
 use patina::error::{Error, ErrorKind};
 use patina::fit::Method;
@@ -10,19 +10,10 @@ use patina::studio::layout::Panel;
 use patina::studio::model::{FitStatus, Phase};
 use std::cell::RefCell;
 use std::sync::atomic::AtomicBool;
-use std::time::{Duration, Instant};
 
 /// A studio in which the small scene was just read, and is about to be checked; settings of a fit of some seconds.
 fn just_read() -> TestStudio {
-    let mut studio = TestStudio::new();
-    studio.model().open(small_scene().into());
-    // News are taken in by hand: with the scene, nothing can have come that was made of it.
-    let began = Instant::now();
-    while studio.model().project.is_none() {
-        assert!(began.elapsed() < Duration::from_secs(240), "{}", studio.log());
-        std::thread::sleep(Duration::from_millis(5));
-        studio.model().poll();
-    }
+    let mut studio = TestStudio::with_scene_just_read();
     let fit = &mut studio.model().edits.fit;
     fit.method = Method::Adam;
     (fit.map_size, fit.levels, fit.steps_diffuse, fit.steps_all) = (64, 2, 4, 4);

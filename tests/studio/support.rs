@@ -142,6 +142,20 @@ impl TestStudio {
         self.frames(2);
     }
 
+    /// A studio in which the small scene was just read, and is about to be checked and prepared.
+    pub fn with_scene_just_read() -> Self {
+        let mut studio = TestStudio::new();
+        studio.model().open(small_scene().into());
+        // News are taken in by hand: with the scene, nothing can have come that was made of it.
+        let began = Instant::now();
+        while studio.model().project.is_none() {
+            assert!(began.elapsed() < PATIENCE, "{}", studio.log());
+            std::thread::sleep(Duration::from_millis(5));
+            studio.model().poll();
+        }
+        studio
+    }
+
     /// A studio with a fit that goes on until it is stopped, some steps after its start.
     pub fn with_running_fit() -> Self {
         let mut studio = TestStudio::with_small_scene();
