@@ -49,7 +49,8 @@ use std::collections::HashMap;
 use topology::Topology;
 
 /// Whether texture coordinates that a mesh came with stay.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum KeepUv {
     /// Keep them when they lie in [0, 1] and do not overlap; rebuild them otherwise.

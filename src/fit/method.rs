@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 /// How maps and light are found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Method {
@@ -11,11 +12,11 @@ pub enum Method {
     /// Resolved once, before a fit begins, by [`Suited`](super::Suited); no run records it.
     #[default]
     #[serde(rename = "auto")]
-    #[value(name = "auto")]
+    #[cfg_attr(feature = "cli", value(name = "auto"))]
     Automatic,
     /// Adam only, as in the paper (Joy and Poullis 2023): many small steps along gradients of the path tracer.
     #[serde(alias = "paper")]
-    #[value(alias = "paper")]
+    #[cfg_attr(feature = "cli", value(alias = "paper"))]
     Adam,
     /// A few large steps without noise: rays are traced once, texels are solved in closed form, and the environment by
     /// Gauss-Newton with the texels eliminated. Settings of Adam's steps do not apply to it.

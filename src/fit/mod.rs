@@ -7,7 +7,8 @@
 //! `batch` picks views and pixels, `gradient` adds them up, `weigh` applies consistency, `advance` moves the numbers,
 //! `held_out` judges them. [`state`] is all they change, [`event`] what it tells of.
 //! `change` takes other settings between two steps, [`views`] leaves photos out, [`figures`] are for who watches.
-//! [`describe`] lists, reads and sets each setting by name, [`presets`] are whole sets of them.
+//! [`by_name`] reads and sets each setting by its name, `describe` says with the command line's help what it means,
+//! [`presets`] are whole sets of them.
 //! [`solver`] is the other method, `solver_step` does its steps, [`suited`] says which of both a scene
 //! asks for, and what else it does.
 //! [`start`] chooses where to begin, [`gauge`] names the freedom that photographs leave, [`checkpoint`] saves it all.
@@ -17,9 +18,11 @@
 pub mod adam;
 mod advance;
 mod batch;
+pub mod by_name;
 mod change;
 pub mod checkpoint;
 pub mod consistency;
+#[cfg(feature = "cli")]
 pub mod describe;
 pub mod event;
 mod evidence;

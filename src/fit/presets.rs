@@ -3,18 +3,19 @@
 use super::settings::FitSettings;
 
 /// How much work a fit may be.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[non_exhaustive]
 pub enum Preset {
     /// A first look: small maps, few steps, direct light only.
-    #[value(name = "draft", alias = "quick")]
+    #[cfg_attr(feature = "cli", value(name = "draft", alias = "quick"))]
     Quick,
     /// The defaults.
     #[default]
-    #[value(name = "standard", alias = "balanced")]
+    #[cfg_attr(feature = "cli", value(name = "standard", alias = "balanced"))]
     Balanced,
     /// For the final run: more steps and samples, three bounces, exposure compensation.
-    #[value(name = "high-quality", alias = "careful")]
+    #[cfg_attr(feature = "cli", value(name = "high-quality", alias = "careful"))]
     Careful,
 }
 

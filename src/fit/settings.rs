@@ -8,7 +8,8 @@ use std::path::Path;
 
 /// How gradients of different views are weighed against each other (multi-view gradient consistency, Joy and Poullis
 /// 2023, eq. 2 and 3).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Consistency {
     /// Not at all.
@@ -24,7 +25,8 @@ pub enum Consistency {
 }
 
 /// Where a fit begins.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Start {
     /// From the photographs: light from the background where it is seen, one grey for the surface.
@@ -35,7 +37,8 @@ pub enum Start {
 }
 
 /// Whether pixels that show the background are evidence for the light.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum BackgroundEvidence {
     /// They show the environment itself.
@@ -46,7 +49,8 @@ pub enum BackgroundEvidence {
 }
 
 /// The order in which maps are freed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Steps {
     /// First diffuse and light alone, then everything.
@@ -57,7 +61,8 @@ pub enum Steps {
 }
 
 /// What becomes of what views that took no part say of the model's freedoms, see [`super::solver::choice`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Choosing {
     /// Held-out views are not asked.
@@ -65,112 +70,113 @@ pub enum Choosing {
     /// The report says what they choose; maps stay as the evidence of the pixels made them.
     #[default]
     #[serde(rename = "report", alias = "tell")]
-    #[value(name = "report", alias = "tell")]
+    #[cfg_attr(feature = "cli", value(name = "report", alias = "tell"))]
     Tell,
     /// Maps follow: regions lose a lobe that is not borne out, or share one.
     Apply,
 }
 
 /// Settings of a fit. Defaults are the balanced preset.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, clap::Args)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::Args))]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct FitSettings {
     /// Seed of all random numbers.
-    #[arg(long, default_value_t = FitSettings::default().seed)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().seed))]
     pub seed: u64,
     /// How maps and environment are estimated. With `auto` a scene is given to the solver, to Adam where a setting is given
     /// that applies to Adam only.
-    #[arg(long, value_enum, default_value_t)]
+    #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
     pub method: Method,
     /// Width and height of the maps in texels: a power of two, 16 to 8192 [default: what the photos resolve, 256 to 2048].
-    #[arg(long, default_value_t = FitSettings::default().map_size)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().map_size))]
     pub map_size: usize,
     /// Height of the environment in texels, 2 to 1024, at most 64 by the solver; it is twice as wide.
-    #[arg(long, default_value_t = FitSettings::default().environment_height)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().environment_height))]
     pub environment_height: usize,
     /// Order in which Adam frees the maps: in two steps as in the paper, or in one.
-    #[arg(long, value_enum, default_value_t)]
+    #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
     pub steps: Steps,
     /// Optimiser steps of the first step: diffuse map and environment.
-    #[arg(long, default_value_t = FitSettings::default().steps_diffuse)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().steps_diffuse))]
     pub steps_diffuse: usize,
     /// Optimiser steps of the second step: all maps and the environment.
-    #[arg(long, default_value_t = FitSettings::default().steps_all)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().steps_all))]
     pub steps_all: usize,
     /// Views in one optimiser step, at least 1.
-    #[arg(long, default_value_t = FitSettings::default().views_per_step)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().views_per_step))]
     pub views_per_step: usize,
     /// Pixels in one optimiser step over all its views; 0 takes every pixel, and so does multi-view consistency.
-    #[arg(long, default_value_t = FitSettings::default().pixels_per_step)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().pixels_per_step))]
     pub pixels_per_step: usize,
     /// Samples per pixel in one optimiser step, 1 to 4096; an even number keeps the squared error unbiased.
-    #[arg(long, default_value_t = FitSettings::default().samples)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().samples))]
     pub samples: usize,
     /// Max bounces: surface hits on the longest path, 1 to 16; 1 is direct light only.
-    #[arg(long, default_value_t = FitSettings::default().bounces)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().bounces))]
     pub bounces: usize,
     /// Levels of Adam's coarse-to-fine, 1 to 6: each halves photos and maps once more; 1 works at full size only.
-    #[arg(long, default_value_t = FitSettings::default().levels)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().levels))]
     pub levels: usize,
     /// How samples are spread over a pixel.
-    #[arg(long, value_enum, default_value_t)]
+    #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
     pub pixel_filter: PixelFilter,
     /// Multi-view gradient consistency, in the last of Adam's steps.
-    #[arg(long, value_enum, default_value_t)]
+    #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
     pub consistency: Consistency,
     /// Background pixels as evidence for the environment.
-    #[arg(long, value_enum, default_value_t)]
+    #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
     pub background: BackgroundEvidence,
     /// Per-photo exposure compensation: one gain per photo, with mean logarithm zero; `--exposure=false` leaves it out
     /// [default: auto: for 8-bit photos where the check finds that exposures differ].
-    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", default_value_t = false,
-        action = clap::ArgAction::Set)]
+    #[cfg_attr(feature = "cli", arg(long, num_args = 0..=1, require_equals = true,
+        default_missing_value = "true", default_value_t = false, action = clap::ArgAction::Set))]
     pub exposure: bool,
     /// Where Adam begins.
-    #[arg(long, value_enum, default_value_t)]
+    #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
     pub start: Start,
     /// Keep the environment as it is at the start; with `--env` on the command line, one that is known.
-    #[arg(long)]
+    #[cfg_attr(feature = "cli", arg(long))]
     pub fixed_light: bool,
     /// Step size of diffuse reflectance, 0 to 1.
-    #[arg(long, default_value_t = FitSettings::default().rate_diffuse)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().rate_diffuse))]
     pub rate_diffuse: f32,
     /// Step size of specular reflectance, 0 to 1.
-    #[arg(long, default_value_t = FitSettings::default().rate_specular)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().rate_specular))]
     pub rate_specular: f32,
     /// Step size of the logarithm of the microfacet width, 0 to 1.
-    #[arg(long, default_value_t = FitSettings::default().rate_roughness)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().rate_roughness))]
     pub rate_roughness: f32,
     /// Step size of the environment, relative to its mean plus the texel's own radiance, 0 to 1.
-    #[arg(long, default_value_t = FitSettings::default().rate_light)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().rate_light))]
     pub rate_light: f32,
     /// Weight of the smoothness prior on the environment, for texels that few pixels constrain; 0 leaves it out.
-    #[arg(long, default_value_t = FitSettings::default().light_smoothness)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().light_smoothness))]
     pub light_smoothness: f32,
     /// Step sizes fall along a cosine to this share of themselves at the end of each of the two steps.
-    #[arg(long, default_value_t = FitSettings::default().final_rate)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().final_rate))]
     pub final_rate: f32,
     /// Optimiser steps over which the specular lobe is switched on.
-    #[arg(long, default_value_t = FitSettings::default().lobe_ramp)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().lobe_ramp))]
     pub lobe_ramp: usize,
     /// Memory for first hits that are traced once, in MiB; 0 draws their positions anew in each step, which takes about as
     /// long and smooths edges better.
-    #[arg(long, default_value_t = FitSettings::default().first_hits_mib)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().first_hits_mib))]
     pub first_hits_mib: usize,
     /// Light iterations of the solver, 2 to 64: half of them on wide basis functions of the environment, half with narrow
     /// ones where it is bright.
-    #[arg(long, default_value_t = FitSettings::default().solver_rounds)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().solver_rounds))]
     pub solver_rounds: usize,
     /// Width and height of the solver's visibility grid over the atlas, 16 to 4096, at most that of the maps [default: 256,
     /// or 128 with refinement].
-    #[arg(long, default_value_t = FitSettings::default().solver_grid)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().solver_grid))]
     pub solver_grid: usize,
     /// Levels of the solver's coarse-to-fine, 1 to 6, each half the size of the next; the full size counts where refinement
     /// makes its maps, and levels with maps below 128 x 128 texels are left out [default: 2, or 3 with refinement].
-    #[arg(long, default_value_t = FitSettings::default().solver_levels)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().solver_levels))]
     pub solver_levels: usize,
     /// What becomes of the judgement of held-out views on lobes, interreflection and resolution of the environment.
-    #[arg(long, value_enum, default_value_t)]
+    #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
     pub solver_choices: Choosing,
     /// Refinement steps after the solver: Adam on all maps and the environment along gradients of the path tracer [default:
     /// 110 for 8-bit photos, else 0].
@@ -178,13 +184,13 @@ pub struct FitSettings {
     /// They are for photos of real places, whose edges, background and geometry the solver's model does not carry. The
     /// solver then leaves the finest maps to them, and believes in a single sun and hardly any metal. Where its model
     /// holds, they make maps worse.
-    #[arg(long, default_value_t = FitSettings::default().solver_polish)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().solver_polish))]
     pub solver_polish: usize,
     /// Held-out evaluation interval in optimiser steps; 0 evaluates at the end only.
-    #[arg(long, default_value_t = FitSettings::default().held_out_interval)]
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().held_out_interval))]
     pub held_out_interval: usize,
     /// Exclude a photo by its name: it is neither fitted nor used for validation. May be given more than once.
-    #[arg(long, value_name = "NAME")]
+    #[cfg_attr(feature = "cli", arg(long, value_name = "NAME"))]
     pub exclude: Vec<String>,
 }
 

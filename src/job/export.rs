@@ -25,9 +25,10 @@ use super::prepare::RunSettings;
 use super::shown::exposure_of;
 
 /// What an export is made for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
-#[value(rename_all = "lower")]
+#[cfg_attr(feature = "cli", value(rename_all = "lower"))]
 pub enum Format {
     /// One file for viewers, engines and Blender.
     Glb,

@@ -10,7 +10,8 @@ use super::pass::Pass;
 use rayon::prelude::*;
 
 /// How a density becomes a stored value.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Reconstruction {
     /// `expm1(exp(colour) p)`: the released code's, and what training aims at.
     #[default]

@@ -7,7 +7,8 @@ use crate::error::{Error, ErrorKind, Place, Result};
 pub const MOST_ROWS: usize = 180;
 
 /// How the light is improved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum LightMethod {
     /// Damped steps of Newton, with the deep prior in alternation.

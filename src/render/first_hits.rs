@@ -12,7 +12,8 @@ use glam::Vec2;
 use rayon::prelude::*;
 
 /// How the samples of a pixel are spread.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum PixelFilter {
     /// Evenly over the pixel's square.

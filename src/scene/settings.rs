@@ -186,7 +186,8 @@ impl FromStr for PixelCentre {
 }
 
 /// Whether masks are used.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "snake_case")]
 pub enum MaskUse {
     /// Where there are any.
@@ -197,7 +198,8 @@ pub enum MaskUse {
 }
 
 /// What background pixels show.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "snake_case")]
 pub enum BackgroundChoice {
     /// The environment for photographs, what the folder says for synthetic scenes.
@@ -210,7 +212,8 @@ pub enum BackgroundChoice {
 }
 
 /// How the numbers of a photo are encoded.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "snake_case")]
 pub enum ColourEncoding {
     /// By the file: its profile or gamma; without one integers are sRGB, floats are linear.

@@ -13,7 +13,8 @@ use crate::math::sphere;
 use glam::Vec3;
 
 /// Which prior holds the light.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum LightPriorKind {
     /// An untrained net (Chen, Nobuhara and Nishino 2020).
