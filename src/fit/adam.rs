@@ -4,7 +4,7 @@
 //! So texels that nobody sees never move, and a texel seen rarely is not pushed by stale momentum.
 
 use crate::material::lobe::MIN_WIDTH;
-use crate::material::texels::Texel;
+use crate::material::{Material, TexelGradient};
 use crate::math::adam::{Decay, LARGEST_GRADIENT};
 use rayon::prelude::*;
 
@@ -13,13 +13,15 @@ const DECAY: Decay = Decay { first: 0.9, second: 0.99 };
 /// Added to the root of the second moment, relative to nothing: gradients of a mean over 10^6 pixels are about 1e-8.
 const EPSILON: f32 = 1e-16;
 
-/// Moments of a group of numbers; the last entry of each group counts its updates.
+/// Moments of groups of up to seven numbers: those of a texel of the maps, a texel of the light, a gain.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Moments {
-    /// Mean of the gradient, seven numbers a texel, and the number of updates.
-    pub first: Vec<Texel<f32>>,
+    /// Mean of the gradient.
+    pub first: Vec<[f32; 7]>,
     /// Mean of the squared gradient.
-    pub second: Vec<Texel<f32>>,
+    pub second: Vec<[f32; 7]>,
+    /// How often each group was updated: a whole number.
+    pub updates: Vec<f32>,
 }
 
 /// Step sizes of the seven numbers of a texel; zero keeps a number as it is.
@@ -40,18 +42,23 @@ pub struct TexelRates {
 impl Moments {
     /// Moments of `count` groups, all zero.
     pub fn zeros(count: usize) -> Self {
-        Moments { first: vec![[0.0; 8]; count], second: vec![[0.0; 8]; count] }
+        Moments { first: vec![[0.0; 7]; count], second: vec![[0.0; 7]; count], updates: vec![0.0; count] }
     }
 
     /// Whether these are moments of `count` groups.
     pub fn is_of(&self, count: usize) -> bool {
-        self.first.len() == count && self.second.len() == count
+        [self.first.len(), self.second.len(), self.updates.len()] == [count; 3]
     }
 
     /// Moves the texels that a gradient touched, and clears the gradient. Values are projected to their ranges after
     /// the step; the projection does not enter the gradient, so a value leaves its bound as soon as the photos ask.
     /// Returns the number of gradients that were not finite and were left out.
-    pub fn step_texels(&mut self, texels: &mut [Texel<f32>], gradient: &mut [Texel<f32>], rates: TexelRates) -> usize {
+    pub fn step_texels(
+        &mut self,
+        texels: &mut [Material<f32>],
+        gradient: &mut [TexelGradient<f32>],
+        rates: TexelRates,
+    ) -> usize {
         let rate_of = |number: usize| match number {
             0..3 => rates.diffuse,
             3..6 => rates.specular,
@@ -65,22 +72,25 @@ impl Moments {
             .zip(gradient)
             .zip(&mut self.first)
             .zip(&mut self.second)
+            .zip(&mut self.updates)
             .with_min_len(4096)
-            .map(|(((texel, gradient), first), second)| {
-                if gradient[7] == 0.0 {
+            .map(|((((texel, gradient), first), second), updates)| {
+                if gradient.evidence == 0.0 {
                     return 0;
                 }
                 let own = std::mem::take(gradient);
-                if !own.iter().all(|value| value.abs() < LARGEST_GRADIENT) {
+                if !is_sound(&own) {
                     return 1;
                 }
-                let corrections = count_update(first);
+                let corrections = count_update(updates);
+                let (mut numbers, d_numbers) = (texel.to_array(), own.d_material.to_array());
                 for number in 0..7 {
                     let moments = (&mut first[number], &mut second[number]);
-                    let direction = update(own[number], moments, corrections, (rates.common, common[number]));
-                    let moved = texel[number] - rate_of(number) * direction;
-                    texel[number] = if number == 6 { moved.clamp(log_min, 0.0) } else { moved.clamp(0.0, 1.0) };
+                    let direction = update(d_numbers[number], moments, corrections, (rates.common, common[number]));
+                    let moved = numbers[number] - rate_of(number) * direction;
+                    numbers[number] = if number == 6 { moved.clamp(log_min, 0.0) } else { moved.clamp(0.0, 1.0) };
                 }
+                *texel = Material::from_array(numbers);
                 0
             })
             .sum()
@@ -98,7 +108,7 @@ impl Moments {
             // The derivative by a relative change of the texel.
             let relative: [f32; 3] = std::array::from_fn(|channel| own[channel] * (mean + light[index][channel]));
             if relative.iter().all(|value| value.abs() < LARGEST_GRADIENT) {
-                let corrections = count_update(&mut self.first[index]);
+                let corrections = count_update(&mut self.updates[index]);
                 for channel in 0..3 {
                     let (first, second) = (&mut self.first[index], &mut self.second[index]);
                     DECAY.accumulate(relative[channel], &mut first[channel], &mut second[channel]);
@@ -124,31 +134,39 @@ impl Moments {
 
     /// One plain number, the first of a group: returns its step before the rate.
     pub fn direction_of(&mut self, group: usize, gradient: f32) -> f32 {
-        let corrections = count_update(&mut self.first[group]);
+        let corrections = count_update(&mut self.updates[group]);
         update(gradient, (&mut self.first[group][0], &mut self.second[group][0]), corrections, (0.0, 0.0))
     }
 }
 
 /// Mean absolute value of each of the seven numbers over the texels that a gradient touched.
-fn mean_sizes(gradient: &[Texel<f32>]) -> [f32; 7] {
-    let of_chunk = |texels: &[Texel<f32>]| {
-        let mut sums = [0.0f64; 8];
-        for own in texels.iter().filter(|own| own[7] != 0.0 && own.iter().all(|value| value.abs() < LARGEST_GRADIENT)) {
-            (0..7).for_each(|number| sums[number] += f64::from(own[number].abs()));
-            sums[7] += 1.0;
+fn mean_sizes(gradient: &[TexelGradient<f32>]) -> [f32; 7] {
+    let of_chunk = |texels: &[TexelGradient<f32>]| {
+        let (mut sums, mut count) = ([0.0f64; 7], 0.0f64);
+        for own in texels.iter().filter(|own| own.evidence != 0.0 && is_sound(own)) {
+            let numbers = own.d_material.to_array();
+            (0..7).for_each(|number| sums[number] += f64::from(numbers[number].abs()));
+            count += 1.0;
         }
-        sums
+        (sums, count)
     };
     // Chunks of one size, added in their order: the same bits whatever the number of threads.
-    let sums: Vec<[f64; 8]> = gradient.par_chunks(1 << 14).map(of_chunk).collect();
-    let total = sums.iter().fold([0.0f64; 8], |total, sums| std::array::from_fn(|k| total[k] + sums[k]));
-    std::array::from_fn(|number| (total[number] / total[7].max(1.0)) as f32)
+    let sums: Vec<([f64; 7], f64)> = gradient.par_chunks(1 << 14).map(of_chunk).collect();
+    let count = sums.iter().fold(0.0, |total, (_, count)| total + count);
+    let total = sums.iter().fold([0.0f64; 7], |total, (sums, _)| std::array::from_fn(|k| total[k] + sums[k]));
+    total.map(|sum| (sum / count.max(1.0)) as f32)
+}
+
+/// Whether a gradient is finite and of a size that moments can hold.
+fn is_sound(own: &TexelGradient<f32>) -> bool {
+    let mut numbers = own.d_material.to_array().into_iter().chain([own.evidence]);
+    numbers.all(|value| value.abs() < LARGEST_GRADIENT)
 }
 
 /// Counts an update of a group and returns the corrections of both moments.
-fn count_update(first: &mut Texel<f32>) -> (f32, f32) {
-    first[7] += 1.0;
-    (1.0 / (1.0 - DECAY.first.powf(first[7])), 1.0 / (1.0 - DECAY.second.powf(first[7])))
+fn count_update(updates: &mut f32) -> (f32, f32) {
+    *updates += 1.0;
+    (1.0 / (1.0 - DECAY.first.powf(*updates)), 1.0 / (1.0 - DECAY.second.powf(*updates)))
 }
 
 /// Takes a gradient into both moments and returns the direction of the step. `common` is the share of the second moment
@@ -171,18 +189,17 @@ mod tests {
 
     #[test]
     fn untouched_texels_do_not_move_and_touched_ones_reach_their_goal() {
-        let mut texels = vec![[0.5f32; 8]; 2];
-        texels[0][6] = -1.0;
+        let mut texels = vec![Material::from_array([0.5f32; 7]); 2];
+        texels[0].log_width = -1.0;
         let start = texels[1];
         let goal = [0.2, 0.9, 0.4, 0.0, 1.0, 0.3, -2.0];
         let mut moments = Moments::zeros(2);
         let rates = TexelRates { diffuse: 0.02, specular: 0.02, log_width: 0.05, common: 0.0 };
         for step in 0..600 {
-            let mut gradient = vec![[0.0f32; 8]; 2];
-            for number in 0..7 {
-                gradient[0][number] = 1e-7 * (texels[0][number] - goal[number]);
-            }
-            gradient[0][7] = 1.0;
+            let mut gradient = vec![TexelGradient::default(); 2];
+            let numbers = texels[0].to_array();
+            let d_numbers = std::array::from_fn(|number| 1e-7 * (numbers[number] - goal[number]));
+            gradient[0] = TexelGradient { d_material: Material::from_array(d_numbers), evidence: 1.0 };
             let fade = 1.0 - step as f32 / 600.0;
             let rates = TexelRates {
                 diffuse: rates.diffuse * fade,
@@ -191,25 +208,25 @@ mod tests {
                 ..rates
             };
             assert_eq!(moments.step_texels(&mut texels, &mut gradient, rates), 0);
-            assert_eq!(gradient[0], [0.0; 8], "the gradient is cleared");
+            assert_eq!(gradient[0], TexelGradient::default(), "the gradient is cleared");
         }
         assert_eq!(texels[1], start);
-        for number in 0..7 {
-            assert!((texels[0][number] - goal[number]).abs() < 2e-3, "{number}: {}", texels[0][number]);
+        for (number, (value, goal)) in texels[0].to_array().into_iter().zip(goal).enumerate() {
+            assert!((value - goal).abs() < 2e-3, "{number}: {value}");
         }
     }
 
     #[test]
     fn a_texel_of_which_a_first_step_says_little_moves_little_where_moments_are_in_common() {
         let first_step = |common: f32| {
-            let mut texels = vec![[0.5f32; 8]; 3];
-            texels.iter_mut().for_each(|texel| texel[6] = -1.0);
+            let mut texels = vec![Material { log_width: -1.0, ..Material::from_array([0.5f32; 7]) }; 3];
             let sizes = [1e-7f32, 1e-9, 0.0];
-            let mut gradient: Vec<Texel<f32>> = sizes.map(|size| [size; 8]).to_vec();
+            let of_size = |size| TexelGradient { d_material: Material::from_array([size; 7]), evidence: size };
+            let mut gradient = sizes.map(of_size);
             let rates = TexelRates { diffuse: 0.1, specular: 0.1, log_width: 0.1, common };
             assert_eq!(Moments::zeros(3).step_texels(&mut texels, &mut gradient, rates), 0);
-            assert_eq!((texels[2][0], texels[2][6]), (0.5, -1.0), "nothing touched it");
-            [0, 1].map(|texel| (0.5 - texels[texel][0], -1.0 - texels[texel][6]))
+            assert_eq!((texels[2].diffuse[0], texels[2].log_width), (0.5, -1.0), "nothing touched it");
+            [0, 1].map(|texel| (0.5 - texels[texel].diffuse[0], -1.0 - texels[texel].log_width))
         };
         let [strong, weak] = first_step(0.0);
         assert!((strong.0 - 0.1).abs() < 1e-6 && (weak.0 - 0.1).abs() < 1e-6, "{strong:?} {weak:?}");
@@ -221,12 +238,12 @@ mod tests {
 
     #[test]
     fn a_gradient_that_is_not_finite_is_counted_and_left_out() {
-        let mut texels = vec![[0.5f32; 8]];
-        let mut gradient = vec![[f32::NAN; 8]];
+        let mut texels = vec![Material::from_array([0.5f32; 7])];
+        let mut gradient = vec![TexelGradient { d_material: Material::from_array([f32::NAN; 7]), evidence: f32::NAN }];
         let mut moments = Moments::zeros(1);
         let rates = TexelRates { diffuse: 0.1, specular: 0.1, log_width: 0.1, common: 0.5 };
         assert_eq!(moments.step_texels(&mut texels, &mut gradient, rates), 1);
-        assert_eq!(texels[0], [0.5; 8]);
+        assert_eq!(texels[0], Material::from_array([0.5; 7]));
         assert_eq!(moments, Moments::zeros(1));
         let mut light = vec![[1.0f32; 3]];
         assert_eq!(moments.step_light(&mut light, &mut [[f32::INFINITY; 3]], 1.0, 0.1), 1);

@@ -27,7 +27,8 @@ impl Fitter {
         let Some(work) = &self.work else { return false };
         let norm =
             |numbers: &mut dyn Iterator<Item = f32>| numbers.map(|d| f64::from(d) * f64::from(d)).sum::<f64>().sqrt();
-        let maps = norm(&mut work.gradient.texels.levels[0].texels.iter().flat_map(|texel| texel[..7].iter().copied()));
+        let maps =
+            norm(&mut work.gradient.texels.levels[0].texels.iter().flat_map(|texel| texel.d_material.to_array()));
         let light = norm(&mut work.gradient.light.iter().flatten().copied());
         let black = self.state.light.iter().all(|radiance| *radiance == [0.0; 3]);
         if !black || maps > 0.0 || self.state.events.iter().any(FitEvent::is_of_saddle) {

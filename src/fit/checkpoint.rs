@@ -7,15 +7,27 @@
 use super::adam::Moments;
 use super::event::FitEvent;
 use super::schedule::Stage;
+use super::solver::TexelVariance;
 use super::state::{FitState, LossRow};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::files::write_atomically;
-use crate::material::texels::Texel;
+use crate::material::Material;
 use serde::{Deserialize, Serialize};
 use std::io::{Read, Write};
 use std::path::Path;
 
 const MAGIC: &[u8] = b"PATINA CHECKPOINT 1\n";
+
+/// How the numbers of a texel stand in the file: seven of them, and one more that goes with them, or 0.
+type Row = [f32; 8];
+
+fn row([a, b, c, d, e, f, g]: [f32; 7], last: f32) -> Row {
+    [a, b, c, d, e, f, g, last]
+}
+
+fn of_row([a, b, c, d, e, f, g, last]: Row) -> ([f32; 7], f32) {
+    ([a, b, c, d, e, f, g], last)
+}
 
 #[derive(Serialize, Deserialize)]
 struct Header {
@@ -71,18 +83,20 @@ pub fn write(path: &Path, state: &FitState) -> Result<()> {
         put(MAGIC)?;
         put(&(json.len() as u64).to_le_bytes())?;
         put(&json)?;
-        for texels in [
-            &state.texels,
-            &state.moments.first,
-            &state.moments.second,
-            &state.light_moments.first,
-            &state.light_moments.second,
-            &state.gain_moments.first,
-            &state.gain_moments.second,
-        ] {
-            put(bytemuck::cast_slice(texels))?;
+        let mut put_rows = |rows: &mut dyn Iterator<Item = Row>| {
+            for row in rows {
+                put(bytemuck::bytes_of(&row))?;
+            }
+            std::io::Result::Ok(())
+        };
+        put_rows(&mut state.texels.iter().map(|texel| row(texel.to_array(), 0.0)))?;
+        for moments in [&state.moments, &state.light_moments, &state.gain_moments] {
+            put_rows(
+                &mut moments.first.iter().zip(&moments.updates).map(|(numbers, updates)| row(*numbers, *updates)),
+            )?;
+            put_rows(&mut moments.second.iter().map(|numbers| row(*numbers, 0.0)))?;
         }
-        put(bytemuck::cast_slice(&state.variances))?;
+        put_rows(&mut state.variances.iter().map(|own| row(own.variance.to_array(), own.lobe_cluster_size)))?;
         put(bytemuck::cast_slice(&state.light))?;
         put(bytemuck::cast_slice(&state.log_gains))?;
         let checksum = checksum.0;
@@ -166,18 +180,22 @@ pub fn read(path: &Path) -> Result<FitState> {
         let bytes = bytes.ok_or_else(|| broken(body_end, "an array is cut"))?;
         Ok(bytes.chunks_exact(4).map(|four| f32::from_le_bytes([four[0], four[1], four[2], four[3]])).collect())
     };
-    let mut texels = |count: usize| -> Result<Vec<Texel<f32>>> {
+    let mut rows = |count: usize| -> Result<Vec<([f32; 7], f32)>> {
         let floats = take(count.saturating_mul(8))?;
-        Ok(floats.chunks_exact(8).map(|eight| std::array::from_fn(|number| eight[number])).collect())
+        Ok(floats.as_chunks().0.iter().copied().map(of_row).collect())
     };
     let count = header.map_size.saturating_mul(header.map_size);
-    let state_texels = texels(count)?;
-    let mut moments =
-        |count: usize| -> Result<Moments> { Ok(Moments { first: texels(count)?, second: texels(count)? }) };
+    let texels = rows(count)?.into_iter().map(|(numbers, _)| Material::from_array(numbers)).collect();
+    let mut moments = |count: usize| -> Result<Moments> {
+        let (first, updates) = rows(count)?.into_iter().unzip();
+        Ok(Moments { first, updates, second: rows(count)?.into_iter().map(|(numbers, _)| numbers).collect() })
+    };
     let texel_moments = moments(count)?;
     let light_moments = moments(header.light_texels)?;
     let gain_moments = moments(header.views)?;
-    let variances = texels(header.variances)?;
+    let variance =
+        |(numbers, lobe_cluster_size)| TexelVariance { variance: Material::from_array(numbers), lobe_cluster_size };
+    let variances = rows(header.variances)?.into_iter().map(variance).collect();
     let light = take(header.light_texels.saturating_mul(3))?.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
     let log_gains = take(header.views)?;
     if !rest.is_empty() {
@@ -189,7 +207,7 @@ pub fn read(path: &Path) -> Result<FitState> {
         step_in_stage: header.step_in_stage,
         step: header.step,
         map_size: header.map_size,
-        texels: state_texels,
+        texels,
         moments: texel_moments,
         variances,
         light,
@@ -231,9 +249,13 @@ mod tests {
             step_in_stage: 2,
             step: 7,
             map_size: 2,
-            texels: (0..4).map(|texel| std::array::from_fn(|n| (texel * 8 + n) as f32 * 0.1)).collect(),
-            moments: Moments::zeros(4),
-            variances: vec![[0.25; 8]; 4],
+            texels: (0..4).map(|t| Material::from_array(std::array::from_fn(|n| (t * 7 + n) as f32 * 0.1))).collect(),
+            moments: Moments {
+                first: vec![[0.125; 7]; 4],
+                second: vec![[0.5; 7]; 4],
+                updates: vec![0.0, 1.0, 2.0, 3.0],
+            },
+            variances: vec![TexelVariance { variance: Material::from_array([0.25; 7]), lobe_cluster_size: 12.0 }; 4],
             light: vec![[1.5, 1e5, 1e-7]; 8],
             light_scale_deviation: Some(f64::MAX),
             light_moments: Moments::zeros(8),

@@ -12,7 +12,7 @@
 //! `grad V = sum_i H_i v_i` with `v_i = 4 / (3 P s^2 (N_p - 1)) (g_i - mean)` on the diffuse map and `H_i` the Hessian
 //! of view i's loss: one pass per view with dual numbers.
 
-use crate::material::texels::Texel;
+use crate::material::TexelGradient;
 use crate::math::real::Real;
 
 /// The gradient of one view's loss by the diffuse map, where the view saw a texel.
@@ -26,12 +26,12 @@ pub struct ViewGradient<R> {
 
 impl<R: Real> ViewGradient<R> {
     /// Collects the touched texels of a gradient on the base level.
-    pub fn collect(texels: &[Texel<R>]) -> Self {
+    pub fn collect(texels: &[TexelGradient<R>]) -> Self {
         let mut own = ViewGradient { index: Vec::new(), d_diffuse: Vec::new() };
         for (index, texel) in texels.iter().enumerate() {
-            if !texel[7].is_zero() {
+            if texel.evidence != 0.0 {
                 own.index.push(index as u32);
-                own.d_diffuse.push([texel[0], texel[1], texel[2]]);
+                own.d_diffuse.push(texel.d_material.diffuse);
             }
         }
         own

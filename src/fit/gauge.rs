@@ -63,11 +63,13 @@ pub fn move_scale(parameters: &mut Parameters<f32>, scale: Vec3) -> f64 {
     let mut total = 0usize;
     for level in &mut parameters.texels.levels {
         for texel in &mut level.texels {
-            for number in 0..6 {
-                let moved = texel[number] * scale[number % 3];
-                bounded += usize::from(moved > 1.0);
-                total += 1;
-                texel[number] = moved.clamp(0.0, 1.0);
+            for channel in 0..3 {
+                for value in [&mut texel.diffuse[channel], &mut texel.specular[channel]] {
+                    let moved = *value * scale[channel];
+                    bounded += usize::from(moved > 1.0);
+                    total += 1;
+                    *value = moved.clamp(0.0, 1.0);
+                }
             }
         }
     }

@@ -11,10 +11,11 @@ use super::step_sums::StepSums;
 use super::targets::Target;
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::light::EnvironmentSampler;
-use crate::material::texels::{Level, TexelPyramid};
+use crate::material::TexelGradient;
+use crate::material::texels::PyramidWeights;
 use crate::render::accumulate::{PassKey, PassTotals, accumulate};
 use crate::render::first_hits::{CameraRays, FirstHits};
-use crate::render::{Parameters, PathSettings, PathTracer};
+use crate::render::{ParameterGradient, Parameters, PathSettings, PathTracer};
 use crate::scene::Background;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -54,7 +55,7 @@ impl Fitter {
         let quota = if separate { 0 } else { self.settings.pixels_per_step.div_ceil(views.len()) };
         let mut sums = StepSums::default();
         let mut view_gradients: Vec<ViewGradient<f32>> = Vec::new();
-        let mut total: Option<Parameters<f32>> = None;
+        let mut total: Option<ParameterGradient<f32>> = None;
         for &(slot, visit) in views {
             let StageWork { weights, parameters, gradient, targets, first_hits, .. } = &mut *work;
             let target = &targets[slot];
@@ -77,17 +78,8 @@ impl Fitter {
             if separate {
                 gradient.texels.pull_down(weights);
                 view_gradients.push(ViewGradient::collect(&gradient.texels.levels[0].texels));
-                let total = total.get_or_insert_with(|| Parameters {
-                    texels: TexelPyramid {
-                        levels: vec![Level {
-                            width: stage.map_size,
-                            height: stage.map_size,
-                            texels: vec![[0.0; 8]; stage.map_size * stage.map_size],
-                        }],
-                    },
-                    light: vec![[0.0; 3]; gradient.light.len()],
-                    environment_size: gradient.environment_size,
-                });
+                let base = || PyramidWeights::flat(stage.map_size, stage.map_size);
+                let total = total.get_or_insert_with(|| ParameterGradient::zeros(&base(), gradient.light.len()));
                 add_scaled(total, gradient, share);
                 clear(gradient);
             }
@@ -165,21 +157,19 @@ impl Fitter {
     }
 }
 
-fn clear(gradient: &mut Parameters<f32>) {
+fn clear(gradient: &mut ParameterGradient<f32>) {
     for level in &mut gradient.texels.levels {
-        level.texels.par_iter_mut().with_min_len(1 << 14).for_each(|texel| *texel = [0.0; 8]);
+        level.texels.par_iter_mut().with_min_len(1 << 14).for_each(|texel| *texel = TexelGradient::default());
     }
     gradient.light.fill([0.0; 3]);
 }
 
-fn add_scaled(total: &mut Parameters<f32>, part: &Parameters<f32>, factor: f32) {
+fn add_scaled(total: &mut ParameterGradient<f32>, part: &ParameterGradient<f32>, factor: f32) {
     let (total_texels, part_texels) = (&mut total.texels.levels[0].texels, &part.texels.levels[0].texels);
     total_texels.par_iter_mut().zip(part_texels).with_min_len(1 << 14).for_each(|(total, part)| {
-        if part[7] != 0.0 {
-            for number in 0..7 {
-                total[number] += factor * part[number];
-            }
-            total[7] += part[7];
+        if part.evidence != 0.0 {
+            total.d_material.add_scaled(&part.d_material, factor);
+            total.evidence += part.evidence;
         }
     });
     for (total, part) in total.light.iter_mut().zip(&part.light) {

@@ -7,7 +7,9 @@
 use super::fitter::{Fitter, StepOutcome};
 use super::schedule::{Stage, StageKind};
 use super::settings::Method;
-use super::solver::{Choices, Estimate, SolverScene, SolverSettings, SolverStep, StepReport, TransportError};
+use super::solver::{
+    Choices, Estimate, SolverScene, SolverSettings, SolverStep, StepReport, TexelVariance, TransportError,
+};
 use super::stage_work::halved;
 use super::state::LossRow;
 use super::targets::targets;
@@ -131,8 +133,9 @@ impl Fitter {
     /// weighed by their evidence; 0 where a texel took over what its neighbours have. `None` as for [`Self::deviations`].
     pub fn lobe_sharing(&self) -> Option<GreyImage> {
         let size = self.state.map_size;
-        self.knows_deviations()
-            .then(|| Image::from_fn(size, size, |row, column| self.state.variances[row * size + column][7]))
+        self.knows_deviations().then(|| {
+            Image::from_fn(size, size, |row, column| self.state.variances[row * size + column].lobe_cluster_size)
+        })
     }
 
     /// Moves the unknowns out of the state, so that none is held twice.
@@ -145,7 +148,7 @@ impl Fitter {
             light_known: std::mem::take(&mut self.light_known),
             log_gains: solver.views.iter().map(|&view| state.log_gains[view]).collect(),
         };
-        estimate.variances.resize(estimate.texels.len(), [0.0; 8]);
+        estimate.variances.resize(estimate.texels.len(), TexelVariance::default());
         // The paper's start is black: nothing could be told apart under it.
         if estimate.light.iter().all(|radiance| *radiance == [0.0; 3]) {
             let light = solver.constant_light();

@@ -1,16 +1,17 @@
 //! What a stage keeps between its steps: mip chains, photographs at its resolution, first hits.
 
 use super::targets::Target;
-use crate::material::texels::{PyramidWeights, Texel};
-use crate::render::Parameters;
+use crate::material::Material;
+use crate::material::texels::PyramidWeights;
 use crate::render::first_hits::FirstHits;
+use crate::render::{ParameterGradient, Parameters};
 use crate::scene::{PixelState, Scene};
 
 /// What a stage needs and no checkpoint holds: all of it follows from scene, settings and state.
 pub(super) struct StageWork {
     pub weights: PyramidWeights,
     pub parameters: Parameters<f32>,
-    pub gradient: Parameters<f32>,
+    pub gradient: ParameterGradient<f32>,
     pub targets: Vec<Target>,
     pub first_hits: Vec<Option<FirstHits>>,
     /// Mean radiance of the pixels that are evidence, over all photos and channels.
@@ -33,8 +34,8 @@ pub(super) fn mean_of_photos(scene: &Scene, targets: &[Target]) -> f32 {
     (sum / count.max(1) as f64) as f32
 }
 
-/// Maps of twice the size: each texel becomes four.
-pub(super) fn doubled(texels: &[Texel<f32>], size: usize) -> Vec<Texel<f32>> {
+/// What is said of the texels of square maps, of maps of twice the size: each texel becomes four.
+pub(super) fn doubled<T: Copy>(texels: &[T], size: usize) -> Vec<T> {
     (0..4 * size * size)
         .map(|index| {
             let (row, column) = (index / (2 * size), index % (2 * size));
@@ -44,13 +45,13 @@ pub(super) fn doubled(texels: &[Texel<f32>], size: usize) -> Vec<Texel<f32>> {
 }
 
 /// Maps of half the size: each texel is the mean of four.
-pub(super) fn halved(texels: &[Texel<f32>], size: usize) -> Vec<Texel<f32>> {
+pub(super) fn halved(texels: &[Material<f32>], size: usize) -> Vec<Material<f32>> {
     let half = size / 2;
     (0..half * half)
         .map(|index| {
             let first = 2 * (index / half) * size + 2 * (index % half);
-            let four = [first, first + 1, first + size, first + size + 1].map(|texel| texels[texel]);
-            std::array::from_fn(|k| 0.25 * four.iter().map(|texel| texel[k]).sum::<f32>())
+            let four = [first, first + 1, first + size, first + size + 1].map(|texel| texels[texel].to_array());
+            Material::from_array(std::array::from_fn(|k| 0.25 * four.iter().map(|texel| texel[k]).sum::<f32>()))
         })
         .collect()
 }

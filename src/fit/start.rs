@@ -8,7 +8,6 @@ use super::settings::{BackgroundEvidence, FitSettings};
 use super::targets::Target;
 use crate::light::Environment;
 use crate::material::Material;
-use crate::material::texels::Texel;
 use crate::math::sphere::{solid_angle_of_texel, tap_of_direction};
 use crate::render::Surface;
 use crate::scene::{Background, PixelState, Scene};
@@ -18,7 +17,7 @@ use glam::{Vec2, Vec3};
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartValues {
     /// Value of every texel.
-    pub texel: Texel<f32>,
+    pub texel: Material<f32>,
     /// The light.
     pub environment: Environment,
 }
@@ -39,10 +38,8 @@ pub fn paper(settings: &FitSettings) -> StartValues {
     }
 }
 
-fn texel(diffuse: f32, specular: f32) -> Texel<f32> {
-    let material = Material::from_maps(Vec3::splat(diffuse), Vec3::splat(specular), START_ROUGHNESS);
-    let [a, b, c, d, e, f, g] = material.to_array();
-    [a, b, c, d, e, f, g, 0.0]
+fn texel(diffuse: f32, specular: f32) -> Material<f32> {
+    Material::from_maps(Vec3::splat(diffuse), Vec3::splat(specular), START_ROUGHNESS)
 }
 
 /// Start values read off the photographs.

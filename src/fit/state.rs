@@ -4,8 +4,9 @@ use super::adam::Moments;
 use super::event::FitEvent;
 use super::schedule::{Stage, revised};
 use super::settings::FitSettings;
+use super::solver::TexelVariance;
 use crate::error::Result;
-use crate::material::texels::Texel;
+use crate::material::Material;
 use serde::{Deserialize, Serialize};
 
 /// One line of the loss history.
@@ -45,12 +46,12 @@ pub struct FitState {
     /// Width and height of the maps.
     pub map_size: usize,
     /// Texels of the maps.
-    pub texels: Vec<Texel<f32>>,
+    pub texels: Vec<Material<f32>>,
     /// Moments of the texels under Adam.
     pub moments: Moments,
     /// What the solver knows of each texel, see [`Estimate::variances`](crate::fit::solver::Estimate::variances); empty
     /// before its first step and under Adam.
-    pub variances: Vec<Texel<f32>>,
+    pub variances: Vec<TexelVariance>,
     /// Radiance of the light's texels.
     pub light: Vec<[f32; 3]>,
     /// Relative standard deviation of the factor that light and reflectance have in common, as the solver's last round on

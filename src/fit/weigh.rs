@@ -8,10 +8,10 @@ use super::settings::Consistency;
 use super::stage_work::StageWork;
 use super::step_sums::StepSums;
 use crate::light::EnvironmentSampler;
-use crate::material::texels::{Texel, TexelPyramid};
+use crate::material::{Material, TexelPyramid};
 use crate::math::real::Dual;
-use crate::render::Parameters;
 use crate::render::accumulate::accumulate;
+use crate::render::{ParameterGradient, Parameters};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 impl Fitter {
@@ -29,9 +29,9 @@ impl Fitter {
         let count = stage.map_size * stage.map_size;
         let mut agreement = Agreement::of(view_gradients, count, None, f64::from);
         sums.consistency = agreement.value;
-        let scale_all = |gradient: &mut Parameters<f32>, factor: f32| {
+        let scale_all = |gradient: &mut ParameterGradient<f32>, factor: f32| {
             for texel in &mut gradient.texels.levels[0].texels {
-                texel[..7].iter_mut().for_each(|value| *value *= factor);
+                texel.d_material = texel.d_material.map(|d| d * factor);
             }
             gradient.light.iter_mut().flatten().for_each(|value| *value *= factor);
         };
@@ -49,7 +49,7 @@ impl Fitter {
                 let gradient = &mut work.gradient;
                 for (texel, &value) in gradient.texels.levels[0].texels.iter_mut().zip(&agreement.per_texel) {
                     let factor = value.exp();
-                    texel[..7].iter_mut().for_each(|value| *value *= factor);
+                    texel.d_material = texel.d_material.map(|d| d * factor);
                 }
                 gradient.light.iter_mut().flatten().for_each(|value| *value *= mean_factor);
             }
@@ -89,7 +89,7 @@ impl Fitter {
         let StageWork { weights, parameters, gradient, targets, first_hits, .. } = work;
         let target = &targets[slot];
         let lift = |value: f32| Dual::new(value, 0.0f32);
-        let mut base: Vec<Texel<Dual<f32>>> =
+        let mut base: Vec<Material<Dual<f32>>> =
             parameters.texels.levels[0].texels.iter().map(|texel| texel.map(lift)).collect();
         // A direction of unit size keeps the tangents of f32 in range; the size is put back at the end.
         let size = direction.iter().flat_map(|(_, v)| v).fold(0.0f64, |size, value| size.max(value.abs()));
@@ -98,7 +98,7 @@ impl Fitter {
         }
         for (index, v) in direction {
             for channel in 0..3 {
-                base[*index as usize][channel].tangent = (v[channel] / size) as f32;
+                base[*index as usize].diffuse[channel].tangent = (v[channel] / size) as f32;
             }
         }
         let dual = Parameters {
@@ -106,11 +106,7 @@ impl Fitter {
             light: parameters.light.iter().map(|radiance| radiance.map(lift)).collect(),
             environment_size: parameters.environment_size,
         };
-        let mut d_dual = Parameters {
-            texels: TexelPyramid::<Dual<f32>>::zeros(weights),
-            light: vec![[Dual::default(); 3]; dual.light.len()],
-            environment_size: dual.environment_size,
-        };
+        let mut d_dual = ParameterGradient::<Dual<f32>>::zeros(weights, dual.light.len());
         let pixels = pixels_of_visit(self.settings.seed, target, visit, 0);
         let tracer = self.tracer(stage, parameters, sampler, target);
         let rays = self.rays(target, &first_hits[slot]);
@@ -122,9 +118,7 @@ impl Fitter {
         d_dual.texels.pull_down(weights);
         let factor = scale * size as f32;
         for (texel, d) in gradient.texels.levels[0].texels.iter_mut().zip(&d_dual.texels.levels[0].texels) {
-            for number in 0..7 {
-                texel[number] += factor * d[number].tangent;
-            }
+            texel.d_material.add_scaled(&d.d_material.map(|d| d.tangent), factor);
         }
         for (light, d) in gradient.light.iter_mut().zip(&d_dual.light) {
             for channel in 0..3 {

@@ -8,8 +8,8 @@ use super::stage_work::{StageWork, doubled, mean_of_photos};
 use super::targets::{Target, targets};
 use crate::atlas::covered_texels;
 use crate::material::texels::{PyramidWeights, TexelPyramid};
-use crate::render::Parameters;
 use crate::render::first_hits::FirstHits;
+use crate::render::{ParameterGradient, Parameters};
 
 impl Fitter {
     /// Prepares what a stage needs, once.
@@ -23,11 +23,7 @@ impl Fitter {
         let weights = PyramidWeights::new(&covered, 6);
         let texels = TexelPyramid::from_base(self.state.texels.clone(), &weights);
         let parameters = Parameters::new(texels, &self.environment());
-        let gradient = Parameters {
-            texels: TexelPyramid::zeros(&weights),
-            light: vec![[0.0; 3]; self.state.light.len()],
-            environment_size: parameters.environment_size,
-        };
+        let gradient = ParameterGradient::zeros(&weights, self.state.light.len());
         let targets = targets(&self.scene, &self.training, stage.photo_level);
         let first_hits = self.cache_first_hits(&targets);
         let mean_of_photos = mean_of_photos(&self.scene, &targets);

@@ -5,7 +5,7 @@ use crate::insight::intervals::interval_coverage;
 use crate::insight::report::data::TruthErrors;
 use crate::insight::truth::{environment_errors, map_errors};
 use crate::light::Environment;
-use crate::material::MaterialMaps;
+use crate::material::{Material, MaterialMaps};
 use crate::render::Surface;
 use crate::scene::Scene;
 
@@ -59,25 +59,24 @@ pub(crate) fn resampled(maps: &MaterialMaps, (width, height): (usize, usize)) ->
 }
 
 struct TexelImage {
-    texels: Vec<crate::material::texels::Texel<f32>>,
+    texels: Vec<Material<f32>>,
     width: usize,
     height: usize,
 }
 
 impl TexelImage {
     /// Mean over the texels that a texel of another size covers, or the nearest one.
-    fn at(&self, index: usize, width: usize, height: usize) -> crate::material::texels::Texel<f32> {
+    fn at(&self, index: usize, width: usize, height: usize) -> Material<f32> {
         let (row, column) = (index / width, index % width);
         let range = |place: usize, size: usize, own: usize| {
             let first = place * own / size;
             first..((place + 1) * own / size).max(first + 1).min(own)
         };
-        let mut sum = [0.0; 8];
+        let mut sum = Material::default();
         let mut count = 0.0;
         for row in range(row, height, self.height) {
             for column in range(column, width, self.width) {
-                let texel = &self.texels[row * self.width + column];
-                sum.iter_mut().zip(texel).for_each(|(sum, value)| *sum += value);
+                sum.add(&self.texels[row * self.width + column]);
                 count += 1.0;
             }
         }

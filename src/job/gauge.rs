@@ -11,7 +11,7 @@ use crate::fit::gauge;
 use crate::image::Image;
 use crate::insight::cursor::texel_of_uv;
 use crate::light::Environment;
-use crate::material::MaterialMaps;
+use crate::material::{Material, MaterialMaps};
 use glam::{Vec2, Vec3};
 use std::path::Path;
 
@@ -45,17 +45,24 @@ pub fn move_scale(maps: &MaterialMaps, environment: &Environment, factor: Vec3) 
     let mut own = parameters(maps, environment);
     let bounded_share = gauge::move_scale(&mut own, factor);
     let base = &own.texels.levels[0];
-    let image = |first: usize| {
-        let pixels = base.texels.iter().map(|texel| Vec3::new(texel[first], texel[first + 1], texel[first + 2]));
+    let image = |colour: fn(&Material<f32>) -> [f32; 3]| {
+        let pixels = base.texels.iter().map(|texel| Vec3::from_array(colour(texel)));
         Image::from_pixels(base.width, base.height, pixels.collect())
     };
     // Roughness as it was: through the logarithm that the tracer keeps it would be rounded.
-    let maps = MaterialMaps { diffuse: image(0), specular: image(3), roughness: maps.roughness.clone() };
+    let maps = MaterialMaps {
+        diffuse: image(|texel| texel.diffuse),
+        specular: image(|texel| texel.specular),
+        roughness: maps.roughness.clone(),
+    };
     let environment = own.environment();
     if environment.radiance.pixels().iter().any(|radiance| !radiance.is_finite()) {
-        return Err(Error::new(ErrorKind::InvalidSetting, format!("the light over {factor} is not finite"))
-            .at(Place::Setting("factor".into()))
-            .remedy("give a factor nearer to 1"));
+        return Err(Error::new(
+            ErrorKind::InvalidSetting,
+            format!("the environment divided by {factor} is not finite"),
+        )
+        .at(Place::Setting("factor".into()))
+        .remedy("give a factor closer to 1"));
     }
     Ok(Moved { maps, environment, bounded_share })
 }
@@ -148,7 +155,7 @@ pub fn move_run(run: &Path, by: &Move, output: &Path) -> Result<MovedRun> {
     let mut findings = Vec::new();
     if moved.bounded_share > 0.0 {
         let message = format!(
-            "{:.2} % of the reflectances would exceed 1 and were held there: pictures of those texels are darker",
+            "{:.2} % of the reflectances would exceed 1 and were clamped: renders of those texels are darker",
             100.0 * moved.bounded_share
         );
         findings.push(

@@ -24,7 +24,7 @@ pub const MIN_WIDTH: f32 = 0.005;
 /// Smallest roughness `r = a^2`.
 pub const MIN_ROUGHNESS: f32 = MIN_WIDTH * MIN_WIDTH;
 
-/// What a texel says of the surface.
+/// What a texel says of the surface: its seven numbers. Derivatives by them and variances of them have the same shape.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Material<R> {
     /// Diffuse reflectance, linear RGB in [0, 1].
@@ -111,6 +111,32 @@ impl<R: Real> Material<R> {
     #[inline(always)]
     pub fn from_array([a, b, c, d, e, f, log_width]: [R; 7]) -> Self {
         Material { diffuse: [a, b, c], specular: [d, e, f], log_width }
+    }
+
+    /// The same with each number changed, perhaps into another type.
+    #[inline(always)]
+    pub fn map<S: Real>(self, change: impl FnMut(R) -> S) -> Material<S> {
+        Material::from_array(self.to_array().map(change))
+    }
+
+    /// Adds another's numbers.
+    #[inline(always)]
+    pub fn add(&mut self, other: &Material<R>) {
+        for channel in 0..3 {
+            self.diffuse[channel] += other.diffuse[channel];
+            self.specular[channel] += other.specular[channel];
+        }
+        self.log_width += other.log_width;
+    }
+
+    /// Adds `factor` times another's numbers.
+    #[inline(always)]
+    pub fn add_scaled(&mut self, other: &Material<R>, factor: R) {
+        for channel in 0..3 {
+            self.diffuse[channel] += other.diffuse[channel] * factor;
+            self.specular[channel] += other.specular[channel] * factor;
+        }
+        self.log_width += other.log_width * factor;
     }
 
     /// `f(i, o) (n.i)` in 1/sr per channel. `lobe_strength` in [0, 1] scales the specular lobe as a whole.

@@ -1,4 +1,4 @@
-//! The maps as the tracer fetches them: seven numbers a texel side by side, with a mip chain and its transpose.
+//! The maps as the tracer fetches them: the seven numbers of a texel side by side, with a mip chain.
 //!
 //! Coarse levels are coverage-weighted means of their children, so that texels outside every chart never leak into a
 //! footprint. The weights are fixed, hence each level is a linear function of the base, and a gradient gathered on any
@@ -12,27 +12,22 @@ use crate::math::real::Real;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-/// Numbers a texel holds: diffuse RGB, specular RGB, log width, and one of padding that keeps texels aligned.
-pub const TEXEL_NUMBERS: usize = 8;
-/// One texel: diffuse RGB, specular RGB, log width, unused.
-pub type Texel<R> = [R; TEXEL_NUMBERS];
-
-/// One level of the chain.
+/// One level of a chain.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Level<R> {
+pub struct Level<T> {
     /// Width in texels.
     pub width: usize,
     /// Height in texels.
     pub height: usize,
     /// Row-major texels.
-    pub texels: Vec<Texel<R>>,
+    pub texels: Vec<T>,
 }
 
 /// A mip chain of materials; level 0 is the base.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TexelPyramid<R> {
     /// Levels from fine to coarse.
-    pub levels: Vec<Level<R>>,
+    pub levels: Vec<Level<Material<R>>>,
 }
 
 /// The fixed weights of the chain: which share of a parent each child has.
@@ -135,7 +130,7 @@ impl PyramidWeights {
     }
 
     /// The share each of a parent's four children has in it. A parent without coverage averages its children evenly.
-    fn shares(&self, level: usize, parent: usize) -> [(usize, f32); 4] {
+    pub(super) fn shares(&self, level: usize, parent: usize) -> [(usize, f32); 4] {
         let own = children(parent, self.sizes[level].0);
         let coverage = own.map(|child| self.coverage[level][child]);
         let sum: f32 = coverage.iter().sum();
@@ -144,13 +139,15 @@ impl PyramidWeights {
 }
 
 /// The texel of a coarse level that stands for its four children on `level`.
-fn mean_of_children<R: Real>(fine: &[Texel<R>], weights: &PyramidWeights, level: usize, parent: usize) -> Texel<R> {
-    let mut sum = [R::zero(); TEXEL_NUMBERS];
+fn mean_of_children<R: Real>(
+    fine: &[Material<R>],
+    weights: &PyramidWeights,
+    level: usize,
+    parent: usize,
+) -> Material<R> {
+    let mut sum = Material::default();
     for (child, share) in weights.shares(level, parent) {
-        let share = R::from_f32(share);
-        for (total, &value) in sum.iter_mut().zip(&fine[child]) {
-            *total += value * share;
-        }
+        sum.add_scaled(&fine[child], R::from_f32(share));
     }
     sum
 }
@@ -162,20 +159,19 @@ fn children(parent: usize, width: usize) -> [usize; 4] {
     [first, first + 1, first + width, first + width + 1]
 }
 
-impl<R: Real> TexelPyramid<R> {
-    /// A chain with every number zero, of the sizes of `weights`.
-    pub fn zeros(weights: &PyramidWeights) -> Self {
-        let level = |&(width, height): &(usize, usize)| Level {
-            width,
-            height,
-            texels: vec![[R::zero(); TEXEL_NUMBERS]; width * height],
-        };
-        TexelPyramid { levels: weights.sizes.iter().map(level).collect() }
+impl<T: Clone + Default> Level<T> {
+    /// A chain of levels with nothing in any texel, of the sizes of `weights`.
+    pub(super) fn chain(weights: &PyramidWeights) -> Vec<Self> {
+        let level =
+            |&(width, height): &(usize, usize)| Level { width, height, texels: vec![T::default(); width * height] };
+        weights.sizes.iter().map(level).collect()
     }
+}
 
+impl<R: Real> TexelPyramid<R> {
     /// A chain over base texels of the size of `weights`.
-    pub fn from_base(texels: Vec<Texel<R>>, weights: &PyramidWeights) -> Self {
-        let mut pyramid = TexelPyramid::zeros(weights);
+    pub fn from_base(texels: Vec<Material<R>>, weights: &PyramidWeights) -> Self {
+        let mut pyramid = TexelPyramid { levels: Level::chain(weights) };
         pyramid.levels[0].texels = texels;
         pyramid.rebuild(weights);
         pyramid
@@ -201,50 +197,15 @@ impl<R: Real> TexelPyramid<R> {
         }
     }
 
-    /// The exact transpose of [`TexelPyramid::rebuild`]: adds each coarse level to the finer ones and clears it, so
-    /// that a gradient gathered on all levels ends on the base. The eighth number, a count of evidence, reaches every
-    /// child that has a share.
-    pub fn pull_down(&mut self, weights: &PyramidWeights) {
-        for level in (1..self.levels.len()).rev() {
-            let (fine, coarse) = self.levels.split_at_mut(level);
-            let (fine, coarse) = (&mut fine[level - 1], &mut coarse[0]);
-            let (fine_width, coarse_width) = (fine.width, coarse.width);
-            // Two fine rows belong to one coarse row, so rows of parents are independent.
-            let rows = fine.texels.par_chunks_mut(2 * fine_width).zip(coarse.texels.par_chunks_mut(coarse_width));
-            rows.enumerate().for_each(|(row, (fine, coarse))| {
-                for (column, texel) in coarse.iter_mut().enumerate() {
-                    if texel.iter().all(|value| value.is_zero()) {
-                        continue;
-                    }
-                    for (child, share) in weights.shares(level - 1, row * coarse_width + column) {
-                        let child = &mut fine[child - 2 * row * fine_width];
-                        let share = R::from_f32(share);
-                        for number in 0..7 {
-                            child[number] += texel[number] * share;
-                        }
-                        if !share.is_zero() {
-                            child[7] += texel[7];
-                        }
-                    }
-                    *texel = [R::zero(); TEXEL_NUMBERS];
-                }
-            });
-        }
-    }
-
     /// The material at a tap.
     #[inline(always)]
     pub fn fetch(&self, tap: &TextureTap) -> Material<R> {
         let texels = &self.levels[tap.level as usize].texels;
-        let mut sum = [R::zero(); 7];
+        let mut sum = Material::default();
         for k in 0..4 {
-            let weight = R::from_f32(tap.weight[k]);
-            let texel = &texels[tap.index[k] as usize];
-            for (total, &value) in sum.iter_mut().zip(texel) {
-                *total += value * weight;
-            }
+            sum.add_scaled(&texels[tap.index[k] as usize], R::from_f32(tap.weight[k]));
         }
-        Material::from_array(sum)
+        sum
     }
 
     /// The tap at a texture coordinate on a level; the level is clamped to those there are.
@@ -257,7 +218,7 @@ impl<R: Real> TexelPyramid<R> {
 
     /// The chain in another number type, without derivatives.
     pub fn convert<S: Real>(&self, convert: impl Fn(R) -> S) -> TexelPyramid<S> {
-        let level = |level: &Level<R>| Level {
+        let level = |level: &Level<Material<R>>| Level {
             width: level.width,
             height: level.height,
             texels: level.texels.iter().map(|texel| texel.map(&convert)).collect(),
@@ -267,27 +228,22 @@ impl<R: Real> TexelPyramid<R> {
 }
 
 /// Base texels of maps as files hold them.
-pub fn texels_from_maps(maps: &MaterialMaps) -> Vec<Texel<f32>> {
+pub fn texels_from_maps(maps: &MaterialMaps) -> Vec<Material<f32>> {
     let pixels = maps.diffuse.pixels().iter().zip(maps.specular.pixels()).zip(maps.roughness.pixels());
-    pixels
-        .map(|((&diffuse, &specular), &roughness)| {
-            let [a, b, c, d, e, f, g] = Material::from_maps(diffuse, specular, roughness).to_array();
-            [a, b, c, d, e, f, g, 0.0]
-        })
-        .collect()
+    pixels.map(|((&diffuse, &specular), &roughness)| Material::from_maps(diffuse, specular, roughness)).collect()
 }
 
 /// Maps as files hold them, of base texels.
-pub fn maps_from_texels(texels: &[Texel<f32>], width: usize, height: usize) -> MaterialMaps {
-    let image = |number: usize| {
-        Image::from_pixels(
-            width,
-            height,
-            texels.iter().map(|texel| Vec3::new(texel[number], texel[number + 1], texel[number + 2])).collect(),
-        )
+pub fn maps_from_texels(texels: &[Material<f32>], width: usize, height: usize) -> MaterialMaps {
+    let image = |colour: fn(&Material<f32>) -> [f32; 3]| {
+        Image::from_pixels(width, height, texels.iter().map(|texel| Vec3::from_array(colour(texel))).collect())
     };
-    let roughness = texels.iter().map(|texel| (2.0 * texel[6].clamp(MIN_WIDTH.ln(), 0.0)).exp()).collect();
-    MaterialMaps { diffuse: image(0), specular: image(3), roughness: Image::from_pixels(width, height, roughness) }
+    let roughness = texels.iter().map(|texel| (2.0 * texel.log_width.clamp(MIN_WIDTH.ln(), 0.0)).exp()).collect();
+    MaterialMaps {
+        diffuse: image(|texel| texel.diffuse),
+        specular: image(|texel| texel.specular),
+        roughness: Image::from_pixels(width, height, roughness),
+    }
 }
 
 #[cfg(test)]

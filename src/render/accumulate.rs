@@ -9,7 +9,7 @@ use self::chunk_gradient::ChunkGradient;
 use super::first_hits::CameraRays;
 use super::packet::{PACKET, PathStart, camera_pairs};
 use super::path::{PathArena, PathTracer};
-use super::sums::{Parameters, radiance, radiance_backward};
+use super::sums::{ParameterGradient, Parameters, radiance, radiance_backward};
 use crate::math::random::{SampleStream, StreamKey};
 use crate::math::real::Real;
 use glam::Vec3;
@@ -151,7 +151,7 @@ pub struct PassTotals<R> {
 
 /// Traces the given pixels of a view and adds the derivatives of `loss` to `gradient`.
 ///
-/// `gradient` has the shape of `parameters`; its coarse mip levels are filled as well: pull them down afterwards.
+/// `gradient` is by `parameters`; its coarse mip levels are filled as well: pull them down afterwards.
 /// Returns early, with the totals so far, when `stop` is set.
 pub fn accumulate<R: Real>(
     tracer: &PathTracer<'_>,
@@ -160,7 +160,7 @@ pub fn accumulate<R: Real>(
     key: PassKey,
     parameters: &Parameters<R>,
     loss: &impl PixelLoss<R>,
-    gradient: &mut Parameters<R>,
+    gradient: &mut ParameterGradient<R>,
     stop: &AtomicBool,
 ) -> PassTotals<R> {
     let mut totals = PassTotals::default();

@@ -34,5 +34,5 @@ pub mod surface;
 mod taps;
 
 pub use path::{PathArena, PathSettings, PathTracer};
-pub use sums::Parameters;
+pub use sums::{ParameterGradient, Parameters};
 pub use surface::Surface;

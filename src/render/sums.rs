@@ -7,8 +7,8 @@
 
 use super::path::{Bounce, MAX_BOUNCES, PathArena, PathHead};
 use crate::light::Environment;
-use crate::material::texels::Texel;
-use crate::material::{Material, TexelPyramid, TextureTap};
+use crate::material::texels::PyramidWeights;
+use crate::material::{GradientPyramid, Material, TexelPyramid, TextureTap};
 use crate::math::real::Real;
 use crate::math::sphere::BilinearTap;
 use glam::Vec3;
@@ -65,6 +65,30 @@ impl<R: Real> Parameters<R> {
             }
         }
         sum
+    }
+}
+
+/// Derivatives of the loss by the parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParameterGradient<R> {
+    /// Derivatives by the maps, on all levels of their mip chain.
+    pub texels: GradientPyramid<R>,
+    /// Derivative by the radiance of the environment's texels, row-major.
+    pub light: Vec<[R; 3]>,
+}
+
+impl<R: Real> ParameterGradient<R> {
+    /// No derivative yet, by maps with these weights and an environment of so many texels.
+    pub fn zeros(weights: &PyramidWeights, light_texels: usize) -> Self {
+        ParameterGradient { texels: GradientPyramid::zeros(weights), light: vec![[R::zero(); 3]; light_texels] }
+    }
+
+    /// The same derivatives in another number type.
+    pub fn convert<S: Real>(&self, convert: impl Fn(R) -> S) -> ParameterGradient<S> {
+        ParameterGradient {
+            texels: self.texels.convert(&convert),
+            light: self.light.iter().map(|radiance| radiance.map(&convert)).collect(),
+        }
     }
 }
 
@@ -181,11 +205,8 @@ pub fn radiance_backward<R: Real>(
         };
         let d_value = scale(multiply(d_leaving, arriving[k]), bounce.inverse_density);
         let d_bounce = material.reflect_backward(&bounce.geometry, lobe_strength, d_value);
-        let (own, more) = (d_material.to_array(), d_bounce.to_array());
-        sink.add_material(
-            &vertex.texture,
-            &Material::from_array(std::array::from_fn(|entry| own[entry] + more[entry])),
-        );
+        d_material.add(&d_bounce);
+        sink.add_material(&vertex.texture, &d_material);
         d_leaving = multiply(d_leaving, reflected[k]);
         if let Some((tap, weight)) = &bounce.escape {
             sink.add_light(tap, scale(d_leaving, *weight));
@@ -194,12 +215,11 @@ pub fn radiance_backward<R: Real>(
 }
 
 /// Adds to texels by index: the plainest sink, for tests and audits.
-impl<R: Real> GradientSink<R> for Parameters<R> {
+impl<R: Real> GradientSink<R> for ParameterGradient<R> {
     fn add_material(&mut self, tap: &TextureTap, d_material: &Material<R>) {
-        let d = d_material.to_array();
         let texels = &mut self.texels.levels[tap.level as usize].texels;
         for k in 0..4 {
-            add_weighted(&mut texels[tap.index[k] as usize], &d, tap.weight[k]);
+            texels[tap.index[k] as usize].add_weighted(d_material, tap.weight[k]);
         }
     }
 
@@ -211,14 +231,4 @@ impl<R: Real> GradientSink<R> for Parameters<R> {
             }
         }
     }
-}
-
-/// Adds seven weighted numbers to a texel of a gradient and the weight to its eighth: a count of evidence.
-#[inline(always)]
-pub(super) fn add_weighted<R: Real>(texel: &mut Texel<R>, d: &[R; 7], weight: f32) {
-    let weight = R::from_f32(weight);
-    for (total, &value) in texel.iter_mut().zip(d) {
-        *total += value * weight;
-    }
-    texel[7] += weight;
 }

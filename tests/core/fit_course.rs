@@ -39,7 +39,10 @@ fn the_four_settings_of_consistency() {
     let of = |consistency| trial.fitted(FitSettings { consistency, ..quick() });
     let distance = |a: &Fitter, b: &Fitter| -> f32 {
         let texels = a.state().texels.iter().zip(&b.state().texels);
-        texels.map(|(a, b)| (0..7).map(|n| (a[n] - b[n]).abs()).sum::<f32>()).sum::<f32>()
+        texels
+            .map(|(a, b)| (a.to_array(), b.to_array()))
+            .map(|(a, b)| (0..7).map(|n| (a[n] - b[n]).abs()).sum::<f32>())
+            .sum::<f32>()
             / a.state().texels.len() as f32
     };
     let none = of(Consistency::None);

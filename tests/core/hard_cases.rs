@@ -25,13 +25,14 @@ fn fitter_from(trial: &Trial, settings: FitSettings, value: Material<f32>) -> Fi
     let (scene, surface) = (Arc::new(trial.photographed()), trial.surface());
     let fresh = Fitter::new(scene.clone(), surface.clone(), settings.clone(), None).unwrap();
     let mut state = fresh.state().clone();
-    state.texels.fill(texel(value));
+    state.texels.fill(value);
     Fitter::resume(scene, surface, settings, state).unwrap()
 }
 
 /// Whether some texel that was moved at all has left `bound` in a number.
 fn some_left(state: &FitState, number: usize, bound: f32) -> bool {
-    state.texels.iter().zip(&state.moments.first).any(|(texel, own)| own[7] > 0.0 && texel[number] != bound)
+    let is_moved = |(texel, updates): (&Material<f32>, &f32)| *updates > 0.0 && texel.to_array()[number] != bound;
+    state.texels.iter().zip(&state.moments.updates).any(is_moved)
 }
 
 // Materials.
@@ -200,7 +201,11 @@ fn photos_clipped_everywhere_never_darken_anything() {
             let now = fitter.state();
             assert_sound(now);
             if row.step > 1 || start == Start::Measured {
-                let darker = now.texels.iter().zip(&before.texels).any(|(a, b)| (0..6).any(|n| a[n] < b[n]));
+                let darker = now
+                    .texels
+                    .iter()
+                    .zip(&before.texels)
+                    .any(|(a, b)| (0..6).any(|n| a.to_array()[n] < b.to_array()[n]));
                 assert!(!darker, "a reflectance fell in step {}", row.step);
                 let darker = now.light.iter().zip(&before.light).any(|(a, b)| (0..3).any(|n| a[n] < b[n]));
                 assert!(!darker, "a light fell in step {}", row.step);
@@ -420,11 +425,12 @@ fn texels_nobody_sees_keep_their_start_bit_for_bit() {
         run(&mut fitter).unwrap();
         let state = fitter.state();
         let mut moved = 0;
+        let bits = |texel: &Material<f32>| texel.to_array().map(f32::to_bits);
         for (index, (now, start)) in state.texels.iter().zip(&start).enumerate() {
             let column = index % 32;
-            assert!(column < 24 || now.map(f32::to_bits) == start.map(f32::to_bits), "texel {index} moved");
+            assert!(column < 24 || bits(now) == bits(start), "texel {index} moved");
             moved += usize::from(now != start);
-            assert!(now == start || state.moments.first[index][7] > 0.0, "moved and not counted");
+            assert!(now == start || state.moments.updates[index] > 0.0, "moved and not counted");
         }
         assert!(moved > 100, "{moved} texels moved");
     }

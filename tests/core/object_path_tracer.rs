@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 use patina::image::{Image, RgbImage};
 use patina::light::Environment;
 use patina::material::Material;
-use patina::material::texels::{PyramidWeights, Texel, TexelPyramid};
+use patina::material::texels::{PyramidWeights, TexelPyramid};
 use patina::measured::analytic::OwnLobe;
 use patina::measured::analytic::own_lobe::MapValues;
 use patina::measured::{HalfDifference, MeasuredBrdf};
@@ -154,8 +154,7 @@ fn the_photos_of_studies_are_those_of_the_path_tracer_with_one_hit() {
 
     // The path tracer with the same table everywhere. The maps are there because it asks for some: nothing shows them.
     let surface = Surface::new(sphere_on_floor()).unwrap();
-    let [a, b, c, d, e, f, g] = Material::<f32>::from_maps(Vec3::ZERO, Vec3::ZERO, 0.5).to_array();
-    let texel: Texel<f32> = [a, b, c, d, e, f, g, 0.0];
+    let texel = Material::from_maps(Vec3::ZERO, Vec3::ZERO, 0.5);
     let parameters = Parameters::new(TexelPyramid::from_base(vec![texel; 4], &PyramidWeights::flat(2, 2)), &light);
     let regions = Regions::everywhere(MeasuredMaterial::new("table", table.clone()));
     let settings =

@@ -6,12 +6,12 @@ use glam::{DVec3, Vec2, Vec3};
 use patina::image::Image;
 use patina::light::{Environment, EnvironmentSampler};
 use patina::material::Material;
-use patina::material::texels::{PyramidWeights, Texel, TexelPyramid};
+use patina::material::texels::{PyramidWeights, TexelPyramid};
 use patina::math::statistics::Moments;
 use patina::render::accumulate::{PassKey, PixelDerivative, PixelEstimate, PixelLoss, accumulate, estimate_pixel};
 use patina::render::first_hits::{CameraRays, FirstHits, PixelFilter};
 use patina::render::picture::{Picture, PictureSettings, render};
-use patina::render::{Parameters, PathArena, PathSettings, PathTracer, Surface};
+use patina::render::{ParameterGradient, Parameters, PathArena, PathSettings, PathTracer, Surface};
 use patina::scene::{Camera, Mesh};
 use std::sync::atomic::AtomicBool;
 
@@ -84,9 +84,7 @@ fn sphere(radius: f32, rows: usize, columns: usize) -> Mesh {
 
 /// One material everywhere under a given light.
 fn uniform(material: Material<f32>, light: &Environment) -> Parameters<f32> {
-    let [a, b, c, d, e, f, g] = material.to_array();
-    let texel: Texel<f32> = [a, b, c, d, e, f, g, 0.0];
-    let pyramid = TexelPyramid::from_base(vec![texel; 4], &PyramidWeights::flat(2, 2));
+    let pyramid = TexelPyramid::from_base(vec![material; 4], &PyramidWeights::flat(2, 2));
     Parameters::new(pyramid, light)
 }
 
@@ -420,11 +418,7 @@ fn pictures_and_gradients_have_the_same_bits_on_one_and_on_two_threads() {
             let rays = CameraRays::fresh(&surface, &camera, PixelFilter::Tent, 4);
             let pixels: Vec<u32> = (0..72 * 72).collect();
             let key = PassKey::halves(3, 1, 2);
-            let mut gradient = Parameters {
-                texels: TexelPyramid::zeros(&PyramidWeights::flat(2, 2)),
-                light: vec![[0.0; 3]; parameters.light.len()],
-                environment_size: parameters.environment_size,
-            };
+            let mut gradient = ParameterGradient::zeros(&PyramidWeights::flat(2, 2), parameters.light.len());
             let totals = accumulate(&tracer, &rays, &pixels, key, &parameters, &ToGrey, &mut gradient, &stop);
             (picture, totals.loss.to_bits(), gradient)
         })

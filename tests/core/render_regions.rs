@@ -6,7 +6,7 @@ use glam::{DVec3, Vec2, Vec3};
 use patina::image::Image;
 use patina::light::Environment;
 use patina::material::Material;
-use patina::material::texels::{PyramidWeights, Texel, TexelPyramid};
+use patina::material::texels::{PyramidWeights, TexelPyramid};
 use patina::measured::analytic::OwnLobe;
 use patina::measured::table::MeasuredBrdf;
 use patina::render::measured_regions::render_regions;
@@ -61,9 +61,7 @@ fn glossy() -> Material<f32> {
 }
 
 fn parameters(material: Material<f32>, light: &Environment) -> Parameters<f32> {
-    let [a, b, c, d, e, f, g] = material.to_array();
-    let texel: Texel<f32> = [a, b, c, d, e, f, g, 0.0];
-    Parameters::new(TexelPyramid::from_base(vec![texel; 4], &PyramidWeights::flat(2, 2)), light)
+    Parameters::new(TexelPyramid::from_base(vec![material; 4], &PyramidWeights::flat(2, 2)), light)
 }
 
 /// The table of the program's own lobe, and of the values of the maps that it stands for.

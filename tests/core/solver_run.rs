@@ -108,7 +108,8 @@ fn polishing_moves_everything_keeps_what_is_known_and_goes_on_bit_for_bit() {
     assert!(whole.state().variances == before.state().variances && whole.deviations().is_some());
     assert!(whole.state().light != before.state().light);
     for number in 0..7 {
-        let moved = |fitter: &Fitter| fitter.state().texels.iter().map(|texel| texel[number]).collect::<Vec<f32>>();
+        let moved =
+            |fitter: &Fitter| fitter.state().texels.iter().map(|texel| texel.to_array()[number]).collect::<Vec<f32>>();
         assert_ne!(moved(&whole), moved(&before), "{number}");
     }
     assert_taken_up_alike(&settings, &[4, 7, 9], &whole);

@@ -3,19 +3,17 @@
 use super::light_evidence::LightKnown;
 use crate::image::Image;
 use crate::light::Environment;
-use crate::material::MaterialMaps;
-use crate::material::texels::{Texel, maps_from_texels};
+use crate::material::texels::maps_from_texels;
+use crate::material::{Material, MaterialMaps};
 use glam::Vec3;
 
 /// The unknowns. They live in the state of a fit between two steps.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Estimate {
     /// Texels of square maps.
-    pub texels: Vec<Texel<f32>>,
-    /// Variance of each number of a texel given the light, 0 where it is not known yet. The eighth is at least 1 where the
-    /// texel's own pixels, or those of its block, were solved for: the number of texels that share its lobe once maps are
-    /// made. It is 0 where a texel took over what others have.
-    pub variances: Vec<Texel<f32>>,
+    pub texels: Vec<Material<f32>>,
+    /// How well each texel is known.
+    pub variances: Vec<TexelVariance>,
     /// Radiance of the light's texels.
     pub light: Vec<[f32; 3]>,
     /// What the light is known by.
@@ -24,31 +22,46 @@ pub struct Estimate {
     pub log_gains: Vec<f32>,
 }
 
-/// Standard deviations of a texel's numbers when nothing is known of it.
-const UNKNOWN_DEVIATION: [f32; 8] = [0.3, 0.3, 0.3, 0.2, 0.2, 0.2, 0.5, 0.0];
+/// How well a texel is known.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TexelVariance {
+    /// Variance of each of its numbers given the light; 0 where it is not known yet.
+    pub variance: Material<f32>,
+    /// Number of texels that share its lobe once maps are made, at least 1 where the texel's own pixels, or those of its
+    /// block, were solved for; 0 where a texel took over what others have.
+    pub lobe_cluster_size: f32,
+}
+
+impl TexelVariance {
+    /// Whether the texel's own pixels, or those of its block, were solved for.
+    #[inline]
+    pub fn is_solved(&self) -> bool {
+        self.lobe_cluster_size > 0.0
+    }
+}
+
+/// Standard deviations of a texel's numbers when nothing is known of it: diffuse RGB, specular RGB, log width.
+const UNKNOWN_DEVIATION: [f32; 7] = [0.3, 0.3, 0.3, 0.2, 0.2, 0.2, 0.5];
 
 /// A light's scale that is known less well counts as known to this, relative.
 const MOST_LIGHT_DEVIATION: f64 = 0.25;
 /// What arrives at places that face differently errs by this share of what the scale may err by: what all have in common
-/// is no error of a map after its factor. With it 91 % of the texels of `toys` are held by stated intervals of nine tenths,
-/// 90 % of the demo and, in the mean, 92 % of the hard cases; without it 88, 89 and 77 %.
+/// is no error of a map after its factor. Chosen so that stated intervals of nine tenths hold nine tenths of the texels.
 const IRRADIANCE_SHARE: f32 = 0.5;
 /// By what a light that was found puts lobes off, all alike where they see the same of it: specular reflectance relative
 /// to itself, logarithm of the width. A lobe sees more detail of the light than irradiance does, which photos tell little
-/// of. Chosen on `toys` and the demo, of whose texels intervals without it held 68 and 86 % in specular reflectance, 83
-/// and 75 % in roughness; the second once more when the roughness was no longer taken for linear in it (0.08 then held 95 %
-/// of `toys`, this 94 %).
+/// of. Chosen, like the share above, by how often stated intervals hold the truth.
 const LOBE_LIGHT_ERRORS: [f32; 2] = [0.25, 0.07];
 
 /// What is known of a texel before anything was solved.
-pub const START_TEXEL: Texel<f32> = [0.4, 0.4, 0.4, 0.08, 0.08, 0.08, -0.7, 0.0];
+pub const START_TEXEL: Material<f32> = Material { diffuse: [0.4; 3], specular: [0.08; 3], log_width: -0.7 };
 
 impl Estimate {
     /// Start values with this light.
     pub fn start(map_size: usize, light: &Environment, views: usize) -> Self {
         Estimate {
             texels: vec![START_TEXEL; map_size * map_size],
-            variances: vec![[0.0; 8]; map_size * map_size],
+            variances: vec![TexelVariance::default(); map_size * map_size],
             light: light.radiance.pixels().iter().map(|pixel| pixel.to_array()).collect(),
             light_known: LightKnown::default(),
             log_gains: vec![0.0; views],
@@ -57,43 +70,37 @@ impl Estimate {
 
     /// Diffuse reflectance of all texels.
     pub fn diffuse(&self) -> Vec<[f32; 3]> {
-        self.texels.iter().map(|texel| [texel[0], texel[1], texel[2]]).collect()
+        self.texels.iter().map(|texel| texel.diffuse).collect()
     }
 
     /// Takes over diffuse reflectances of all texels.
     pub fn set_diffuse(&mut self, rho: &[[f32; 3]]) {
-        self.texels.iter_mut().zip(rho).for_each(|(texel, rho)| texel[..3].copy_from_slice(rho));
+        self.texels.iter_mut().zip(rho).for_each(|(texel, rho)| texel.diffuse = *rho);
     }
 
     /// Whether a texel was solved for when maps were made, better than any block of a round on the light is.
     #[inline]
     pub fn is_mapped(&self, texel: usize) -> bool {
-        self.variances[texel][0] > 0.0
+        self.variances[texel].variance.diffuse[0] > 0.0
     }
 
-    /// Sets a texel that was solved for; `variance` is 0 where it is not known, its last the number of texels that share
-    /// the lobe.
-    pub fn set(&mut self, texel: usize, diffuse: [f32; 3], specular: [f32; 3], log_width: f32, variance: Texel<f32>) {
-        let [a, b, c] = diffuse;
-        let [d, e, f] = specular;
-        self.texels[texel] = [a, b, c, d, e, f, log_width, 0.0];
-        self.variances[texel] = variance;
-        self.variances[texel][7] = variance[7].max(1.0);
+    /// Sets a texel that was solved for, together with the texels that share its lobe: at least itself.
+    pub fn set(&mut self, texel: usize, material: Material<f32>, known: TexelVariance) {
+        self.texels[texel] = material;
+        self.variances[texel] = TexelVariance { lobe_cluster_size: known.lobe_cluster_size.max(1.0), ..known };
     }
 
     /// Texels that no block has reached yet take the mean of those that one has.
     pub fn fill_with_mean(&mut self) {
-        let mut sum = [0.0f64; 8];
+        let mut sum = Material::<f64>::default();
         let mut count = 0.0f64;
-        for (texel, _) in self.texels.iter().zip(&self.variances).filter(|(_, variance)| variance[7] > 0.0) {
-            for (sum, &value) in sum.iter_mut().zip(texel) {
-                *sum += f64::from(value);
-            }
+        for (texel, _) in self.texels.iter().zip(&self.variances).filter(|(_, known)| known.is_solved()) {
+            sum.add(&texel.map(f64::from));
             count += 1.0;
         }
         if count > 0.0 {
             let mean = sum.map(|value| (value / count) as f32);
-            for (texel, _) in self.texels.iter_mut().zip(&self.variances).filter(|(_, variance)| variance[7] == 0.0) {
+            for (texel, _) in self.texels.iter_mut().zip(&self.variances).filter(|(_, known)| !known.is_solved()) {
                 *texel = mean;
             }
         }
@@ -104,8 +111,8 @@ impl Estimate {
     /// `light_deviation` is the relative standard deviation of the light's scale; `None` for a light that is known, which
     /// adds nothing.
     pub fn deviations(
-        texels: &[Texel<f32>],
-        variances: &[Texel<f32>],
+        texels: &[Material<f32>],
+        variances: &[TexelVariance],
         map_size: usize,
         light_deviation: Option<f64>,
     ) -> MaterialMaps {
@@ -114,14 +121,14 @@ impl Estimate {
             [of_diffuse, LOBE_LIGHT_ERRORS[0], LOBE_LIGHT_ERRORS[1]]
         });
         let deviation = |texel: usize, number: usize| {
-            let own = variances[texel];
-            if own[7] > 0.0 && own[number] > 0.0 {
+            let own = variances[texel].variance.to_array()[number];
+            if variances[texel].is_solved() && own > 0.0 {
                 let by_light = match number {
-                    0..3 => of_diffuse * texels[texel][number],
-                    3..6 => of_specular * texels[texel][number],
+                    0..3 => of_diffuse * texels[texel].diffuse[number],
+                    3..6 => of_specular * texels[texel].specular[number - 3],
                     _ => of_log_width,
                 };
-                own[number].sqrt().hypot(by_light)
+                own.sqrt().hypot(by_light)
             } else {
                 UNKNOWN_DEVIATION[number]
             }
@@ -136,7 +143,7 @@ impl Estimate {
             specular: colour(3),
             roughness: Image::from_fn(map_size, map_size, |row, column| {
                 let texel = row * map_size + column;
-                roughness_deviation(texels[texel][6], deviation(texel, 6))
+                roughness_deviation(texels[texel].log_width, deviation(texel, 6))
             }),
         }
     }
@@ -172,10 +179,11 @@ mod tests {
 
     #[test]
     fn a_light_that_was_found_makes_intervals_wider_and_one_that_is_known_does_not() {
-        let texels = [[0.4, 0.4, 0.4, 0.1, 0.1, 0.1, -0.5, 0.0], START_TEXEL];
+        let texels = [Material { diffuse: [0.4; 3], specular: [0.1; 3], log_width: -0.5 }, START_TEXEL];
         let texels = [texels[0], texels[0], texels[1], texels[1]];
-        let solved = [0.01, 0.01, 0.01, 0.0001, 0.0001, 0.0001, 0.04, 3.0];
-        let variances = [solved, solved, [0.0; 8], [0.0; 8]];
+        let variance = Material { diffuse: [0.01; 3], specular: [0.0001; 3], log_width: 0.04 };
+        let (solved, unsolved) = (TexelVariance { variance, lobe_cluster_size: 3.0 }, TexelVariance::default());
+        let variances = [solved, solved, unsolved, unsolved];
         let of = |light| Estimate::deviations(&texels, &variances, 2, light);
         let (known, close, open) = (of(None), of(Some(0.1)), of(Some(f64::MAX)));
         assert_eq!(known.diffuse[(0, 0)], Vec3::splat(0.1));

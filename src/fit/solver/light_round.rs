@@ -1,7 +1,7 @@
 //! A round on the light: some blocks are solved under the light as it is, and their rows move it.
 
 use super::eliminate::BlockRows;
-use super::estimate::Estimate;
+use super::estimate::{Estimate, TexelVariance};
 use super::gains::gains_after;
 use super::light_colour::change_by_highlights;
 use super::light_evidence::{LightKnown, Precisions, evidence_shares};
@@ -14,15 +14,15 @@ use super::plan;
 use super::report::{ErrorSums, StepReport, median};
 use super::round::{BlockWork, Round, open_prior};
 use super::scene::{BackgroundPixel, SolverScene};
+use crate::material::Material;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Noise of a background pixel, relative to its radiance and to the mean of the surface's.
 const BACKGROUND_NOISE: f64 = 0.03;
 /// By how much the mean light on the surface may differ from the gauge's where background shows, relative. Errors of
-/// transport make blocks take their light for less than it is, so a sun that no photo shows grows where it is free to:
-/// at 0.3 the demo's relit error was .193, at 0.1 .116, at 0.02 .059, but `saharov_bmvs` wants it loose (SSIM .642, .638
-/// and .618).
+/// transport make blocks take their light for less than it is, so a sun that no photo shows grows where it is free to;
+/// but photographs want it loose.
 const BACKGROUND_GAUGE_SLACK: f64 = 0.05;
 /// A block with fewer observations says nothing of the light.
 const LEAST_OBSERVATIONS: usize = 16;
@@ -73,7 +73,8 @@ impl SolverScene {
                     continue;
                 }
                 let diffuse = solution.cells[usize::from(cell)];
-                estimate.set(texel as usize, diffuse, solution.specular, solution.log_width, [0.0; 8]);
+                let own = Material { diffuse, specular: solution.specular, log_width: solution.log_width };
+                estimate.set(texel as usize, own, TexelVariance::default());
             }
         }
         estimate.fill_with_mean();
@@ -203,7 +204,7 @@ impl SolverScene {
             variation: self.settings.light_variation,
             independence: self.settings.independence,
             // Where the background shows, it fixes the scale; but not alone: what photos show behind a thing is seldom as
-            // far away as a sky (`saharov_bmvs` without this: the light grew by a third a round).
+            // far away as a sky, and the light would grow from round to round.
             gauge_slack: if self.background.is_empty() { self.settings.gauge_slack } else { BACKGROUND_GAUGE_SLACK },
         };
         let before = shape.coefficients_of_channels(&estimate.light);

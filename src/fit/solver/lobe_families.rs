@@ -12,10 +12,10 @@
 //! That uses what a texel's own pixels say twice, once in the cluster. So clusters are wide, and families of what any scene
 //! has keep half of what is believed.
 
-use super::estimate::Estimate;
+use super::estimate::{Estimate, TexelVariance};
 use super::lobe_prior::{LobeFamily, LobeKind, LobePrior, REACH, SurfaceKinds};
 use super::lobe_scene::SceneLobes;
-use crate::material::texels::Texel;
+use crate::material::Material;
 
 /// Share of the prior that is left to kinds of surface that any scene has,
 const ANY_SHARE: f64 = 0.5;
@@ -55,13 +55,14 @@ impl Sample {
     }
 
     /// Of a texel whose lobe is known well.
-    fn of(texel: &Texel<f32>, variance: &Texel<f32>) -> Option<Sample> {
-        let is_known = variance[7] > 0.0
-            && variance[6] > 0.0
-            && variance[6].sqrt() <= KNOWN_LOG_WIDTH
-            && (3..6).all(|k| variance[k].sqrt() <= KNOWN_SPECULAR.0 * texel[k] + KNOWN_SPECULAR.1);
-        let colour = |first: usize| [0, 1, 2].map(|c| f64::from(texel[first + c]));
-        is_known.then(|| Sample::new(colour(3), f64::from(texel[6]), colour(0)))
+    fn of(texel: &Material<f32>, known: &TexelVariance) -> Option<Sample> {
+        let Material { specular, log_width, .. } = known.variance;
+        let is_known = known.is_solved()
+            && log_width > 0.0
+            && log_width.sqrt() <= KNOWN_LOG_WIDTH
+            && (0..3).all(|c| specular[c].sqrt() <= KNOWN_SPECULAR.0 * texel.specular[c] + KNOWN_SPECULAR.1);
+        let texel = texel.map(f64::from);
+        is_known.then(|| Sample::new(texel.specular, texel.log_width, texel.diffuse))
     }
 
     /// Squared distance in units of a cluster's size.
@@ -199,12 +200,14 @@ pub(super) mod tests {
         let mut estimate = Estimate::start(32, &light, 1);
         for texel in 0..32 * 32 {
             let wobble = 0.01 * ((texel * 7 % 11) as f32 - 5.0) / 5.0;
-            let known = [0.01, 0.01, 0.01, 1e-4, 1e-4, 1e-4, 0.01, 1.0];
-            match texel % 4 {
-                0 => estimate.set(texel, [0.05; 3], [0.8 + wobble, 0.5, 0.3], -0.7 + wobble, known),
-                1 | 2 => estimate.set(texel, [0.1 * (texel % 7) as f32; 3], [0.05 + 0.2 * wobble; 3], -1.2, known),
-                _ => estimate.set(texel, [0.5; 3], [0.3; 3], -0.3, [0.01, 0.01, 0.01, 0.09, 0.09, 0.09, 0.5, 1.0]),
-            }
+            let material = |diffuse, specular, log_width| Material { diffuse, specular, log_width };
+            let (own, variance) = match texel % 4 {
+                0 => (material([0.05; 3], [0.8 + wobble, 0.5, 0.3], -0.7 + wobble), [1e-4, 0.01]),
+                1 | 2 => (material([0.1 * (texel % 7) as f32; 3], [0.05 + 0.2 * wobble; 3], -1.2), [1e-4, 0.01]),
+                _ => (material([0.5; 3], [0.3; 3], -0.3), [0.09, 0.5]),
+            };
+            let variance = material([0.01; 3], [variance[0]; 3], variance[1]);
+            estimate.set(texel, own, TexelVariance { variance, lobe_cluster_size: 1.0 });
         }
         estimate
     }

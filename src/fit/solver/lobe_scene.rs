@@ -53,12 +53,13 @@ impl SceneLobes {
     /// maps. `None` without any.
     pub(super) fn of(estimate: &Estimate) -> Option<Self> {
         let (mut widths, mut dielectrics) = (Moments::default(), Moments::default());
-        for (texel, variance) in estimate.texels.iter().zip(&estimate.variances).filter(|(_, own)| own[7] > 0.0) {
-            widths.add(f64::from(texel[6]), f64::from(variance[6]));
-            let mean = |of: &[f32; 8]| f64::from(of[3] + of[4] + of[5]) / 3.0;
-            let specular = mean(texel);
+        for (texel, variance) in estimate.texels.iter().zip(&estimate.variances).filter(|(_, own)| own.is_solved()) {
+            let variance = &variance.variance;
+            widths.add(f64::from(texel.log_width), f64::from(variance.log_width));
+            let mean = |[r, g, b]: [f32; 3]| f64::from(r + g + b) / 3.0;
+            let specular = mean(texel.specular);
             if specular < MOST_OF_DIELECTRIC {
-                dielectrics.add(specular, mean(variance));
+                dielectrics.add(specular, mean(variance.specular));
             }
         }
         let (mean, variance) = widths.mean()?;
@@ -127,9 +128,8 @@ mod tests {
         // Twice as bright, and every second one by a half more.
         for (texel, own) in estimate.texels.iter_mut().enumerate().filter(|(texel, _)| matches!(texel % 4, 1 | 2)) {
             let times = if texel % 4 == 1 { 2.0 } else { 3.0 };
-            (3..6).for_each(|k| own[k] *= times);
             // Some pass for no dielectric any more.
-            own[3..6].iter_mut().for_each(|value| *value = value.min(0.145));
+            own.specular = own.specular.map(|value| (value * times).min(0.145));
         }
         let (mean, deviation) = SceneLobes::of(&estimate).and_then(|own| own.dielectric).expect("half are dielectrics");
         assert!((mean - 0.1225).abs() < 5e-3 && (0.02..0.03).contains(&deviation), "{mean} {deviation}");
@@ -138,7 +138,7 @@ mod tests {
     #[test]
     fn a_scene_of_metals_has_no_dielectrics_to_learn_from() {
         let mut estimate = estimate();
-        estimate.texels.iter_mut().for_each(|own| own[3..6].fill(0.6));
+        estimate.texels.iter_mut().for_each(|own| own.specular = [0.6; 3]);
         let own = SceneLobes::of(&estimate).expect("maps were made");
         assert_eq!(own.dielectric, None);
         let any = &LobePrior::default().families[0];

@@ -5,7 +5,7 @@ use super::choice::apply::Undecided;
 use super::choice::check::Check;
 use super::diffuse::{self, Leaning};
 use super::diffuse_system::{DiffuseRow, DiffuseSystem};
-use super::estimate::Estimate;
+use super::estimate::{Estimate, TexelVariance};
 use super::lobe_families;
 use super::lobe_prior::LobePrior;
 use super::lobe_tails::TailSums;
@@ -16,6 +16,7 @@ use super::scene::SolverScene;
 use super::tile::{TILE, Tile};
 use crate::atlas::{dilate, nearest_covered};
 use crate::image::Image;
+use crate::material::Material;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -99,15 +100,18 @@ impl SolverScene {
         }
         let mut errors = self.solve_diffuse(&rows, &mut rho, stop)?;
 
-        estimate.variances.fill([0.0; 8]);
+        estimate.variances.fill(TexelVariance::default());
         for tile in &made {
             for (index, &texel) in tile.texels.iter().enumerate() {
-                let (lobe, [a, b, c]) = (&tile.lobes[index], tile.variance[index]);
-                let [d, e, f, g] = lobe.square.map(|value| value as f32);
-                let specular = [0, 1, 2].map(|c| (lobe.mean[c] as f32).clamp(0.0, 1.0));
-                let texel = texel as usize;
-                let shared = (lobe.shared as f32).max(1.0);
-                estimate.set(texel, rho[texel], specular, lobe.mean[3].min(0.0) as f32, [a, b, c, d, e, f, g, shared]);
+                let (lobe, texel) = (&tile.lobes[index], texel as usize);
+                let [r, g, b, log_width] = lobe.square.map(|value| value as f32);
+                let variance = Material { diffuse: tile.variance[index], specular: [r, g, b], log_width };
+                let own = Material {
+                    diffuse: rho[texel],
+                    specular: [0, 1, 2].map(|c| (lobe.mean[c] as f32).clamp(0.0, 1.0)),
+                    log_width: lobe.mean[3].min(0.0) as f32,
+                };
+                estimate.set(texel, own, TexelVariance { variance, lobe_cluster_size: lobe.shared as f32 });
             }
         }
         self.fill_from_neighbours(estimate);
@@ -209,7 +213,7 @@ impl SolverScene {
     /// Texels without observations take the values of the nearest that has some.
     pub(super) fn fill_from_neighbours(&self, estimate: &mut Estimate) {
         let size = self.settings.map_size;
-        let solved: Vec<bool> = estimate.variances.iter().map(|variance| variance[7] > 0.0).collect();
+        let solved: Vec<bool> = estimate.variances.iter().map(TexelVariance::is_solved).collect();
         if !solved.contains(&true) {
             return;
         }

@@ -77,7 +77,7 @@ pub mod transport_check;
 mod tests;
 
 pub use choice::Choices;
-pub use estimate::Estimate;
+pub use estimate::{Estimate, TexelVariance};
 pub use lobe_tails::LobeTails;
 pub use report::StepReport;
 pub use scene::SolverScene;

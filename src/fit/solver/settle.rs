@@ -1,8 +1,8 @@
 //! Light between surfaces, once more with the reflectances that were found.
 //!
 //! Maps are made under the light that surfaces sent each other when they began. Where that is most of the light, as in a
-//! deep bowl of plaster, maps that differ from those by little are lit differently by much: 13 % there, 1 to 2 % where
-//! things stand on a floor. So diffuse reflectances follow what arrives, and that follows them, until both stay.
+//! deep bowl of plaster, maps that differ from those by little are lit differently by much, ten times as much as
+//! where things stand on a floor. So diffuse reflectances follow what arrives, and that follows them, until both stay.
 
 use super::diffuse_system::DiffuseRow;
 use super::estimate::Estimate;
@@ -64,10 +64,12 @@ fn relative_change(before: &[[f32; 3]], now: &[[f32; 3]]) -> f64 {
 mod tests {
     use super::super::SolverSettings;
     use super::super::diffuse_system::DiffuseSystem;
+    use super::super::estimate::TexelVariance;
     use super::super::solver::Solver;
     use super::*;
     use crate::core_tests::hard_scenes::bowl_of_plaster;
     use crate::light::Environment;
+    use crate::material::Material;
     use crate::material::texels::texels_from_maps;
     use crate::render::Surface;
     use glam::Vec3;
@@ -90,7 +92,7 @@ mod tests {
         let planes = scene.transport.basis.planes(&estimate.light);
         let never = AtomicBool::new(false);
         estimate.texels = texels_from_maps(&truth.maps);
-        estimate.variances.fill([1.0; 8]);
+        estimate.variances.fill(TexelVariance { variance: Material::from_array([1.0; 7]), lobe_cluster_size: 1.0 });
         let real = scene.point_light(&estimate, &planes).arriving;
 
         // What pixels show of the truth, taken for lit by a bowl that is less white.
@@ -104,7 +106,7 @@ mod tests {
         let mut rho = estimate.diffuse();
         let shown = DiffuseSystem::new(&scene.footprints, &scene.observations, &rows, SIZE).models(&rho);
         let mut darker = estimate.clone();
-        darker.texels.iter_mut().for_each(|texel| texel[..3].iter_mut().for_each(|value| *value *= 0.8));
+        darker.texels.iter_mut().for_each(|texel| texel.diffuse = texel.diffuse.map(|value| value * 0.8));
         let at_points = scene.point_light(&darker, &planes);
         let mut rows: Vec<DiffuseRow> = (0..count).map(|index| row(&at_points.arriving, index)).collect();
         rows.iter_mut().zip(&shown).for_each(|(row, shown)| row.radiance = *shown);

@@ -5,12 +5,12 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::fit::loss::ViewLoss;
 use crate::fit::targets::Target;
 use crate::light::EnvironmentSampler;
-use crate::material::texels::{PyramidWeights, TexelPyramid};
+use crate::material::texels::PyramidWeights;
 use crate::math::evenly_spread;
 use crate::math::real::Real;
 use crate::render::accumulate::{PassKey, PixelLoss, accumulate, sum_pixel, trace_pixel};
 use crate::render::first_hits::{CameraRays, PixelFilter};
-use crate::render::{Parameters, PathArena, PathSettings, PathTracer, Surface};
+use crate::render::{ParameterGradient, Parameters, PathArena, PathSettings, PathTracer, Surface};
 use crate::scene::{Background, Mesh, Scene};
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
@@ -177,7 +177,7 @@ impl<'a> Bench<'a> {
         &self,
         view: usize,
         parameters: &Parameters<R>,
-        gradient: &mut Parameters<R>,
+        gradient: &mut ParameterGradient<R>,
         stop: &AtomicBool,
     ) {
         let (tracer, rays, loss) = (self.tracer(view), self.rays(view), self.loss(view));
@@ -185,11 +185,7 @@ impl<'a> Bench<'a> {
     }
 
     /// A gradient of zeros on all levels.
-    pub fn zeros<R: Real>(&self) -> Parameters<R> {
-        Parameters {
-            texels: TexelPyramid::zeros(self.weights),
-            light: vec![[R::zero(); 3]; self.parameters.light.len()],
-            environment_size: self.parameters.environment_size,
-        }
+    pub fn zeros<R: Real>(&self) -> ParameterGradient<R> {
+        ParameterGradient::zeros(self.weights, self.parameters.light.len())
     }
 }

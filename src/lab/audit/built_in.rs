@@ -66,10 +66,10 @@ pub fn built_in(settings: &AuditSettings) -> Result<BuiltIn> {
     let mut random = SequentialRandom::new(settings.seed ^ 0xb111);
     let mut factor = || 0.7 + 0.6 * random.next_number();
     for texel in &mut parameters.texels.levels[0].texels {
-        for value in &mut texel[..6] {
+        for value in texel.diffuse.iter_mut().chain(&mut texel.specular) {
             *value = (*value * factor()).clamp(0.0, 1.0);
         }
-        texel[6] = (texel[6] + factor() - 1.0).clamp(MIN_WIDTH.ln(), 0.0);
+        texel.log_width = (texel.log_width + factor() - 1.0).clamp(MIN_WIDTH.ln(), 0.0);
     }
     parameters.texels.rebuild(&weights);
     for value in parameters.light.iter_mut().flatten() {

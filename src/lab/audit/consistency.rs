@@ -13,9 +13,9 @@ use crate::fit::consistency::{Agreement, ViewGradient};
 use crate::fit::loss::ViewLoss;
 use crate::material::texels::TexelPyramid;
 use crate::math::real::{Dual, Real};
-use crate::render::Parameters;
 use crate::render::accumulate::{PixelLoss, sum_pixel};
 use crate::render::sums::radiance_backward;
+use crate::render::{ParameterGradient, Parameters};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -28,7 +28,7 @@ pub fn differences(
     among: &[Parameter],
     stop: &AtomicBool,
 ) -> Vec<Difference> {
-    let raw: Vec<Parameters<f64>> = (0..bench.view_count())
+    let raw: Vec<ParameterGradient<f64>> = (0..bench.view_count())
         .map(|view| {
             let mut gradient = bench.zeros();
             bench.reverse(view, parameters, &mut gradient, stop);
@@ -73,8 +73,8 @@ pub fn differences(
                 parameter,
                 places: readers.places(parameter, &own, bench.weights),
                 difference,
-                precise: parameter.value(&precise),
-                single: parameter.value(&single),
+                precise: parameter.derivative(&precise),
+                single: parameter.derivative(&single),
             }
         };
         batch.iter().map(difference).collect::<Vec<_>>()
@@ -89,8 +89,8 @@ fn gradient_of_value<R: Real>(
     directions: &[Vec<(u32, [f64; 3])>],
     round: impl Fn(f64) -> R,
     stop: &AtomicBool,
-) -> Parameters<R> {
-    let mut total: Parameters<R> = bench.zeros();
+) -> ParameterGradient<R> {
+    let mut total: ParameterGradient<R> = bench.zeros();
     for (view, direction) in directions.iter().enumerate() {
         // A direction of unit size keeps the tangents of f32 in range, as in a fit.
         let size = direction.iter().flat_map(|(_, v)| v).fold(0.0f64, |size, value| size.max(value.abs()));
@@ -101,7 +101,7 @@ fn gradient_of_value<R: Real>(
         let mut base: Vec<_> = parameters.texels.levels[0].texels.iter().map(|texel| texel.map(lift)).collect();
         for (index, v) in direction {
             for channel in 0..3 {
-                base[*index as usize][channel].tangent = round(v[channel] / size);
+                base[*index as usize].diffuse[channel].tangent = round(v[channel] / size);
             }
         }
         let dual = Parameters {
@@ -109,13 +109,13 @@ fn gradient_of_value<R: Real>(
             light: parameters.light.iter().map(|radiance| radiance.map(lift)).collect(),
             environment_size: parameters.environment_size,
         };
-        let mut d_dual: Parameters<Dual<R>> = bench.zeros();
+        let mut d_dual: ParameterGradient<Dual<R>> = bench.zeros();
         bench.reverse(view, &dual, &mut d_dual, stop);
         d_dual.texels.pull_down(bench.weights);
         let size = round(size);
         let texels = total.texels.levels[0].texels.iter_mut().zip(&d_dual.texels.levels[0].texels);
-        for (total, d) in texels.flat_map(|(total, d)| total.iter_mut().zip(d)) {
-            *total += d.tangent * size;
+        for (total, d) in texels {
+            total.d_material.add_scaled(&d.d_material.map(|d| d.tangent), size);
         }
         for (total, d) in total.light.iter_mut().zip(&d_dual.light).flat_map(|(total, d)| total.iter_mut().zip(d)) {
             *total += d.tangent * size;
@@ -131,7 +131,7 @@ fn add_gradient(
     record: &PixelRecord,
     parameters: &Parameters<f64>,
     sign: f64,
-    gradient: &mut Parameters<f64>,
+    gradient: &mut ParameterGradient<f64>,
 ) {
     let estimate = sum_pixel(parameters, &record.arena, bench.lobe_strength());
     let Some(derivative) = losses[record.view].at(record.pixel, &estimate) else { return };
@@ -150,7 +150,7 @@ fn add_gradient(
     }
 }
 
-fn pulled(bench: &Bench<'_>, raw: &Parameters<f64>) -> ViewGradient<f64> {
+fn pulled(bench: &Bench<'_>, raw: &ParameterGradient<f64>) -> ViewGradient<f64> {
     let mut texels = raw.texels.clone();
     texels.pull_down(bench.weights);
     ViewGradient::collect(&texels.levels[0].texels)

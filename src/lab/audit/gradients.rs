@@ -9,7 +9,7 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::material::texels::PyramidWeights;
 use crate::math::random::SequentialRandom;
 use crate::math::real::Real;
-use crate::render::{Parameters, Surface};
+use crate::render::{ParameterGradient, Parameters, Surface};
 use crate::scene::Scene;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -61,8 +61,8 @@ pub fn gradients(
             parameter,
             places: readers.places(parameter, &readers.of(parameter, weights), weights),
             difference,
-            precise: parameter.value(&reverse_f64),
-            single: parameter.value(&reverse_f32.convert(f64::from)),
+            precise: parameter.derivative(&reverse_f64),
+            single: parameter.derivative(&reverse_f32.convert(f64::from)),
         })
         .collect();
     let mut report = AuditReport {
@@ -88,7 +88,7 @@ pub fn gradients(
 }
 
 /// The gradient of the summed loss of all views, on the base level, as a fit computes it.
-fn reverse_of_all<R: Real>(bench: &Bench<'_>, parameters: &Parameters<R>, stop: &AtomicBool) -> Parameters<R> {
+fn reverse_of_all<R: Real>(bench: &Bench<'_>, parameters: &Parameters<R>, stop: &AtomicBool) -> ParameterGradient<R> {
     let mut gradient = bench.zeros();
     for view in 0..bench.view_count() {
         bench.reverse(view, parameters, &mut gradient, stop);
@@ -199,8 +199,8 @@ fn paths_by_hits(records: &[PixelRecord]) -> Vec<usize> {
 }
 
 /// Parameters that no path reads and whose derivative is not exactly zero: must be none.
-fn unread_with_derivative(readers: &Readers, gradient: &Parameters<f64>, weights: &PyramidWeights) -> usize {
+fn unread_with_derivative(readers: &Readers, gradient: &ParameterGradient<f64>, weights: &PyramidWeights) -> usize {
     all_parameters(gradient.texels.levels[0].texels.len(), gradient.light.len())
-        .filter(|&parameter| parameter.value(gradient) != 0.0 && readers.of(parameter, weights).is_empty())
+        .filter(|&parameter| parameter.derivative(gradient) != 0.0 && readers.of(parameter, weights).is_empty())
         .count()
 }

@@ -1,9 +1,10 @@
 //! Which pixels read which parameter, and what is special about it.
 
 use super::bench::PixelRecord;
+use crate::material::Material;
 use crate::material::texels::PyramidWeights;
 use crate::math::sphere::BilinearTap;
-use crate::render::Parameters;
+use crate::render::{ParameterGradient, Parameters};
 
 /// One number that is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -42,8 +43,16 @@ impl Parameter {
     /// Its value.
     pub fn value(self, parameters: &Parameters<f64>) -> f64 {
         match self {
-            Parameter::Texel { index, number } => parameters.texels.levels[0].texels[index][number],
+            Parameter::Texel { index, number } => parameters.texels.levels[0].texels[index].to_array()[number],
             Parameter::Light { index, channel } => parameters.light[index][channel],
+        }
+    }
+
+    /// The derivative by it.
+    pub fn derivative(self, gradient: &ParameterGradient<f64>) -> f64 {
+        match self {
+            Parameter::Texel { index, number } => gradient.texels.levels[0].texels[index].d_material.to_array()[number],
+            Parameter::Light { index, channel } => gradient.light[index][channel],
         }
     }
 
@@ -51,7 +60,10 @@ impl Parameter {
     pub fn set(self, value: f64, parameters: &mut Parameters<f64>, weights: &PyramidWeights) {
         match self {
             Parameter::Texel { index, number } => {
-                parameters.texels.levels[0].texels[index][number] = value;
+                let texel = &mut parameters.texels.levels[0].texels[index];
+                let mut numbers = texel.to_array();
+                numbers[number] = value;
+                *texel = Material::from_array(numbers);
                 parameters.texels.rebuild_above(weights, index);
             }
             Parameter::Light { index, channel } => parameters.light[index][channel] = value,

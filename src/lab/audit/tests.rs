@@ -1,6 +1,6 @@
 use super::report::AuditReport;
 use super::*;
-use crate::math::real::Real;
+use crate::material::Material;
 use crate::render::Parameters;
 
 #[test]
@@ -22,8 +22,8 @@ fn a_wrong_derivative_is_found_and_named() {
     };
     let weights = crate::material::texels::PyramidWeights::flat(8, 8);
     let parameters = Parameters {
-        texels: crate::material::TexelPyramid::<f32>::zeros(&weights),
-        light: vec![[f32::zero(); 3]; 64],
+        texels: crate::material::TexelPyramid::from_base(vec![Material::default(); 64], &weights),
+        light: vec![[0.0; 3]; 64],
         environment_size: (16, 4),
     };
     let report = |factor: f64| {

@@ -2,11 +2,12 @@
 
 use crate::image::RgbImage;
 use crate::light::EnvironmentSampler;
+use crate::material::GradientPyramid;
 use crate::render::accumulate::{PassKey, PixelDerivative, PixelEstimate, PixelLoss, accumulate};
 use crate::render::first_hits::{CameraRays, PixelFilter};
 use crate::render::path::{PathSettings, PathTracer};
 use crate::render::picture::{PictureSettings, render};
-use crate::render::{Parameters, Surface};
+use crate::render::{ParameterGradient, Parameters, Surface};
 use crate::scene::{Background, Scene};
 use std::sync::atomic::AtomicBool;
 
@@ -62,7 +63,10 @@ impl Workload<'_> {
     /// The gradient of a squared error in all views by all maps and the light; how many pixels took part.
     pub fn gradients(&self) -> usize {
         let sampler = EnvironmentSampler::new(&self.lit.environment());
-        let mut gradient = self.lit.convert(|_| 0.0f32);
+        let mut gradient = ParameterGradient {
+            texels: GradientPyramid::zeros_by(&self.lit.texels),
+            light: vec![[0.0; 3]; self.lit.light.len()],
+        };
         let stop = AtomicBool::new(false);
         let mut done = 0;
         for &view in self.views {

@@ -1,9 +1,11 @@
 use super::*;
+use crate::material::{GradientPyramid, TexelGradient};
 use crate::math::random::SequentialRandom;
 
-fn random_texels(count: usize, seed: u64) -> Vec<Texel<f64>> {
+fn random_texels(count: usize, seed: u64) -> Vec<Material<f64>> {
     let mut random = SequentialRandom::new(seed);
-    (0..count).map(|_| std::array::from_fn(|_| f64::from(random.next_number()) - 0.4)).collect()
+    let mut number = || f64::from(random.next_number()) - 0.4;
+    (0..count).map(|_| Material::from_array(std::array::from_fn(|_| number()))).collect()
 }
 
 #[test]
@@ -13,12 +15,14 @@ fn pulling_down_is_the_transpose_of_building() {
     assert_eq!(weights.level_count(), 4);
     let base = random_texels(128, 1);
     let built = TexelPyramid::from_base(base.clone(), &weights);
-    let mut probe = TexelPyramid::<f64>::zeros(&weights);
+    let mut probe = GradientPyramid::<f64>::zeros(&weights);
     for (level, texels) in probe.levels.iter_mut().enumerate() {
-        texels.texels = random_texels(texels.texels.len(), 10 + level as u64);
+        let random = random_texels(texels.texels.len(), 10 + level as u64);
+        texels.texels = random.into_iter().map(|d_material| TexelGradient { d_material, evidence: 1.0 }).collect();
     }
-    let dot = |a: &[Texel<f64>], b: &[Texel<f64>]| -> f64 {
-        a.iter().zip(b).flat_map(|(a, b)| (0..7).map(move |number| a[number] * b[number])).sum()
+    let dot = |a: &[Material<f64>], b: &[TexelGradient<f64>]| -> f64 {
+        let pairs = a.iter().zip(b).map(|(a, b)| (a.to_array(), b.d_material.to_array()));
+        pairs.flat_map(|(a, b)| (0..7).map(move |number| a[number] * b[number])).sum()
     };
     let forward: f64 = built.levels.iter().zip(&probe.levels).map(|(a, b)| dot(&a.texels, &b.texels)).sum();
     probe.pull_down(&weights);
@@ -33,8 +37,8 @@ fn one_changed_texel_rebuilds_like_all() {
     let mut base = random_texels(128, 2);
     let mut one = TexelPyramid::from_base(base.clone(), &weights);
     for index in [0, 17, 63, 127] {
-        base[index] = [3.0; 8];
-        one.levels[0].texels[index] = [3.0; 8];
+        base[index] = Material::from_array([3.0; 7]);
+        one.levels[0].texels[index] = Material::from_array([3.0; 7]);
         one.rebuild_above(&weights, index);
         assert_eq!(one, TexelPyramid::from_base(base.clone(), &weights));
     }
@@ -44,10 +48,10 @@ fn one_changed_texel_rebuilds_like_all() {
 fn uncovered_texels_do_not_leak_into_coarse_levels() {
     let covered = Image::from_fn(8, 8, |_, column| column < 5);
     let weights = PyramidWeights::new(&covered, 3);
-    let texels = (0..64).map(|index| if index % 8 < 5 { [1.0f32; 8] } else { [100.0; 8] }).collect();
+    let texels = (0..64).map(|index| Material::from_array([if index % 8 < 5 { 1.0f32 } else { 100.0 }; 7])).collect();
     let pyramid = TexelPyramid::from_base(texels, &weights);
-    assert!((pyramid.levels[1].texels[2][0] - 1.0).abs() < 1e-6, "the parent across the border");
-    assert!((pyramid.levels[2].texels[1][3] - 1.0).abs() < 1e-6);
+    assert!((pyramid.levels[1].texels[2].diffuse[0] - 1.0).abs() < 1e-6, "the parent across the border");
+    assert!((pyramid.levels[2].texels[1].specular[0] - 1.0).abs() < 1e-6);
 }
 
 #[test]

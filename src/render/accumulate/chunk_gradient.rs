@@ -1,16 +1,15 @@
 //! The gradients that one chunk of pixels adds up, in a small table of its own.
 
-use crate::material::texels::Texel;
-use crate::material::{Material, TextureTap};
+use crate::material::{Material, TexelGradient, TextureTap};
 use crate::math::real::Real;
 use crate::math::sphere::BilinearTap;
-use crate::render::sums::{GradientSink, Parameters, add_weighted};
+use crate::render::sums::{GradientSink, ParameterGradient};
 
 /// Gradients of one chunk: an open-addressing table of texels and a dense light.
 pub(super) struct ChunkGradient<R> {
     /// `level << 28 | index`, or `EMPTY`.
     keys: Vec<u32>,
-    texels: Vec<Texel<R>>,
+    texels: Vec<TexelGradient<R>>,
     used: usize,
     light: Vec<[R; 3]>,
 }
@@ -22,14 +21,14 @@ impl<R: Real> ChunkGradient<R> {
     pub(super) fn new(light_texels: usize) -> Self {
         ChunkGradient {
             keys: vec![EMPTY; 1 << 13],
-            texels: vec![[R::zero(); 8]; 1 << 13],
+            texels: vec![TexelGradient::default(); 1 << 13],
             used: 0,
             light: vec![[R::zero(); 3]; light_texels],
         }
     }
 
     #[inline(always)]
-    fn texel(&mut self, key: u32) -> &mut Texel<R> {
+    fn texel(&mut self, key: u32) -> &mut TexelGradient<R> {
         let mask = self.keys.len() - 1;
         let mut slot = (key.wrapping_mul(0x9e37_79b1) >> 7) as usize & mask;
         loop {
@@ -55,7 +54,7 @@ impl<R: Real> ChunkGradient<R> {
         let keys = std::mem::take(&mut self.keys);
         let texels = std::mem::take(&mut self.texels);
         self.keys = vec![EMPTY; keys.len() * 2];
-        self.texels = vec![[R::zero(); 8]; keys.len() * 2];
+        self.texels = vec![TexelGradient::default(); keys.len() * 2];
         self.used = 0;
         for (key, texel) in keys.into_iter().zip(texels) {
             if key != EMPTY {
@@ -64,14 +63,13 @@ impl<R: Real> ChunkGradient<R> {
         }
     }
 
-    pub(super) fn add_to(&self, gradient: &mut Parameters<R>) {
+    pub(super) fn add_to(&self, gradient: &mut ParameterGradient<R>) {
         for (&key, texel) in self.keys.iter().zip(&self.texels) {
             if key != EMPTY {
                 let level = &mut gradient.texels.levels[(key >> LEVEL_SHIFT) as usize];
                 let total = &mut level.texels[(key & ((1 << LEVEL_SHIFT) - 1)) as usize];
-                for (total, &value) in total.iter_mut().zip(texel) {
-                    *total += value;
-                }
+                total.d_material.add(&texel.d_material);
+                total.evidence += texel.evidence;
             }
         }
         for (total, light) in gradient.light.iter_mut().zip(&self.light) {
@@ -85,9 +83,8 @@ impl<R: Real> ChunkGradient<R> {
 impl<R: Real> GradientSink<R> for ChunkGradient<R> {
     #[inline(always)]
     fn add_material(&mut self, tap: &TextureTap, d_material: &Material<R>) {
-        let d = d_material.to_array();
         for k in 0..4 {
-            add_weighted(self.texel(tap.level << LEVEL_SHIFT | tap.index[k]), &d, tap.weight[k]);
+            self.texel(tap.level << LEVEL_SHIFT | tap.index[k]).add_weighted(d_material, tap.weight[k]);
         }
     }
 

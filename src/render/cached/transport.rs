@@ -11,7 +11,7 @@ use super::points::VisibilityGrid;
 use super::seen_light::SeenLight;
 use super::surroundings::Surroundings;
 use super::visibility::Visibility;
-use crate::material::texels::Texel;
+use crate::material::Material;
 use crate::render::Surface;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -161,21 +161,19 @@ impl CachedTransport {
     }
 
     /// What points send back of light from everywhere: diffuse reflectance, and the lobe's as if it were diffuse too.
-    pub fn reflectance_of_points(&self, texels: &[Texel<f32>], map_size: usize) -> Vec<[f32; 3]> {
+    pub fn reflectance_of_points(&self, texels: &[Material<f32>], map_size: usize) -> Vec<[f32; 3]> {
         self.grid
             .points
             .par_iter()
             .map(|point| {
                 let tap = crate::material::TextureTap::at(point.uv, 0, map_size, map_size);
-                let mut mean = [0.0f32; 7];
+                let mut mean = Material::default();
                 for k in 0..4 {
-                    for (sum, value) in mean.iter_mut().zip(&texels[tap.index[k] as usize]) {
-                        *sum += value * tap.weight[k];
-                    }
+                    mean.add_scaled(&texels[tap.index[k] as usize], tap.weight[k]);
                 }
-                let [base, grazing] = self.lobe_albedo_at(mean[6]);
+                let [base, grazing] = self.lobe_albedo_at(mean.log_width);
                 let strength = self.settings.lobe_strength;
-                [0, 1, 2].map(|c| mean[c] + strength * (mean[3 + c] * base + grazing))
+                [0, 1, 2].map(|c| mean.diffuse[c] + strength * (mean.specular[c] * base + grazing))
             })
             .collect()
     }
@@ -284,21 +282,19 @@ impl CachedTransport {
 
     /// Mean over a shading point's texels.
     #[inline]
-    pub fn material_of(footprints: &ViewFootprints, point: &ShadingPoint, texels: &[Texel<f32>]) -> [f32; 7] {
-        let mut mean = [0.0f32; 7];
+    pub fn material_of(footprints: &ViewFootprints, point: &ShadingPoint, texels: &[Material<f32>]) -> [f32; 7] {
+        let mut mean = Material::default();
         for &(texel, weight) in footprints.texels_of(point) {
-            for (sum, value) in mean.iter_mut().zip(&texels[texel as usize]) {
-                *sum += value * weight;
-            }
+            mean.add_scaled(&texels[texel as usize], weight);
         }
-        mean
+        mean.to_array()
     }
 
     /// A picture of a view in linear radiance, row-major. The background is black.
     pub fn picture(
         &self,
         footprints: &ViewFootprints,
-        texels: &[Texel<f32>],
+        texels: &[Material<f32>],
         light: &LightPlanes,
         at: &PointLight,
     ) -> Vec<[f32; 3]> {

@@ -14,7 +14,7 @@ use patina::job::prepare::Prepared;
 use patina::job::{JobHandle, JobOptions, RunSettings, start_with};
 use patina::light::Environment;
 use patina::material::Material;
-use patina::material::texels::{PyramidWeights, Texel, TexelPyramid};
+use patina::material::texels::{PyramidWeights, TexelPyramid};
 use patina::render::picture::{PictureSettings, render};
 use patina::render::{Parameters, Surface};
 use patina::scene::synthetic::layout::{PartChart, lay_out};
@@ -93,17 +93,11 @@ pub fn sky() -> Environment {
     Environment { radiance }
 }
 
-/// A texel of a material.
-pub fn texel(material: Material<f32>) -> Texel<f32> {
-    let [a, b, c, d, e, f, g] = material.to_array();
-    [a, b, c, d, e, f, g, 0.0]
-}
-
 impl Trial {
     /// The truth, as one texel in all places and the light.
     pub fn truth(&self) -> Parameters<f32> {
         let weights = PyramidWeights::flat(1, 1);
-        let texels = TexelPyramid::from_base(vec![texel(self.material)], &weights);
+        let texels = TexelPyramid::from_base(vec![self.material], &weights);
         Parameters::new(texels, &self.light)
     }
 
@@ -201,14 +195,15 @@ pub fn run(fitter: &mut Fitter) -> Result<()> {
 pub fn assert_sound(state: &FitState) {
     let step = state.step;
     for (index, texel) in state.texels.iter().enumerate() {
-        assert!(texel[..6].iter().all(|value| (0.0..=1.0).contains(value)), "step {step}, texel {index}: {texel:?}");
-        assert!((-6.0..=0.0).contains(&texel[6]), "step {step}, texel {index}: width {}", texel[6]);
+        let colours = [texel.diffuse, texel.specular].concat();
+        assert!(colours.iter().all(|value| (0.0..=1.0).contains(value)), "step {step}, texel {index}: {texel:?}");
+        assert!((-6.0..=0.0).contains(&texel.log_width), "step {step}, texel {index}: {texel:?}");
     }
     for (index, light) in state.light.iter().enumerate() {
         assert!(light.iter().all(|value| value.is_finite() && *value >= 0.0), "step {step}, light {index}: {light:?}");
     }
     for moments in [&state.moments, &state.light_moments, &state.gain_moments] {
-        let mut numbers = moments.first.iter().chain(&moments.second).flatten();
+        let mut numbers = moments.first.iter().chain(&moments.second).flatten().chain(&moments.updates);
         assert!(numbers.all(|value| value.is_finite()), "step {step}: a moment is not finite");
     }
     assert!(state.log_gains.iter().all(|gain| gain.is_finite()), "step {step}: {:?}", state.log_gains);
@@ -237,7 +232,7 @@ pub fn without_seconds(state: &FitState) -> FitState {
 
 /// Mean of a number over all texels.
 pub fn mean_of(state: &FitState, number: usize) -> f32 {
-    state.texels.iter().map(|texel| texel[number]).sum::<f32>() / state.texels.len() as f32
+    state.texels.iter().map(|texel| texel.to_array()[number]).sum::<f32>() / state.texels.len() as f32
 }
 
 /// Mean over all texels and channels of the light, not weighed by solid angle.
