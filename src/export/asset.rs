@@ -111,6 +111,8 @@ pub const GRAZING_OF_VIEWS: f32 = 1.0 / 21.0;
 /// The least largest F0 that an index is chosen for: the default dielectric of every renderer.
 const LEAST_F0: f32 = 0.04;
 
+/// The largest F0 of paint and plastic in the metalness workflow of Unreal and others: "specular" 1.
+pub const LARGEST_SPECULAR: f32 = 0.08;
 /// F0 above which a texel speaks for metals: no common dielectric but gems reflects so much.
 const METAL_F0: f32 = 0.16;
 
@@ -232,7 +234,7 @@ impl Asset {
     pub fn metals(&self) -> Option<MetalSplit> {
         let brightest = || self.maps.specular.pixels().iter().filter(|f0| f0.max_element() > METAL_F0).count();
         let has_metals = self.has_lobe && brightest() * 1000 > self.maps.specular.pixels().len();
-        has_metals.then(|| self.metal_split(DielectricRange::UpTo(super::texture_set::LARGEST_SPECULAR)))
+        has_metals.then(|| self.metal_split(DielectricRange::UpTo(LARGEST_SPECULAR)))
     }
 
     /// A quantile of the luminance of F0, in [0, 1].

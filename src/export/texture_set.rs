@@ -1,13 +1,10 @@
 //! Maps alone, named as artists name them, in both workflows: base colour with metalness, and diffuse with specular.
 
-use super::asset::{Asset, DielectricRange, MetalSplit};
+use super::asset::{Asset, DielectricRange, LARGEST_SPECULAR, MetalSplit};
 use super::environment_file::write_both;
 use super::texture::{Curve, Texture, TextureFormat};
 use crate::error::Result;
 use std::path::Path;
-
-/// The largest F0 of paint and plastic in the metalness workflow of Unreal and others: "specular" 1.
-pub const LARGEST_SPECULAR: f32 = 0.08;
 
 /// Writes the set, the mesh and the environment into a folder; gives what base colour and metalness lost.
 ///

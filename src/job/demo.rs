@@ -74,7 +74,7 @@ pub fn photograph(
     progress: &dyn Fn(f32),
 ) -> Result<()> {
     let Some(truth) = scene.truth.clone() else {
-        return Err(Error::new(ErrorKind::Internal, "a scene without truth cannot be photographed"));
+        return Err(Error::new(ErrorKind::Internal, "a scene without ground truth cannot be photographed"));
     };
     let surface = Surface::new(scene.mesh.clone())?;
     let lit = parameters(&truth.maps, &truth.environment);
@@ -86,7 +86,7 @@ pub fn photograph(
         seed: seed ^ 0xf0f0_1234,
         ..Default::default()
     };
-    let stopped = || Error::new(ErrorKind::Stopped, "stopped while photographs were rendered");
+    let stopped = || Error::new(ErrorKind::Stopped, "stopped while photos were rendered");
     let count = scene.views.len();
     for view in 0..count {
         let picture = render(&surface, &scene.views[view].camera, &lit, view as u32, &settings, stop);

@@ -14,7 +14,7 @@ use crate::export::{RunFolder, RunResult};
 use crate::fit::views::views_of;
 use crate::fit::{Fitter, ViewUse};
 use crate::image::{GreyImage, Image};
-use crate::insight::report::choices::ChoiceTable;
+use crate::insight::report::choice_table::ChoiceTable;
 use crate::insight::report::data::{NamedAggregate, ReportData, StageTime, ViewLine};
 use crate::insight::report::{ReportImages, write_report};
 use crate::insight::scores::aggregate;

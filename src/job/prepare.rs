@@ -1,14 +1,15 @@
 //! From a scene folder to something a fit can start on.
 
-use super::open::{OpenStage, Tell, open_scene, told};
+use super::stages::{OpenStage, Tell, told};
 use crate::atlas::{self, AtlasQuality, AtlasSettings, covered_texels};
 use crate::error::{Finding, Result};
+use crate::export::RunFolder;
 use crate::fit::FitSettings;
 use crate::insight::report::data::StageTime;
 use crate::render::Surface;
 use crate::scene::{ReadSettings, Scene};
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -51,14 +52,6 @@ pub fn timed<T>(timings: &mut Vec<StageTime>, stage: &str, work: impl FnOnce() -
     result
 }
 
-/// Reads and checks a scene. A finding that is fatal is an error: nothing starts a long fit on a scene that cannot work.
-pub fn read_scene(path: &Path, settings: &ReadSettings, timings: &mut Vec<StageTime>) -> Result<(Scene, Vec<Finding>)> {
-    let opened = open_scene(path, settings, &AtomicBool::new(false), &|_, _| {})?;
-    opened.refuse_fatal()?;
-    timings.extend(opened.timings);
-    Ok((opened.scene, opened.report.findings))
-}
-
 /// Makes the atlas and the surface of a checked scene.
 pub fn prepare(
     scene: Scene,
@@ -94,6 +87,11 @@ pub fn prepare_with(
     let mesh = atlas.mesh;
     let surface = told(OpenStage::Tracer, stop, tell, || timed(&mut timings, "tracer", || Surface::new(mesh)))?;
     Ok(Prepared { scene, surface: Arc::new(surface), quality: Some(atlas.quality), findings, timings })
+}
+
+/// The surface with the atlas of a run.
+pub(super) fn surface_of(folder: &RunFolder) -> Result<Surface> {
+    Surface::new(crate::export::obj::read(&folder.file("mesh.obj"))?)
 }
 
 /// Texels of a chart, at a size.

@@ -1,8 +1,9 @@
 //! A run to look at, finished or not.
 
-use super::open::{OpenStage, Tell, open_scene_of, surface_of, told};
-use super::prepare::RunSettings;
+use super::opened_scene::open_scene_of;
+use super::prepare::{RunSettings, surface_of};
 use super::solver_told::SolverTold;
+use super::stages::{OpenStage, Tell, told};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::export::RunFolder;
 use crate::fit::{LossRow, Method, checkpoint};
@@ -104,7 +105,7 @@ pub fn view_run(folder: &RunFolder, moved_scene: Option<&Path>, stop: &AtomicBoo
         Err(error) => {
             findings.push(
                 finding_of("scene-not-opened", &error)
-                    .remedy("say where the scene is now; the maps and the light can be looked at without it"),
+                    .remedy("give the new path of the scene; maps and environment can be viewed without it"),
             );
             None
         }
@@ -136,7 +137,7 @@ fn open_scene_to_view(settings: &RunSettings, stop: &AtomicBool, tell: Tell) -> 
 fn light_of(light: &[[f32; 3]], path: &Path) -> Result<Environment> {
     let height = (light.len() / 2).isqrt();
     if height == 0 || 2 * height * height != light.len() {
-        return Err(Error::new(ErrorKind::Malformed, "the light of the checkpoint is not twice as wide as high")
+        return Err(Error::new(ErrorKind::Malformed, "the environment in the checkpoint is not twice as wide as high")
             .at(Place::File(path.into()))
             .remedy("the file is damaged: start the run again, or copy the checkpoint anew"));
     }

@@ -4,15 +4,21 @@
 //! random ray is least, after Ylitie, Karras and Laine 2017 ("Efficient incoherent ray traversal on GPUs through
 //! compressed wide BVHs"), section 3.1.
 
-use super::binary::{BinaryTree, Content};
+use super::binary::{self, BinaryTree, Content};
 use super::prepare::{Prepared, PreparedTriangle};
-use super::wide::{BLOCK, LANES, TriangleBlock, WIDTH, WideNode, WideTree};
+use super::wide::{BLOCK, DEPTH_MAX, LANES, TriangleBlock, WIDTH, WideNode, WideTree};
 use glam::Vec3;
 
 /// Cost of testing the eight boxes of a node, relative to [`BLOCK_COST`].
 const NODE_COST: f64 = 1.0;
 /// Cost of testing a block of triangles.
 const BLOCK_COST: f64 = 1.0;
+
+/// Builds the tree.
+pub(super) fn build(prepared: &Prepared) -> WideTree {
+    let tree = collapse(prepared, &binary::by_surface_area(prepared));
+    if tree.depth <= DEPTH_MAX { tree } else { collapse(prepared, &binary::balanced(prepared)) }
+}
 
 /// What becomes of a binary subtree at least cost.
 #[derive(Clone, Copy)]
@@ -205,7 +211,7 @@ fn block_of(prepared: &Prepared, tree: &BinaryTree, source: u32) -> (TriangleBlo
 
 #[cfg(test)]
 mod tests {
-    use super::super::{binary, plain, prepare, query::Query, wide};
+    use super::super::{binary, plain, prepare, query::Query};
     use super::*;
     use crate::math::random::SequentialRandom;
     use crate::trace::Ray;
@@ -261,7 +267,7 @@ mod tests {
         let mut random = SequentialRandom::new(1);
         for count in [1, 2, 3, 8, 9, 100, 3000] {
             let prepared = prepared_soup(count, &mut random);
-            check(&prepared, &wide::build(&prepared));
+            check(&prepared, &build(&prepared));
             check(&prepared, &collapse(&prepared, &binary::balanced(&prepared)));
         }
     }
@@ -270,7 +276,7 @@ mod tests {
     fn hits_do_not_depend_on_the_tree() {
         let mut random = SequentialRandom::new(2);
         let prepared = prepared_soup(2000, &mut random);
-        let trees = [wide::build(&prepared), collapse(&prepared, &binary::balanced(&prepared))];
+        let trees = [build(&prepared), collapse(&prepared, &binary::balanced(&prepared))];
         for _ in 0..5000 {
             let ray = Ray { origin: point(&mut random), direction: point(&mut random), t_max: f32::INFINITY };
             let query = Query::new(&ray, 1.1).unwrap();

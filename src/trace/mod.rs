@@ -106,7 +106,7 @@ impl Bvh {
     /// when a triangle's vertex is not finite. The place is the first such triangle.
     pub fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Bvh> {
         let prepared = prepare::prepare(positions, triangles)?;
-        let tree = wide::build(&prepared);
+        let tree = collapse::build(&prepared);
         let bounds = prepared.bounds();
         let largest_coordinate = bounds.0.abs().max(bounds.1.abs()).max_element();
         Ok(Bvh {

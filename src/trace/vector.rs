@@ -37,7 +37,7 @@ pub(super) fn closest_hit(tree: &WideTree, ray: &Ray, largest_coordinate: f32) -
     let bottom = stack.as_mut_ptr().cast::<u64>();
     let mut top = bottom;
     let mut reference = 0;
-    // SAFETY: references are those that `wide::build` wrote. The tree is at most as deep as `STACK_SIZE` allows for:
+    // SAFETY: references are those that `collapse::build` wrote. The tree is at most as deep as `STACK_SIZE` allows for:
     // every level leaves seven keys, the last eight. Keys are read between `bottom` and `top` only, where they were
     // written.
     unsafe {
@@ -193,7 +193,7 @@ fn test_node(node: &WideNode, frame: &Frame, t_max: f32) -> (__m256, u32) {
 #[inline]
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 fn test_block<const ANY: bool>(tree: &WideTree, number: u32, frame: &Frame, best: &mut Best) -> bool {
-    // SAFETY: only numbers that `wide::build` wrote are asked for.
+    // SAFETY: only numbers that `collapse::build` wrote are asked for.
     let block: &TriangleBlock = unsafe { tree.blocks.get_unchecked(number as usize) };
     // SAFETY: `Frame` holds places of rows of points, each row is eight numbers, blocks are aligned to 64 bytes.
     let row =

@@ -1,8 +1,5 @@
 //! The tree that rays walk through: nodes of eight children and blocks of triangles.
 
-use super::prepare::Prepared;
-use super::{binary, collapse};
-
 /// Children of a node.
 pub(super) const WIDTH: usize = 8;
 /// Triangles of a block.
@@ -10,7 +7,7 @@ pub(super) const LANES: usize = 8;
 /// Marks a child that is a block; the other 31 bits are its number.
 pub(super) const BLOCK: u32 = 1 << 31;
 /// Depth above which a tree is not walked; the walk's stack holds seven entries a level.
-const DEPTH_MAX: usize = 36;
+pub(super) const DEPTH_MAX: usize = 36;
 /// Entries the stack of a walk needs: each level leaves at most seven behind, the last eight.
 pub(super) const STACK_SIZE: usize = (WIDTH - 1) * DEPTH_MAX + 1;
 
@@ -79,10 +76,4 @@ impl WideTree {
             + size_of_val(self.blocks.as_slice())
             + size_of_val(self.triangles.as_slice())
     }
-}
-
-/// Builds the tree.
-pub(super) fn build(prepared: &Prepared) -> WideTree {
-    let tree = collapse::collapse(prepared, &binary::by_surface_area(prepared));
-    if tree.depth <= DEPTH_MAX { tree } else { collapse::collapse(prepared, &binary::balanced(prepared)) }
 }

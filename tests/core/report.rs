@@ -7,7 +7,7 @@ use patina::export::{LossRow, RunFolder, RunResult};
 use patina::image::{Image, RgbImage};
 use patina::insight::capture::ViewCapture;
 use patina::insight::intervals::IntervalCoverage;
-use patina::insight::report::choices::{ChoiceRow, ChoiceTable};
+use patina::insight::report::choice_table::{ChoiceRow, ChoiceTable};
 use patina::insight::report::data::*;
 use patina::insight::report::{RelitPicture, RelitStrip, ReportData, ReportImages, ViewPictures, write_report};
 use patina::insight::scores::{aggregate, score_view};

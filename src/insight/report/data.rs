@@ -4,7 +4,7 @@ use crate::error::{Finding, Severity};
 use crate::export::LossRow;
 use crate::insight::capture::ViewCapture;
 use crate::insight::intervals::IntervalCoverage;
-use crate::insight::report::choices::ChoiceTable;
+use crate::insight::report::choice_table::ChoiceTable;
 use crate::insight::scores::{AggregateScore, PictureScore, ViewScores};
 use crate::insight::truth::{EnvironmentErrors, MapErrors};
 use serde::{Deserialize, Serialize};

@@ -7,7 +7,8 @@
 //! choice of light or dark. It stays below about 15 MB whatever the number of views. Every section that is empty says
 //! why. What it refuses to do: it computes no score (that is [`super::scores`]) and hides no number that is not finite.
 
-pub mod choices;
+pub mod choice_table;
+mod choices;
 mod curves;
 pub mod data;
 mod gallery;

@@ -1,6 +1,7 @@
 //! The deep prior in alternation with Newton's steps on the light.
 
-use super::{LightOutcome, LightTerms, NewtonBudget, newton};
+use super::newton::{LightOutcome, NewtonBudget, newton};
+use super::terms::LightTerms;
 use crate::object::likelihood::Likelihood;
 use crate::object::matrices::LightMatrix;
 use crate::object::prior::deep::DeepPrior;

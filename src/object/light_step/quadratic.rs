@@ -1,6 +1,6 @@
 //! The quadratic that touches the objective at a light, and its minimum by conjugate gradients.
 
-use super::LightTerms;
+use super::terms::LightTerms;
 use crate::object::likelihood::Likelihood;
 use crate::object::matrices::LightMatrix;
 use crate::object::prior::{LogLight, shares};

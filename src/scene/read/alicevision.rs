@@ -7,9 +7,9 @@
 use super::blended_mvs::files_of;
 use super::camera_file::read_text;
 use super::colmap_lens::matrix;
-use super::mesh_choice;
-use super::photo_index::{PhotoIndex, Posed, views_of};
+use super::photo_index::{PhotoIndex, Posed};
 use super::source::{SourceCamera, SourceScene};
+use super::tool_folder::scene_of;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::scene::lens::{Base, Lens, Model, Polynomial};
 use glam::{DMat3, DVec3};
@@ -89,7 +89,7 @@ fn intrinsics_of(entry: &Value, place: &Place) -> Result<((usize, usize), DMat3,
             Polynomial { base: Base::Angle, numerator: radial(values), ..Default::default() }
         }
         (other, _) => {
-            return Err(Error::new(ErrorKind::Unsupported, format!("the distortion {other} is not read"))
+            return Err(Error::new(ErrorKind::Unsupported, format!("the distortion {other} is not supported"))
                 .at(place.clone())
                 .remedy("use a radial, brown or fisheye4 model, or undistort the photos (ExportColoredPointCloud, PrepareDenseScene)"));
         }
@@ -141,13 +141,11 @@ pub fn read(path: &Path) -> Result<SourceScene> {
         posed.push(Posed { listed, camera, lens, size: Some(size), mask: None, place });
     }
     if unposed > 0 {
-        let message = format!("{unposed} views have no pose and take no part");
+        let message = format!("{unposed} views have no pose and are skipped");
         findings.push(Finding::new(Severity::Note, "camera-not-aligned", message).at(Place::File(path.into())));
     }
     let photos = PhotoIndex::of_folders(&[folder.join("images"), folder.into()].map(|path: PathBuf| path))?;
-    let views = views_of(posed, &photos, &[folder.join("masks"), folder.join("mask")], &mut findings)?;
-    let mesh = mesh_choice::find(&[folder.into()], &mut findings);
-    Ok(SourceScene { findings, ..SourceScene::of_photographs(folder, mesh, views) })
+    scene_of(folder, posed, &photos, &[folder.into()], findings)
 }
 
 #[cfg(test)]

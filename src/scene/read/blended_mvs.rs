@@ -173,7 +173,7 @@ pub fn views(
             Finding::new(
                 Severity::Warning,
                 "camera-without-photo",
-                format!("there is no photo '{name}': the camera is left out"),
+                format!("there is no photo '{name}': its camera is skipped"),
             )
             .at(Place::File(path.clone()))
             .remedy("copy the photo, or delete the camera file"),
@@ -186,7 +186,7 @@ pub fn views(
                 Finding::new(
                     Severity::Warning,
                     "photo-without-camera",
-                    format!("there is no {name}_cam.txt: the photo is left out"),
+                    format!("there is no {name}_cam.txt: the photo is skipped"),
                 )
                 .at(Place::File(photo))
                 .remedy("copy the camera file, or delete the photo"),

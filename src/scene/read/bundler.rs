@@ -5,9 +5,9 @@
 
 use super::camera_file::read_text;
 use super::colmap_lens::matrix;
-use super::mesh_choice;
-use super::photo_index::{PhotoIndex, Posed, views_of};
+use super::photo_index::{PhotoIndex, Posed};
 use super::source::{SourceCamera, SourceScene};
+use super::tool_folder::scene_of;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::file;
 use crate::scene::lens::{Lens, Model, Polynomial};
@@ -91,12 +91,10 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
         posed.push(Posed { listed: name.to_owned(), camera, lens, size, mask: None, place });
     }
     if unregistered > 0 {
-        let message = format!("{unregistered} of {count} cameras were not registered and take no part");
+        let message = format!("{unregistered} of {count} cameras were not registered and are skipped");
         findings.push(Finding::new(Severity::Note, "camera-not-aligned", message).at(Place::File(bundle)));
     }
-    let views = views_of(posed, &photos, &[folder.join("masks"), folder.join("mask")], &mut findings)?;
-    let mesh = mesh_choice::find(&[folder.into()], &mut findings);
-    Ok(SourceScene { findings, ..SourceScene::of_photographs(folder, mesh, views) })
+    scene_of(folder, posed, &photos, &[folder.into()], findings)
 }
 
 #[cfg(test)]

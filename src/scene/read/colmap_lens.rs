@@ -28,7 +28,7 @@ const MODELS: [(&str, usize); 18] = [
 
 fn unknown(what: String, place: &Place) -> Error {
     let known = MODELS[..17].iter().map(|model| model.0).collect::<Vec<_>>().join(", ");
-    Error::new(ErrorKind::Unsupported, format!("the camera model {what} is not read"))
+    Error::new(ErrorKind::Unsupported, format!("the camera model {what} is not supported"))
         .at(place.clone())
         .remedy(format!("undistort the photos (COLMAP: image_undistorter), or use one of {known}"))
 }

@@ -4,7 +4,7 @@
 //! Every range of bytes is checked against its buffer before it is read. Compressed geometry (Draco, meshopt), sparse
 //! accessors and skins are refused or ignored by name.
 
-use super::mesh_file::{SourceMesh, is_a_place, vertex_index};
+use super::source_mesh::{SourceMesh, is_a_place, vertex_index};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use base64::Engine;
 use glam::{DMat4, DVec3, Vec2, Vec3};
@@ -195,7 +195,7 @@ impl Reader<'_> {
             mesh.uvs.clear();
         }
         if left_out > 0 {
-            let message = format!("{left_out} sets of lines or points are no surface: they are left out");
+            let message = format!("{left_out} sets of lines or points are not surfaces: they are ignored");
             mesh.findings
                 .push(Finding::new(Severity::Note, "mesh-lines-dropped", message).at(Place::File(path.into())));
         }

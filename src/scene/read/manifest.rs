@@ -158,7 +158,7 @@ fn views_of_json(
                 Finding::new(
                     Severity::Warning,
                     "camera-without-photo",
-                    format!("there is no photo '{name}': the camera is left out"),
+                    format!("there is no photo '{name}': its camera is skipped"),
                 )
                 .at(entry.place)
                 .remedy("copy the photo, or delete the camera"),
@@ -181,7 +181,7 @@ fn views_of_json(
             Finding::new(
                 Severity::Warning,
                 "photo-without-camera",
-                format!("there is no camera for '{name}': the photo is left out"),
+                format!("there is no camera for '{name}': the photo is skipped"),
             )
             .at(Place::File(photo.clone()))
             .remedy("add its camera, or delete the photo"),

@@ -83,9 +83,10 @@ pub fn told(matte: Matte, count: usize) -> Finding {
         [red, green, blue] => format!("of the one colour {red} {green} {blue}"),
     };
     let severity = if matte.is_masked { Severity::Note } else { Severity::Warning };
-    let message = format!("the background of all {count} photos is {name}: it is taken for a matte, not for the sky");
+    let message =
+        format!("the background of all {count} photos is {name}: it is treated as a backdrop, not as the environment");
     Finding::new(severity, "background-matte", message)
-        .remedy("if it is what surrounds the object, read with --scene-background environment")
+        .remedy("if it is the real environment, read the scene with --scene-background environment")
 }
 
 fn colour_at(photo: &Photo, row: usize, column: usize) -> [u8; 3] {

@@ -57,7 +57,7 @@ pub fn find(folders: &[PathBuf], findings: &mut Vec<Finding>) -> Vec<PathBuf> {
             Finding::new(
                 Severity::Note,
                 "mesh-choice",
-                format!("several meshes lie here; others are {}", super::photo_index::some_of(&others)),
+                format!("there are several meshes here; the others are {}", super::photo_index::some_of(&others)),
             )
             .at(Place::File(chosen.clone()))
             .remedy("choose another with --mesh FILE"),

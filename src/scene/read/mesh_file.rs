@@ -1,44 +1,12 @@
 //! From mesh files to one clean mesh.
 
+use super::source_mesh::{SourceMesh, vertex_index};
 use super::{obj, outliers, ply, stl};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::scene::Mesh;
-use glam::{DVec3, Vec2, Vec3};
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::path::{Path, PathBuf};
-
-/// A mesh in the coordinates of its source, in `f64` because survey coordinates are large.
-#[derive(Clone, Debug, Default)]
-pub struct SourceMesh {
-    /// Vertices in the source's world.
-    pub positions: Vec<DVec3>,
-    /// Normals as the file has them; empty when it has none.
-    pub normals: Vec<Vec3>,
-    /// Texture coordinates; empty when the file has none.
-    pub uvs: Vec<Vec2>,
-    /// Corners of each triangle.
-    pub triangles: Vec<[u32; 3]>,
-    /// What the reader noticed.
-    pub findings: Vec<Finding>,
-}
-
-/// Coordinates beyond this are no place of a scene.
-const LARGEST_COORDINATE: f64 = 1e30;
-
-/// Whether a vertex is somewhere: finite, and not so far out that it can only be a mistake.
-pub(super) fn is_a_place(point: DVec3) -> bool {
-    point.is_finite() && point.abs().max_element() <= LARGEST_COORDINATE
-}
-
-/// A vertex count as an index, or an error when a mesh outgrows 32-bit indices.
-pub fn vertex_index(count: usize, path: &Path) -> Result<u32> {
-    u32::try_from(count).map_err(|_| {
-        Error::new(ErrorKind::TooLarge, format!("the mesh has {count} vertices"))
-            .at(Place::File(path.into()))
-            .remedy("simplify the mesh to fewer than four thousand million vertices")
-    })
-}
 
 /// Reads one mesh file by its extension, in source coordinates.
 pub fn read_one(path: &Path) -> Result<SourceMesh> {
@@ -53,7 +21,7 @@ pub fn read_one(path: &Path) -> Result<SourceMesh> {
         "ply" => ply::read(path),
         "glb" | "gltf" => super::gltf::read(path),
         "stl" => stl::read(path),
-        _ => Err(Error::new(ErrorKind::Unsupported, format!("'.{extension}' is not a mesh that is read here"))
+        _ => Err(Error::new(ErrorKind::Unsupported, format!("'.{extension}' is not a supported mesh format"))
             .at(Place::File(path.into()))
             .remedy("give an OBJ, PLY, glTF or STL file")),
     }
@@ -145,11 +113,11 @@ fn leave_out_copies(mesh: &mut SourceMesh) {
     if copies > 0 {
         let severity = if copies * 20 > mesh.triangles.len() { Severity::Warning } else { Severity::Note };
         let message = format!(
-            "{copies} triangles lie between the corners of an earlier one, {reversed} of them turned over: they are left out"
+            "{copies} triangles lie between the corners of an earlier one, {reversed} of them flipped: they are ignored"
         );
         mesh.findings.push(
             Finding::new(severity, "mesh-copies", message)
-                .remedy("rays meet the first of each only; export the mesh without double faces"),
+                .remedy("rays hit only the first of each; export the mesh without double faces"),
         );
     }
 }
@@ -185,60 +153,6 @@ fn join_equal_vertices(mesh: &mut SourceMesh) {
     mesh.uvs.truncate(kept);
     for corner in mesh.triangles.iter_mut().flatten() {
         *corner = target[*corner as usize];
-    }
-}
-
-impl SourceMesh {
-    /// Lower and upper corner of the vertices in use, without those far from the others: `f32` is to fit what is there,
-    /// not what one bad vertex adds.
-    pub fn bounds_of_most(&self) -> Option<(DVec3, DVec3)> {
-        outliers::bounds_of_most(
-            self.triangles.iter().flatten().map(|&corner| self.positions[corner as usize]).collect(),
-        )
-    }
-
-    /// Lower and upper corner of the referenced vertices; `None` without triangles.
-    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        let mut points = self.triangles.iter().flatten().map(|&corner| self.positions[corner as usize]);
-        let first = points.next()?;
-        Some(points.fold((first, first), |(low, high), point| (low.min(point), high.max(point))))
-    }
-
-    /// The mesh in the program's world; normals are unit length and complete, with a finding when the file's were not.
-    pub fn into_world(self, world: &crate::scene::WorldFromSource) -> (Mesh, Vec<Finding>) {
-        let SourceMesh { positions, normals, uvs, triangles, mut findings } = self;
-        let rotation = world.rotation.as_mat3();
-        let positions =
-            positions.into_iter().map(|point| (world.rotation * (point - world.origin_in_source)).as_vec3()).collect();
-        let mut mesh = Mesh { positions, normals: Vec::new(), uvs, triangles };
-        let had_normals = !normals.is_empty();
-        mesh.compute_normals();
-        if !had_normals {
-            findings.push(Finding::new(
-                Severity::Note,
-                "mesh-normals-computed",
-                "the mesh has no normals: they are computed from its triangles",
-            ));
-            return (mesh, findings);
-        }
-        let mut recomputed = 0usize;
-        for (own, computed) in normals.iter().zip(&mut mesh.normals) {
-            match own.try_normalize() {
-                Some(unit) => *computed = rotation * unit,
-                None => recomputed += 1,
-            }
-        }
-        if recomputed > 0 {
-            findings.push(
-                Finding::new(
-                    Severity::Warning,
-                    "mesh-normals-repaired",
-                    format!("{recomputed} normals are zero or not finite: they are computed from the triangles"),
-                )
-                .remedy("export the mesh with normals, or without any"),
-            );
-        }
-        (mesh, findings)
     }
 }
 

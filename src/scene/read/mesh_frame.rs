@@ -1,8 +1,8 @@
 //! A mesh that stands in another frame than the cameras: noticed by what the cameras see of it, and put right by a transform
 //! that is known from the tools.
 
-use super::mesh_file::SourceMesh;
 use super::source::{MeshFrame, SourceView};
+use super::source_mesh::SourceMesh;
 use crate::error::{Finding, Severity};
 use glam::{DMat3, DMat4, DVec3};
 
@@ -107,7 +107,7 @@ pub fn put_right(mesh: &mut SourceMesh, views: &[SourceView], own: &[MeshFrame],
                 Severity::Warning,
                 "mesh-frame-unknown",
                 format!(
-                    "{} % of the views look at the mesh: it may stand in another frame than they do",
+                    "{} % of the views look at the mesh: it may be in another coordinate system than they are",
                     percent(as_it_is.views)
                 ),
             )

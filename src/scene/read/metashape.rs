@@ -10,7 +10,7 @@
 
 use super::colmap_lens::matrix;
 use super::mesh_choice;
-use super::metashape_project::{self, Chunk};
+use super::metashape_project::{self, Chunk, parse};
 use super::photo_index::{PhotoIndex, Posed, some_of, views_of};
 use super::source::{MeshFrame, SourceCamera, SourceScene};
 use super::{blended_mvs::files_of, camera_file::read_text};
@@ -32,15 +32,6 @@ pub fn export_of(folder: &Path) -> Option<PathBuf> {
         let Ok(text) = read_text(path) else { return false };
         let start: String = text.chars().take(2000).collect();
         start.contains("<document") && start.contains("<chunk")
-    })
-}
-
-/// A text file of XML as a document.
-pub fn parse<'a>(text: &'a str, path: &Path) -> Result<roxmltree::Document<'a>> {
-    roxmltree::Document::parse(text).map_err(|error| {
-        Error::new(ErrorKind::Malformed, format!("the file is not XML: {error}"))
-            .at(Place::Line(path.into(), error.pos().row as usize))
-            .remedy("export it again")
     })
 }
 
@@ -84,7 +75,7 @@ fn sensor(node: Node, place: &Place) -> Result<Option<Sensor>> {
         "frame" => Base::Plane,
         "fisheye" | "equidistant_fisheye" => Base::Angle,
         other => {
-            return Err(Error::new(ErrorKind::Unsupported, format!("a sensor of the type {other} is not read"))
+            return Err(Error::new(ErrorKind::Unsupported, format!("a sensor of the type {other} is not supported"))
                 .at(place.clone())
                 .remedy("frame and fisheye are read: export undistorted photos for the others"));
         }
@@ -155,8 +146,8 @@ pub fn posed_of(
         posed.push(Posed { listed, camera, lens: sensor.lens.clone(), size: Some(sensor.size), mask: None, place });
     }
     for (names, code, what) in [
-        (unaligned, "camera-not-aligned", "are not aligned and take no part"),
-        (excluded, "camera-disabled", "are disabled in the project and take no part"),
+        (unaligned, "camera-not-aligned", "are not aligned and are skipped"),
+        (excluded, "camera-disabled", "are disabled in the project and are skipped"),
     ] {
         if !names.is_empty() {
             let message = format!("{} cameras {what}: {}", names.len(), some_of(&names));

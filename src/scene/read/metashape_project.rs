@@ -1,7 +1,6 @@
 //! The archives of a Metashape or PhotoScan project.
 
 use super::camera_file::read_text;
-use super::metashape::parse;
 use super::zip::Archive;
 use crate::error::{Error, ErrorKind, Place, Result};
 use std::collections::BTreeMap;
@@ -19,6 +18,15 @@ pub struct Chunk {
     pub text: String,
     /// Paths of photos by the number of their camera, of the first frame.
     pub photos: BTreeMap<String, String>,
+}
+
+/// A text file of XML as a document.
+pub fn parse<'a>(text: &'a str, path: &Path) -> Result<roxmltree::Document<'a>> {
+    roxmltree::Document::parse(text).map_err(|error| {
+        Error::new(ErrorKind::Malformed, format!("the file is not XML: {error}"))
+            .at(Place::Line(path.into(), error.pos().row as usize))
+            .remedy("export it again")
+    })
 }
 
 /// `doc.xml` of an archive.

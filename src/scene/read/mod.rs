@@ -44,8 +44,10 @@ mod ply_header;
 pub mod polygon;
 mod realitycapture;
 pub mod source;
+mod source_mesh;
 mod stl;
 pub mod text;
+mod tool_folder;
 pub mod transforms;
 pub mod understood;
 pub mod world;
@@ -90,12 +92,13 @@ pub fn picture_folders(path: &Path) -> Result<std::collections::BTreeSet<std::pa
 fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
     let SourceScene { name, folder, mesh, views, mut findings, .. } = source;
     let mut views = choose_views(views, settings.max_views, &folder)?;
-    photo_size::fit_to_photos(&mut views, &mut findings)?;
+    let sizes = photo_size::of_files(&views)?;
+    photo_size::fit_to_photos(&mut views, &sizes, &mut findings)?;
     let mesh = settings.mesh.as_ref().map_or(mesh, |chosen| vec![chosen.clone()]);
     if mesh.is_empty() {
-        return Err(Error::new(ErrorKind::Missing, "no mesh lies with the photos and cameras")
+        return Err(Error::new(ErrorKind::Missing, "no mesh was found with the photos and cameras")
             .at(Place::File(folder))
-            .remedy("name it with --mesh FILE, in the frame of the cameras"));
+            .remedy("name one with --mesh FILE, in the coordinate system of the cameras"));
     }
 
     // The mesh, turned so that +y is up.
@@ -118,7 +121,7 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
 
     // The photos.
     let encoding = if settings.encoding == ColourEncoding::Auto { source.encoding } else { settings.encoding };
-    let mut loaded = photos::load_all(&views, encoding, settings)?;
+    let mut loaded = photos::load_all(&views, &sizes, encoding, settings)?;
     findings.extend(photos::told_of_lenses(&loaded));
     let mut background = match settings.background {
         BackgroundChoice::Auto => source.background,
@@ -140,7 +143,10 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
                 Finding::new(
                     Severity::Warning,
                     "masks-incomplete",
-                    format!("{without} of {} views have no mask: rays decide there", views.len()),
+                    format!(
+                        "{without} of {} views have no mask: ray casting against the mesh decides there",
+                        views.len()
+                    ),
                 )
                 .remedy("add the missing masks, or ignore all with --masks ignore"),
             );
@@ -214,7 +220,12 @@ fn decide_centre_unshrunk(
     assumed: PixelCentre,
 ) -> Result<(PixelCentre, Finding)> {
     let few: Vec<SourceView> = views.iter().step_by(views.len().div_ceil(6)).cloned().collect();
-    let loaded = photos::load_all(&few, encoding, &ReadSettings { shrink: 1, ..settings.clone() })?;
+    let loaded = photos::load_all(
+        &few,
+        &photo_size::of_files(&few)?,
+        encoding,
+        &ReadSettings { shrink: 1, ..settings.clone() },
+    )?;
     let joined = few
         .iter()
         .zip(loaded)
@@ -276,8 +287,8 @@ fn hold_out(views: &mut [View], named: Option<&[String]>, every: usize, findings
             view.held_out = true;
         }
         if views.iter().all(|view| view.held_out) {
-            return Err(Error::new(ErrorKind::InvalidScene, "every view is held out: none is left to fit")
-                .remedy("name fewer views in held_out"));
+            return Err(Error::new(ErrorKind::InvalidScene, "every view is held out, none is left to fit")
+                .remedy("list fewer views in held_out"));
         }
         return Ok(());
     }
@@ -288,7 +299,7 @@ fn hold_out(views: &mut [View], named: Option<&[String]>, every: usize, findings
         findings.push(Finding::new(
             Severity::Note,
             "none-held-out",
-            format!("no view is held out of {}: the fit cannot be judged on a view it has not seen", views.len()),
+            format!("no view of {} is held out: the fit cannot be validated on views it has not seen", views.len()),
         ));
         return Ok(());
     }

@@ -5,8 +5,8 @@
 //! ([`super::text`]), in `f64`: what no face uses is not looked at, polygons are cut ([`super::polygon`]), and `tobj` is
 //! given plain triangles near the origin, whose corners it joins. Their number is compared with that of the file.
 
-use super::mesh_file::SourceMesh;
 use super::obj_elements::{Elements, NONE};
+use super::source_mesh::SourceMesh;
 use super::text;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use glam::{DVec3, Vec2, Vec3};
@@ -122,7 +122,7 @@ fn join(plain: &str, path: &Path) -> Result<SourceMesh> {
         })?;
     let mut result = SourceMesh::default();
     for tobj::Model { mesh, .. } in &models {
-        let first = super::mesh_file::vertex_index(result.positions.len(), path)?;
+        let first = super::source_mesh::vertex_index(result.positions.len(), path)?;
         let points = mesh.positions.chunks_exact(3).map(|p| Vec3::from_slice(p).as_dvec3());
         result.positions.extend(points);
         result.normals.extend(mesh.normals.chunks_exact(3).map(Vec3::from_slice));

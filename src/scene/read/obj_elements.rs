@@ -1,6 +1,6 @@
 //! The elements of an OBJ file as they stand in it: vertices, texture coordinates, normals, faces.
 
-use super::mesh_file::is_a_place;
+use super::source_mesh::is_a_place;
 use super::text::{self, Statement};
 use super::{outliers, polygon};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
@@ -144,7 +144,10 @@ impl Elements {
                 };
                 if !position.is_finite() {
                     let at = self.bad_vertices.iter().find(|bad| bad.0 == vertex as usize).map_or(line, |bad| bad.1);
-                    let message = format!("vertex {} is at no finite place, and a face uses it", u64::from(vertex) + 1);
+                    let message = format!(
+                        "vertex {} has a position that is not finite, and a face uses it",
+                        u64::from(vertex) + 1
+                    );
                     return Err(Error::new(ErrorKind::NonFinite, message)
                         .at(Place::Line(path.into(), at))
                         .remedy("remove the vertex or export the mesh again"));
@@ -185,14 +188,14 @@ impl Elements {
             }
         };
         let (unused, line) = (self.bad_vertices.len(), self.bad_vertices.first().map_or(0, |bad| bad.1));
-        let message = "vertices that no face uses are not finite, this is the first: they are left out";
+        let message = "vertices that no face uses are not finite, this is the first: they are ignored";
         tell(Severity::Note, "mesh-vertices-dropped", unused, line, message, "");
         let (count, line) = self.small_faces;
-        let message = "faces have fewer than three corners, this is the first: they are left out";
-        let remedy = "look at the exporter if they should be surface";
+        let message = "faces have fewer than three corners, this is the first: they are ignored";
+        let remedy = "check the exporter if they should be part of the surface";
         tell(Severity::Warning, "mesh-faces-dropped", count, line, message, remedy);
         let (count, line) = self.lines_and_points;
-        let message = "lines and points are no surface, this is the first: they are left out";
+        let message = "lines and points are not surfaces; this is the first: they are ignored";
         tell(Severity::Note, "mesh-lines-dropped", count, line, message, "");
         if let Some(line) = self.decimal_commas {
             let message = "numbers have decimal commas: they are read as points";

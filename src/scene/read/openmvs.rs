@@ -5,9 +5,9 @@
 
 use super::blended_mvs::files_of;
 use super::bytes::Bytes;
-use super::mesh_choice;
-use super::photo_index::{PhotoIndex, Posed, views_of};
+use super::photo_index::{PhotoIndex, Posed};
 use super::source::{SourceCamera, SourceScene};
+use super::tool_folder::scene_of;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::file;
 use crate::scene::lens::Lens;
@@ -148,12 +148,10 @@ pub fn read(path: &Path) -> Result<SourceScene> {
         posed.push(Posed { listed, camera: own, lens: Lens::default(), size, mask, place });
     }
     if unposed > 0 {
-        let message = format!("{unposed} photos have no pose and take no part");
+        let message = format!("{unposed} photos have no pose and are skipped");
         findings.push(Finding::new(Severity::Note, "camera-not-aligned", message).at(Place::File(path.into())));
     }
-    let views = views_of(posed, &photos, &[folder.join("masks"), folder.join("mask")], &mut findings)?;
-    let mesh = mesh_choice::find(&[folder.into()], &mut findings);
-    Ok(SourceScene { findings, ..SourceScene::of_photographs(folder, mesh, views) })
+    scene_of(folder, posed, &photos, &[folder.into()], findings)
 }
 
 #[cfg(test)]

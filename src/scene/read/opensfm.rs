@@ -5,9 +5,9 @@
 
 use super::camera_file::read_text;
 use super::colmap_lens::matrix;
-use super::mesh_choice;
-use super::photo_index::{PhotoIndex, Posed, views_of};
+use super::photo_index::{PhotoIndex, Posed};
 use super::source::{SourceCamera, SourceScene};
+use super::tool_folder::scene_of;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::scene::lens::{Base, Lens, Model, Polynomial};
 use glam::{DMat3, DQuat, DVec3};
@@ -62,7 +62,7 @@ impl Camera {
             "perspective" | "simple_radial" | "radial" | "brown" => Base::Plane,
             "fisheye" | "fisheye_opencv" => Base::Angle,
             other => {
-                return Err(Error::new(ErrorKind::Unsupported, format!("the projection {other} is not read"))
+                return Err(Error::new(ErrorKind::Unsupported, format!("the projection {other} is not supported"))
                     .at(place.clone())
                     .remedy("undistort the photos first (opensfm undistort)"));
             }
@@ -118,9 +118,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
         posed.push(Posed { listed: name, camera, lens, size, mask: None, place });
     }
     let photos = PhotoIndex::of_folders(&[folder.join("images"), folder.into()].map(|path: PathBuf| path))?;
-    let views = views_of(posed, &photos, &[folder.join("masks"), folder.join("mask")], &mut findings)?;
-    let mesh = mesh_choice::find(&[folder.into(), folder.join("undistorted/depthmaps")], &mut findings);
-    Ok(SourceScene { findings, ..SourceScene::of_photographs(folder, mesh, views) })
+    scene_of(folder, posed, &photos, &[folder.into(), folder.join("undistorted/depthmaps")], findings)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@
 //! atlas. Distances are counted from the median point, in units of the median distance, which single vertices do not
 //! move.
 
-use super::mesh_file::SourceMesh;
+use super::source_mesh::SourceMesh;
 use super::world;
 use crate::error::{Finding, Severity};
 use glam::DVec3;
@@ -43,6 +43,14 @@ pub fn bounds_of_most(points: Vec<DVec3>) -> Option<(DVec3, DVec3)> {
     let mut near = points.iter().filter(is_near);
     let first = *near.next()?;
     Some(near.fold((first, first), |(low, high), point| (low.min(*point), high.max(*point))))
+}
+
+impl SourceMesh {
+    /// Lower and upper corner of the vertices in use, without those far from the others: `f32` is to fit what is there,
+    /// not what one bad vertex adds.
+    pub fn bounds_of_most(&self) -> Option<(DVec3, DVec3)> {
+        bounds_of_most(self.triangles.iter().flatten().map(|&corner| self.positions[corner as usize]).collect())
+    }
 }
 
 /// The point to take as origin where `f32` would lose the shape of the points.

@@ -173,13 +173,13 @@ pub fn views_of(
                 Severity::Warning,
                 "camera-without-photo",
                 format!(
-                    "{} of {listed} cameras have no photo here and are left out: {}",
+                    "{} of {listed} cameras have no photo here and are skipped: {}",
                     missing.len(),
                     some_of(&missing)
                 ),
             )
             .at(Place::File(folder))
-            .remedy("copy their photos as well if they should take part"),
+            .remedy("copy their photos as well to use them"),
         );
     }
     name_views(&mut views);

@@ -3,21 +3,30 @@
 use super::source::SourceView;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::file;
+use rayon::prelude::*;
 
 /// The sides of a photo may be rounded by so many pixels when it is made smaller.
 const ROUNDING_PIXELS: f64 = 1.0;
 
-/// Scales the intrinsics of views to the true size of their photos, by each side's own ratio. The first pixel's centre is at
+/// Width and height of each view's photo as its file says, before any turning.
+///
+/// # Errors
+/// The first photo, in the order of `views`, that cannot be read.
+pub fn of_files(views: &[SourceView]) -> Result<Vec<(usize, usize)>> {
+    let sizes: Vec<_> = views.par_iter().map(|view| file::read_size(&view.photo)).collect();
+    sizes.into_iter().collect()
+}
+
+/// Scales the intrinsics of views to the true `sizes` of their photos, by each side's own ratio. The first pixel's centre is at
 /// (0.5, 0.5), so that the picture's corner stays. A photo on its side is left to its orientation.
 ///
 /// # Errors
-/// A photo that cannot be read, or whose sides were not scaled alike.
-pub fn fit_to_photos(views: &mut [SourceView], findings: &mut Vec<Finding>) -> Result<()> {
+/// A photo whose sides were not scaled alike.
+pub fn fit_to_photos(views: &mut [SourceView], sizes: &[(usize, usize)], findings: &mut Vec<Finding>) -> Result<()> {
     let mut scaled = 0usize;
     let (mut least, mut most) = (f64::INFINITY, 0.0f64);
-    for view in views.iter_mut() {
+    for (view, &size) in views.iter_mut().zip(sizes) {
         let Some(claimed) = view.size else { continue };
-        let size = file::read_size(&view.photo)?;
         if size == claimed || size == (claimed.1, claimed.0) || claimed.0 == 0 || claimed.1 == 0 {
             continue;
         }
@@ -28,12 +37,12 @@ pub fn fit_to_photos(views: &mut [SourceView], findings: &mut Vec<Finding>) -> R
             return Err(Error::new(
                 ErrorKind::InvalidScene,
                 format!(
-                    "the photo is {} x {} but its camera is for {} x {}, another shape",
+                    "the photo is {} x {} but its camera is for {} x {}, another aspect ratio",
                     size.0, size.1, claimed.0, claimed.1
                 ),
             )
             .at(Place::File(view.photo.clone()))
-            .remedy("use the photos the cameras were made for: a crop needs its own calibration"));
+            .remedy("use the photos the cameras were calibrated on: a crop needs a calibration of its own"));
         }
         let intrinsics = &mut view.camera.intrinsics;
         intrinsics.x_axis.x *= ratio[0];
@@ -50,7 +59,7 @@ pub fn fit_to_photos(views: &mut [SourceView], findings: &mut Vec<Finding>) -> R
             Severity::Note,
             "intrinsics-scaled",
             format!(
-                "{scaled} of {} photos are {by} times the size they were calibrated at: their intrinsics follow",
+                "{scaled} of {} photos are {by} times the size they were calibrated at: their intrinsics are scaled to match",
                 views.len()
             ),
         ));

@@ -54,11 +54,14 @@ impl LoadedPhoto {
     }
 }
 
-/// Decodes all views; the first error in the order of `views` is returned. What several photos have in common is told once,
-/// with the first of them.
-pub fn load_all(views: &[SourceView], encoding: ColourEncoding, settings: &ReadSettings) -> Result<Vec<LoadedPhoto>> {
-    let size = |view: &SourceView| file::read_size(&view.photo);
-    let sizes: Vec<_> = views.par_iter().map(size).collect::<Vec<_>>().into_iter().collect::<Result<_>>()?;
+/// Decodes all views, whose files are of these sizes; the first error in the order of `views` is returned. What several photos
+/// have in common is told once, with the first of them.
+pub fn load_all(
+    views: &[SourceView],
+    sizes: &[(usize, usize)],
+    encoding: ColourEncoding,
+    settings: &ReadSettings,
+) -> Result<Vec<LoadedPhoto>> {
     let pixels: usize = sizes.iter().map(|(width, height)| width * height).sum();
     let shrink = settings.shrink;
     let as_half = pixels / (shrink * shrink) * std::mem::size_of::<Vec3>() > MOST_FLOAT_BYTES;
@@ -239,7 +242,7 @@ fn checked_floats(
             Finding::new(
                 Severity::Note,
                 "photo-negative",
-                format!("{negative} pixels are negative: they are taken as 0"),
+                format!("{negative} pixels are negative: they are set to 0"),
             )
             .at(Place::View(view.name.clone())),
         );
@@ -247,7 +250,7 @@ fn checked_floats(
         shared.push(Finding::new(
             Severity::Note,
             "colour-out-of-gamut",
-            "some colours lie outside Rec. 709: their negative channels are taken as 0",
+            "some colours are outside Rec. 709: their negative channels are set to 0",
         ));
     }
     (image, states)
@@ -283,7 +286,7 @@ fn apply_alpha(alpha: &GreyImage, is_float: bool, states: &mut Image<PixelState>
         return;
     }
     if most <= ROUNDING {
-        let message = "the opacity is 0 all over the photo: it is not used";
+        let message = "the alpha channel is 0 everywhere: it is ignored";
         shared.push(Finding::new(Severity::Warning, "alpha-empty", message).remedy("export the photo without alpha"));
         return;
     }
@@ -298,7 +301,7 @@ fn apply_alpha(alpha: &GreyImage, is_float: bool, states: &mut Image<PixelState>
         };
     }
     shared.push(
-        Finding::new(Severity::Note, "alpha-as-mask", "the opacity of the photo is its mask")
+        Finding::new(Severity::Note, "alpha-as-mask", "the alpha channel of the photo is used as its mask")
             .remedy("ignore it with --masks ignore"),
     );
 }
@@ -325,7 +328,7 @@ fn apply_mask(
             format!("the mask is {} x {} but the photo is {} x {}", mask.width(), mask.height(), size.0, size.1),
         )
         .at(Place::File(path.into()))
-        .remedy("make the mask in the size of the photo, or ignore all with --masks ignore"));
+        .remedy("resize the mask to the photo, or ignore all masks with --masks ignore"));
     }
     let is_object: Image<bool> = if is_twin { object_of_twin(&mask, photo) } else { mask.map(|value| *value >= 0.5) };
     let mut object_pixels = 0usize;
@@ -342,7 +345,7 @@ fn apply_mask(
             Finding::new(
                 Severity::Warning,
                 "mask-empty",
-                "the mask marks no pixel as object: the view says nothing of the surface",
+                "the mask marks no pixel as object, so the view contributes nothing",
             )
             .at(Place::View(view.name.clone()))
             .remedy("255 is object; make the mask again or remove the view"),

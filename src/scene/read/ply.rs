@@ -3,7 +3,7 @@
 //! A header may claim any number of elements. The claim is checked against the size of the file before anything is
 //! read, so that a lying file of one kilobyte costs one kilobyte.
 
-use super::mesh_file::{SourceMesh, is_a_place, vertex_index};
+use super::source_mesh::{SourceMesh, is_a_place, vertex_index};
 use super::{ply_header, polygon};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use glam::{DVec3, Vec2, Vec3};
@@ -97,11 +97,11 @@ fn cut(
         mesh.triangles.extend(triangles.into_iter().map(|triangle| triangle.map(|corner| corners[corner])));
     }
     if small > 0 {
-        let message = format!("{small} faces have fewer than three corners, this is the first: they are left out");
+        let message = format!("{small} faces have fewer than three corners, this is the first: they are ignored");
         mesh.findings.push(
             Finding::new(Severity::Warning, "mesh-faces-dropped", message)
                 .at(place_of_face(first_small))
-                .remedy("look at the exporter if they should be surface"),
+                .remedy("check the exporter if they should be part of the surface"),
         );
     }
     if mesh.triangles.is_empty() {
@@ -114,7 +114,7 @@ fn cut(
         // Their places are kept, since corners count.
         bad.iter().for_each(|&index| mesh.positions[index] = DVec3::ZERO);
         let message =
-            format!("{} vertices that no face uses are not finite, this is the first: they are left out", bad.len());
+            format!("{} vertices that no face uses are not finite, this is the first: they are ignored", bad.len());
         mesh.findings.push(Finding::new(Severity::Note, "mesh-vertices-dropped", message).at(place_of_vertex(first)));
     }
     Ok(())

@@ -8,7 +8,7 @@ use super::blended_mvs::files_of;
 use super::camera_file::read_text;
 use super::colmap_lens::matrix;
 use super::mesh_choice;
-use super::metashape::parse;
+use super::metashape_project::parse;
 use super::photo_index::{PhotoIndex, Posed, some_of, views_of};
 use super::source::{SourceCamera, SourceScene};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};

@@ -3,7 +3,7 @@
 //! A binary file may begin with `solid` as an ascii one does: its length tells. Normals of facets are not taken up, they
 //! follow from the corners.
 
-use super::mesh_file::{SourceMesh, is_a_place, vertex_index};
+use super::source_mesh::{SourceMesh, is_a_place, vertex_index};
 use super::text;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use glam::{DVec3, Vec3};

@@ -117,7 +117,7 @@ impl Transforms {
                 ..Default::default()
             },
             other => {
-                return Err(Error::new(ErrorKind::Unsupported, format!("the camera model {other} is not read"))
+                return Err(Error::new(ErrorKind::Unsupported, format!("the camera model {other} is not supported"))
                     .at(Place::View(format!("frame {index} of {}", self.path.display())))
                     .remedy("OPENCV, OPENCV_FISHEYE and PINHOLE are read: export perspective photos"));
             }

@@ -64,10 +64,7 @@ pub fn up_in_source(asked: Up, cameras: &[SourceCamera]) -> Result<(DVec3, Vec<F
     }
     if up.dot(mean) < 0.5 * mean.length() {
         up = mean.normalize_or(DVec3::Y);
-        uncertain(
-            &mut findings,
-            "the horizons of the cameras contradict their up directions: some pictures are turned",
-        );
+        uncertain(&mut findings, "the horizons of the cameras contradict their up directions: some photos are rotated");
     }
     let snapped = Up::NAMED
         .into_iter()

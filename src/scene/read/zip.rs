@@ -91,7 +91,7 @@ impl Archive {
         if entry.is_encrypted || !matches!(entry.method, 0 | 8) {
             return Err(Error::new(
                 ErrorKind::Unsupported,
-                "the entry is encrypted or packed in a way that is not read",
+                "the entry is encrypted or packed in a way that is not supported",
             )
             .at(place())
             .remedy("unpack the archive and pack it again as an ordinary ZIP"));
