@@ -1,7 +1,7 @@
 //! `patina completions`.
 
 use super::arguments::Arguments;
-use super::standard_output;
+use super::say;
 use crate::error::Result;
 use clap::{Args, CommandFactory};
 use clap_complete::Shell;
@@ -19,5 +19,5 @@ pub fn completions(options: &CompletionsOptions) -> Result<()> {
     let mut script = Vec::new();
     // Into memory first: the generator panics where its output is refused.
     clap_complete::generate(options.shell, &mut Arguments::command(), "patina", &mut script);
-    standard_output::write(&String::from_utf8_lossy(&script))
+    say::text(&String::from_utf8_lossy(&script))
 }

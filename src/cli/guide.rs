@@ -1,6 +1,6 @@
 //! `patina guide`.
 
-use super::standard_output;
+use super::say;
 use crate::error::Result;
 use crate::guide::{Topic, plain::plain};
 use clap::Args;
@@ -21,7 +21,7 @@ pub fn guide(options: &GuideOptions, json: bool) -> Result<()> {
         Some(name) => topic_text(Topic::named(name)?, json),
         None => list(json),
     };
-    standard_output::write(&text)
+    say::text(&text)
 }
 
 fn topic_text(topic: Topic, json: bool) -> String {

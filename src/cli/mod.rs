@@ -27,7 +27,6 @@ mod hint;
 pub mod measured;
 pub mod object;
 mod say;
-mod standard_output;
 mod threads;
 pub mod turntable;
 

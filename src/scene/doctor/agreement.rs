@@ -8,8 +8,8 @@
 //!
 //! It refuses to judge surfaces that look everywhere alike, and mirrors, whose pictures move with the camera.
 
-use super::probe::{Probe, surface_at};
-use super::{Report, names_of};
+use super::probe::Probe;
+use super::{Report, names_of, neighbours};
 use crate::error::{Finding, Place, Severity};
 use crate::math::{luminance, statistics::quantile};
 use crate::scene::{PixelState, Scene, View};
@@ -137,13 +137,7 @@ fn correlation(values: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
 
 /// Measures how the photos agree, and names those that do not belong to their cameras.
 pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Report) {
-    let pairs: Vec<Pair> = (0..scene.views.len())
-        .into_par_iter()
-        .map(|view| pairs_of(scene, bvh, probes, view))
-        .collect::<Vec<_>>()
-        .into_iter()
-        .flatten()
-        .collect();
+    let pairs = neighbours::over_views(scene, |view| pairs_of(scene, bvh, probes, view));
     if pairs.len() < 2 {
         return;
     }
@@ -163,8 +157,8 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
     let names: Vec<&str> = scene.views.iter().map(|view| view.name.as_str()).collect();
     if let Some((shift, shifted)) = trial.best_shift(middle) {
         let message = format!(
-            "photos and cameras do not belong together: the photos agree by {middle:.2} where they show the same surface, \
-             and by {shifted:.2} if each camera takes the photo {} in the order of names",
+            "photos and cameras are out of step: where photos show the same surface their correlation is {middle:.2}, and \
+             {shifted:.2} when each camera is given the photo {} in the order of names",
             match shift {
                 1 => "after its own".into(),
                 -1 => "before its own".into(),
@@ -172,20 +166,18 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
                 shift => format!("{} places before its own", -shift),
             }
         );
-        report.findings.push(
-            Finding::new(Severity::Warning, "photos-shifted", message)
-                .remedy("name photos and cameras alike again: one was added, lost or numbered from 1 on one side"),
-        );
+        report.findings.push(Finding::new(Severity::Warning, "photos-shifted", message).remedy(
+            "rename photos and cameras to match: one was added or removed on one side, or numbering starts at 1 there",
+        ));
         return;
     }
     if middle < HARDLY {
         let message = format!(
-            "the photos hardly agree where the cameras say that they show the same surface ({middle:.2}, where 1 is alike)"
+            "photos barely correlate where the cameras say they show the same surface ({middle:.2}; 1 is a perfect match)"
         );
-        report.findings.push(
-            Finding::new(Severity::Warning, "photos-disagree", message)
-                .remedy("check that cameras, photos and mesh are of one capture; a mirror or glass does the same"),
-        );
+        report.findings.push(Finding::new(Severity::Warning, "photos-disagree", message).remedy(
+            "check that cameras, photos and mesh belong to the same capture; mirrors and glass have the same effect",
+        ));
     }
     if middle < JUDGED_ABOVE {
         return;
@@ -201,11 +193,11 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
         let own = agreement[view].unwrap_or_default();
         let needed = own + 0.5 * (middle - own);
         if let Some(lie) = Lie::OTHERS.into_iter().find(|&lie| trial.of_view(view, view, lie) >= Some(needed)) {
-            let message = format!("the photo agrees with no other as it is, and does when it is {}", lie.in_words());
+            let message = format!("the photo matches the others only when it is {}", lie.in_words());
             report.findings.push(
                 Finding::new(Severity::Warning, "photo-turned", message)
                     .at(Place::View(names[view].into()))
-                    .remedy("turn the photo, or leave the view out"),
+                    .remedy("rotate or flip the photo file, or exclude the view"),
             );
             continue;
         }
@@ -217,14 +209,12 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
         });
         if let Some(other) = partner {
             done[other] = true;
-            let message = format!(
-                "the photos {} and {} are exchanged: each agrees with the other's camera",
-                names[view], names[other]
-            );
+            let message =
+                format!("the photos {} and {} are swapped: each matches the other's camera", names[view], names[other]);
             report.findings.push(
                 Finding::new(Severity::Warning, "photos-exchanged", message)
                     .at(Place::View(names[view].into()))
-                    .remedy("exchange their names, or those of their cameras"),
+                    .remedy("swap their names, or those of their cameras"),
             );
             continue;
         }
@@ -232,7 +222,7 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
     }
     if !left.is_empty() {
         let message = format!(
-            "{} photos do not show what the others see of the same surface (agreement below {LOW}, of the others \
+            "{} photos do not match the others on the same surface (correlation below {LOW}; the others have \
              {middle:.2}): {}",
             left.len(),
             names_of(&left)
@@ -240,7 +230,7 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
         report.findings.push(
             Finding::new(Severity::Warning, "photos-disagree", message)
                 .at(Place::View(left[0].into()))
-                .remedy("check that these photos belong to their cameras, or leave the views out"),
+                .remedy("check that these photos belong to their cameras, or exclude the views"),
         );
     }
 }
@@ -300,25 +290,11 @@ impl Trial<'_> {
 /// The pairs of a view with the neighbours that come after it, or that do not count it among their own.
 fn pairs_of(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], a: usize) -> Vec<Pair> {
     let view = &scene.views[a];
-    let hits: Vec<&Probe> = probes[a].iter().filter(|probe| probe.hit.is_some()).collect();
-    let step = (hits.len() / POINTS_PER_VIEW).max(1);
-    let points: Vec<_> = hits
-        .iter()
-        .step_by(step)
-        .filter_map(|probe| {
-            let (point, normal, _) = surface_at(&scene.mesh, probe.hit.as_ref()?)?;
-            Some((point, normal, (probe.row * view.camera.width + probe.column) as u32))
-        })
-        .collect();
-    let mut others: Vec<(f32, usize)> = (0..scene.views.len())
-        .filter(|&b| b != a && !probes[b].is_empty())
-        .map(|b| (view.camera.forward_in_world().dot(scene.views[b].camera.forward_in_world()), b))
-        .collect();
-    others.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
-    others.truncate(NEIGHBOURS);
-    others
+    let pixel = |probe: &Probe| Some((probe.row * view.camera.width + probe.column) as u32);
+    let points = neighbours::points(scene, &probes[a], POINTS_PER_VIEW, |_| true, pixel);
+    neighbours::of(scene, probes, a, NEIGHBOURS)
         .into_iter()
-        .filter_map(|(_, b)| {
+        .filter_map(|b| {
             let camera = &scene.views[b].camera;
             let eye = camera.position_in_world();
             let (mut in_a, mut in_b) = (Vec::new(), Vec::new());

@@ -3,14 +3,12 @@
 //! Points seen by two views give the logarithm of a ratio; its median over the points hardly feels highlights. The
 //! views' exposures are the least-squares solution of all pairs, with median zero.
 
-use super::probe::{Probe, surface_at};
-use super::{Report, ViewCheck, names_of};
+use super::probe::Probe;
+use super::{Report, ViewCheck, names_of, neighbours};
 use crate::error::{Finding, Place, Severity};
 use crate::math::{luminance, statistics::quantile};
 use crate::scene::{PixelState, Scene};
 use crate::trace::Bvh;
-use glam::Vec3;
-use rayon::prelude::*;
 
 /// Points of each view that are looked up in its neighbours.
 const POINTS_PER_VIEW: usize = 500;
@@ -22,8 +20,7 @@ const FEWEST_SHARED: usize = 20;
 const JUMP_STOPS: f64 = 0.5;
 /// Where no view is, views that differ by more than this, in stops, are told of: root of the mean square.
 const SPREAD_STOPS: f64 = 0.1;
-/// More than gloss makes of photos that all have one exposure: a glossy vase came to 0.16 stops so, photographs of a statue
-/// and of portals by a camera that chose its exposures to 0.32 and 0.31.
+/// More than gloss makes of photos that all have one exposure, less than a camera makes that chooses its own.
 const SPREAD_BEYOND_GLOSS_STOPS: f64 = 0.25;
 
 /// A pair of views and the median of ln(radiance in b / radiance in a) over what they share.
@@ -36,13 +33,7 @@ struct Pair {
 
 /// Measures the views' exposures against each other.
 pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Report) {
-    let pairs: Vec<Pair> = (0..scene.views.len())
-        .into_par_iter()
-        .map(|a| pairs_of(scene, bvh, probes, a))
-        .collect::<Vec<_>>()
-        .into_iter()
-        .flatten()
-        .collect();
+    let pairs = neighbours::over_views(scene, |view| pairs_of(scene, bvh, probes, view));
     let exposures = solve(scene.views.len(), &pairs);
     for (line, exposure) in report.views.iter_mut().zip(&exposures) {
         line.exposure_stops = exposure.map(|log| log / std::f64::consts::LN_2);
@@ -54,7 +45,7 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
         let listed: Vec<String> = jumps.iter().map(|(stops, name)| format!("{name} by {stops:+.1}")).collect();
         let listed: Vec<&str> = listed.iter().map(String::as_str).collect();
         let message = format!(
-            "{} of {} views are brighter or darker than the others see the same surface, by more than {JUMP_STOPS} stops: {}",
+            "{} of {} photos are more than {JUMP_STOPS} EV brighter or darker than the others on the same surface: {}",
             jumps.len(),
             scene.views.len(),
             names_of(&listed)
@@ -71,7 +62,7 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
             Finding::new(
                 Severity::Note,
                 "exposure-varies",
-                format!("exposures vary by {spread:.2} stops (standard deviation over the views)"),
+                format!("exposures vary by {spread:.2} EV (standard deviation over the views)"),
             )
             .remedy("fit an exposure per view if the fit leaves brightness errors of whole pictures"),
         );
@@ -100,28 +91,14 @@ fn spread_stops(views: &[ViewCheck]) -> Option<f64> {
 fn pairs_of(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], a: usize) -> Vec<Pair> {
     let view = &scene.views[a];
     let evident = |state: PixelState| state == PixelState::Surface;
-    let hits: Vec<&Probe> = probes[a]
-        .iter()
-        .filter(|probe| probe.hit.is_some() && evident(view.states[(probe.row, probe.column)]))
-        .collect();
-    let step = (hits.len() / POINTS_PER_VIEW).max(1);
-    let points: Vec<(Vec3, Vec3, f64)> = hits
-        .iter()
-        .step_by(step)
-        .filter_map(|probe| {
-            let (point, normal, _) = surface_at(&scene.mesh, probe.hit.as_ref()?)?;
-            let value = f64::from(luminance(view.photo.radiance(probe.row, probe.column)));
-            (value > 1e-4).then_some((point, normal, value))
-        })
-        .collect();
-    let mut others: Vec<(f32, usize)> = (0..scene.views.len())
-        .filter(|&b| b != a && !probes[b].is_empty())
-        .map(|b| (view.camera.forward_in_world().dot(scene.views[b].camera.forward_in_world()), b))
-        .collect();
-    others.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
-    others.truncate(NEIGHBOURS);
+    let is_evident = |probe: &Probe| evident(view.states[(probe.row, probe.column)]);
+    let radiance = |probe: &Probe| {
+        let value = f64::from(luminance(view.photo.radiance(probe.row, probe.column)));
+        (value > 1e-4).then_some(value)
+    };
+    let points = neighbours::points(scene, &probes[a], POINTS_PER_VIEW, is_evident, radiance);
     let mut pairs = Vec::new();
-    for (_, b) in others {
+    for b in neighbours::of(scene, probes, a, NEIGHBOURS) {
         let other = &scene.views[b];
         let eye = other.camera.position_in_world();
         let ratios: Vec<f64> = points

@@ -29,6 +29,7 @@ pub mod exposure;
 pub mod facets;
 pub mod geometry;
 pub mod lights;
+mod neighbours;
 pub mod normals;
 pub mod overlay;
 pub mod pictures;
