@@ -11,6 +11,7 @@ mod cli_process;
 mod cli_remedies;
 pub mod common;
 mod demo_scene;
+mod docs;
 mod fit_course;
 mod hard_bench;
 mod hard_cases;
