@@ -71,7 +71,7 @@ pub fn entanglement(
 ) -> Result<Entanglement> {
     let Some(truth) = &scene.truth else {
         return Ok(Entanglement::Unknown(
-            "The truth of this scene is not known: nothing tells how its pictures would look under another light.",
+            "This scene has no ground truth, so nothing shows how it would look under another environment.",
         ));
     };
     let mut order: Vec<usize> = (0..scene.views.len()).collect();
@@ -94,7 +94,7 @@ pub fn entanglement(
         let pictures = relight.pictures.iter().filter(|(view, _)| *view < scene.views.len()).take(settings.most_views);
         let scores: Result<Vec<_>> =
             pictures.map(|(view, picture)| compare.with_picture(&lit, *view, picture)).collect();
-        add("a light that no photo shows", false, &scores?);
+        add("novel lighting", false, &scores?);
     }
     if has_maps && !lights.is_empty() {
         let true_surface = Surface::new(scene.mesh.clone())?;

@@ -29,12 +29,12 @@ pub(super) fn finding(views: &[ScoredView]) -> Option<Finding> {
     let percent = (100.0 * middle).max(0.0);
     if middle < LEAST_MIDDLE {
         let message = format!(
-            "the photos are not explained: of how they vary over the surface, {percent:.0} % is in the pictures of the fit \
-             (median of the training photos)"
+            "the fit does not explain the photos: its renders reproduce {percent:.0} % of their variation \
+             over the surface (median of the training photos)"
         );
         return Some(Finding::new(Severity::Warning, "photos-not-explained", message).remedy(
-            "do not rely on these maps: photos, cameras and mesh may not belong together (`patina check`), or the surface \
-             is of a kind that the model has no word for, as a mirror or glass",
+            "do not rely on these maps: photos, cameras and mesh may not belong together (run `patina check`), \
+             or the surface is outside the model, such as a mirror or glass",
         ));
     }
     let bad: Vec<&str> = shares.iter().filter(|(share, _)| *share < LEAST_OF_ONE).map(|(_, name)| *name).collect();
@@ -42,13 +42,14 @@ pub(super) fn finding(views: &[ScoredView]) -> Option<Finding> {
     let listed = bad.iter().take(SHOWN).copied().collect::<Vec<_>>().join(", ");
     let more = if bad.len() > SHOWN { format!(" and {} more", bad.len() - SHOWN) } else { String::new() };
     let message = format!(
-        "{} training photos are not explained (of the middle one {percent:.0} % of how it varies is): {listed}{more}",
+        "the fit does not explain {} training photos (it reproduces {percent:.0} % of the variation of the \
+         median one): {listed}{more}",
         bad.len()
     );
     Some(
         Finding::new(Severity::Warning, "photos-not-explained", message)
             .at(Place::View(first.into()))
-            .remedy("look at these photos: leave them out with --exclude if they do not belong"),
+            .remedy("check these photos, and exclude them with --exclude if they do not belong"),
     )
 }
 

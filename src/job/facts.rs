@@ -106,14 +106,16 @@ fn atlas_facts(quality: &AtlasQuality) -> Vec<Fact> {
 
 fn evidence(scene: &Scene, settings: &RunSettings) -> String {
     let background = match (scene.background, settings.fit.background) {
-        (Background::Black, _) => "The background is black: pixels without surface say nothing of the light.",
-        (Background::Environment, BackgroundEvidence::Use) => {
-            "Pixels without surface were used: they show the light itself."
+        (Background::Black, _) => {
+            "The background is black: pixels without surface are no evidence for the environment."
         }
-        (Background::Environment, BackgroundEvidence::Ignore) => "Pixels without surface were left out.",
+        (Background::Environment, BackgroundEvidence::Use) => {
+            "Background pixels were used: they show the environment itself."
+        }
+        (Background::Environment, BackgroundEvidence::Ignore) => "Background pixels were ignored.",
     };
     format!(
-        "{background} Clipped channels only push the fit up to the clip, never down; masked and mixed pixels were left \
-         out. Scores count unclipped surface pixels; PSNR and SSIM are of sRGB-encoded values."
+        "{background} Clipped channels only push the fit up to the clip, never down; masked and mixed \
+         pixels were ignored. Scores count unclipped surface pixels; PSNR and SSIM are of sRGB-encoded values."
     )
 }

@@ -159,7 +159,7 @@ pub fn write_picture(
     while accumulation.samples() < settings.samples {
         let samples = (settings.samples - accumulation.samples()).min(SAMPLES_OF_PASS);
         if !accumulation.add_pass(&tracer, camera, 0, samples, stop, &|_| {}) {
-            return Err(Error::new(ErrorKind::Stopped, "stopped while a picture was drawn"));
+            return Err(Error::new(ErrorKind::Stopped, "stopped while an image was rendered"));
         }
         progress(accumulation.samples() as f32 / settings.samples.max(1) as f32);
     }
@@ -273,9 +273,9 @@ fn is_png(path: &Path) -> Result<bool> {
     match ending.as_str() {
         "png" => Ok(true),
         "exr" => Ok(false),
-        _ => Err(Error::new(ErrorKind::Unsupported, "pictures are saved as PNG or EXR")
+        _ => Err(Error::new(ErrorKind::Unsupported, "images are saved as PNG or EXR")
             .at(Place::File(path.into()))
-            .remedy("end the name with .png to keep what the screen shows, or with .exr to keep linear radiance")),
+            .remedy("end the name with .png for what the screen shows, or with .exr for linear radiance")),
     }
 }
 
@@ -300,8 +300,8 @@ pub(super) fn drawn(
 /// A picture that was not stopped.
 fn whole(picture: Picture, stop: &AtomicBool) -> Result<Picture> {
     if stop.load(Ordering::Relaxed) {
-        return Err(Error::new(ErrorKind::Stopped, "stopped while pictures were drawn")
-            .remedy("pictures that were written before are whole"));
+        return Err(Error::new(ErrorKind::Stopped, "stopped while images were rendered")
+            .remedy("images written so far are complete"));
     }
     Ok(picture)
 }

@@ -197,9 +197,8 @@ impl Worker {
             let key = request.key;
             let Err(panic) = catch_unwind(AssertUnwindSafe(|| self.draw(&request))) else { continue };
             let message = text_of_panic(&*panic);
-            let error =
-                Error::new(ErrorKind::Internal, format!("the path-traced picture ended unexpectedly: {message}"))
-                    .remedy("internal error (please report); other pictures can still be drawn");
+            let error = Error::new(ErrorKind::Internal, format!("path tracing ended unexpectedly: {message}"))
+                .remedy("internal error (please report); other images can still be rendered");
             self.failures.put(PreviewFailure { key, error });
             self.call_wake();
         }

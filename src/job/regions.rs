@@ -36,7 +36,7 @@ pub fn read(
             let message = format!("{} reflects up to {largest:.2} times the light it gets", found.name);
             findings.push(
                 Finding::new(Severity::Warning, "region-gains-energy", message)
-                    .remedy("measured tables do so at grazing angles; pictures with many bounces become too bright"),
+                    .remedy("measured tables do so at grazing angles; renders with many bounces become too bright"),
             );
         }
         read.push(material);
@@ -48,13 +48,9 @@ pub fn read(
             for (path, picture) in masks.iter().zip(&pictures) {
                 if picture.pixels().iter().all(|&value| value.is_nan() || value <= COVERED) {
                     findings.push(
-                        Finding::new(
-                            Severity::Warning,
-                            "region-empty",
-                            "the mask covers nothing: its material is not seen",
-                        )
-                        .at(Place::File(path.clone()))
-                        .remedy("paint the region white, on the texture coordinates of the run's mesh"),
+                        Finding::new(Severity::Warning, "region-empty", "the mask is empty: its material is not shown")
+                            .at(Place::File(path.clone()))
+                            .remedy("paint the region white, on the texture coordinates of the run's mesh"),
                     );
                 }
             }

@@ -30,7 +30,7 @@ pub fn relight(
     let settings = PictureSettings { samples, two_sided: true, ..PictureSettings::default() };
     let picture = render(&surface, camera, &parameters, 0, &settings, stop).radiance;
     match stop.load(Ordering::Relaxed) {
-        true => Err(Error::new(ErrorKind::Stopped, "the picture was stopped")),
+        true => Err(Error::new(ErrorKind::Stopped, "rendering was stopped")),
         false => Ok(picture),
     }
 }

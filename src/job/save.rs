@@ -69,7 +69,7 @@ impl Saver {
     pub fn news(&mut self, outcome: &Result<PathBuf>) -> Option<Finding> {
         match outcome {
             Ok(_) => self.failure.take().map(|_| {
-                let message = "the checkpoint could be written again; nothing is lost";
+                let message = "the checkpoint is saved again; nothing was lost";
                 Finding::new(Severity::Note, "checkpoint-written-again", message)
             }),
             Err(error) => {
@@ -83,10 +83,10 @@ impl Saver {
 }
 
 fn not_written(error: &Error) -> Finding {
-    let message = format!("the checkpoint was not written, the fit goes on without: {}", error.message());
+    let message = format!("the checkpoint could not be saved; the fit continues without it: {}", error.message());
     Finding::new(Severity::Warning, "checkpoint-not-written", message).at(error.place().clone()).remedy(format!(
-        "{}; it is tried again every {} seconds",
-        if error.remedy_text().is_empty() { "check free space and permission" } else { error.remedy_text() },
+        "{}; it is retried every {} seconds",
+        if error.remedy_text().is_empty() { "check free disk space and permissions" } else { error.remedy_text() },
         RETRY_INTERVAL.as_secs()
     ))
 }

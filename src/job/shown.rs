@@ -109,7 +109,7 @@ pub(super) fn go_on(stop: &AtomicBool) -> Result<()> {
     match stop.load(Ordering::Relaxed) {
         false => Ok(()),
         true => Err(Error::new(ErrorKind::Stopped, "stopped while the report was made")
-            .remedy("the maps are written; going on from the checkpoint makes the report: `patina resume`")),
+            .remedy("the maps are written; `patina resume` makes the report from the checkpoint")),
     }
 }
 
@@ -148,7 +148,7 @@ pub(super) fn relit_strips(
     if let Some(truth) = scene.truth.as_ref().and_then(|truth| truth.relight.as_ref()) {
         let own_settings = picture_settings(scene, settings, 2 * RELIT_SAMPLES);
         let mut strip = RelitStrip {
-            light: "a light that no photo shows".into(),
+            light: "novel lighting".into(),
             environment: Some(truth.environment.radiance.clone()),
             pictures: Vec::new(),
         };
@@ -178,7 +178,8 @@ pub(super) fn relit_strips(
     let shown: Vec<usize> = order.iter().copied().step_by((order.len() / 3).max(1)).take(3).collect();
     let relight_settings =
         PictureSettings { background_visible: true, ..picture_settings(scene, settings, RELIT_SAMPLES) };
-    let turned = |degrees: f32| (format!("the fitted light turned by {degrees} degrees"), degrees.to_radians());
+    let turned =
+        |degrees: f32| (format!("the estimated environment rotated by {degrees} degrees"), degrees.to_radians());
     let mut lights = Vec::new();
     for sky in BuiltInSky::ALL {
         let sky = light_of(sky.name(), settings.fit.environment_height.max(64))?;

@@ -1,4 +1,4 @@
-//! What the solver tells beside its maps: how sure it is, how lobes are shared, what the light is known by.
+//! What the solver tells beside its maps: how sure it is, how lobes are shared, what constrains the environment.
 
 use crate::error::Result;
 use crate::export::RunFolder;
@@ -95,11 +95,11 @@ impl SolverTold {
         if let Some(shares) = &self.light_evidence {
             let mean = mean_shares(shares).map(|share| 100.0 * share);
             let value = format!(
-                "highlights {:.0} %, background {:.0} %, diffuse light and shadows {:.0} %, belief that skies are \
-                 smooth {:.0} % (means over the sphere; environment_evidence.exr has each texel)",
+                "highlights {:.0} %, background {:.0} %, diffuse light and shadows {:.0} %, smoothness prior {:.0} % \
+                 (means over the sphere; environment_evidence.exr has each texel)",
                 mean[0], mean[1], mean[2], mean[3]
             );
-            facts.push(fact("what the light is known by", value));
+            facts.push(fact("what constrains the environment", value));
         }
         if let Some(deviation) = self.light_scale_deviation {
             facts.push(fact("factor common to light and reflectance", scale_words(deviation)));

@@ -32,7 +32,7 @@ pub fn pace(plan: &[Stage], losses: &[LossRow]) -> (f64, f64) {
     (per_second, seconds)
 }
 
-/// What a step costs, in rounds on the light at full size: about what was measured on `toys` and `saharov_bmvs`.
+/// What a step costs, in rounds on the light at full size: about what was measured.
 fn relative_cost(plan: &[Stage], stage: &Stage, step: usize) -> f64 {
     let shrunk = 0.5f64.powi(stage.photo_level as i32);
     let is_first_of_level =

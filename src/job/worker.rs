@@ -75,7 +75,7 @@ pub fn start_with(
                 Err(panic) => {
                     let message = text_of_panic(&*panic);
                     Error::new(ErrorKind::Internal, format!("the worker of the fit ended unexpectedly: {message}"))
-                        .remedy("internal error (please report); the last checkpoint is whole: `patina resume`")
+                        .remedy("internal error (please report); the last checkpoint is valid: `patina resume`")
                 }
             };
             teller.send(Event::Failed(error));

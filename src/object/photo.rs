@@ -67,7 +67,7 @@ impl ObjectPhoto {
         }
         let negative = radiance.pixels().iter().filter(|pixel| pixel.is_finite() && pixel.min_element() < 0.0).count();
         if negative > 0 {
-            let message = format!("{negative} pixels are negative: they are taken as 0");
+            let message = format!("{negative} pixels are negative: they are set to 0");
             findings.push(Finding::new(Severity::Note, "photo-negative", message).at(place()));
         }
         let radiance = radiance.map(|pixel| if pixel.is_finite() { pixel.max(Vec3::ZERO) } else { Vec3::ZERO });

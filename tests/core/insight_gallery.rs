@@ -163,7 +163,7 @@ fn light_that_is_baked_into_the_maps_shows_under_other_lights_only() {
     };
     let rows = table(&parameters(&truth.maps, &truth.environment));
     let names: Vec<&str> = rows.iter().map(|row| row.light.as_str()).collect();
-    assert_eq!(names, ["the light of the photos", "a light that no photo shows", "evening", "overcast"]);
+    assert_eq!(names, ["the light of the photos", "novel lighting", "evening", "overcast"]);
     assert_eq!(rows.iter().map(|row| row.is_own).collect::<Vec<_>>(), [true, false, false, false]);
 
     // Reflectance times 0.8, light over it: right again once the scale is aligned.

@@ -85,7 +85,7 @@ fn a_run_folder_that_cannot_be_written_is_a_warning_and_is_tried_again() {
     // What the check says of so small photos.
     studio.model().log.clear();
     studio.click("Checkpoint");
-    studio.wait_for_word("the checkpoint was not written");
+    studio.wait_for_word("the checkpoint could not be saved");
     assert!(studio.says("warning"));
     studio.click("Messages (1)");
     assert!(studio.says("Fix: "), "{}", studio.log());
@@ -115,7 +115,7 @@ fn a_disk_that_is_full_is_told_and_the_last_checkpoint_stays() {
     #[cfg(unix)]
     std::os::unix::fs::symlink("/dev/full", temporary_beside(&checkpoint)).unwrap();
     studio.click("Checkpoint");
-    studio.wait_for_word("the checkpoint was not written");
+    studio.wait_for_word("the checkpoint could not be saved");
     assert!(studio.log().contains("No space left"), "{}", studio.log());
     assert!(std::fs::read(&checkpoint).unwrap() == before, "the last checkpoint stays as it was");
     assert_lives(&mut studio);

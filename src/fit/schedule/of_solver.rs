@@ -34,7 +34,7 @@ enum CoarseMaps {
 
 /// The solver's part in maps of all sizes.
 ///
-/// Where polishing follows, light and maps need not be found as well: on photographs of a statue and of portals the time
+/// Where polishing follows, light and maps need not be found as well: on photographs the time
 /// that second maps on the coarsest level, a second round on the light on finer ones and maps twice as large took serves
 /// better for more steps of polishing.
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -12,9 +12,8 @@ use faer::{Mat, MatRef, Side};
 const LEAST_USUAL: f64 = 0.3;
 /// Share of the hold on suns that all narrow hats have, so that none of them is free.
 const LEAST_HOLD: f64 = 1e-6;
-/// By which power of the scale of a texel it may differ from its neighbours: suns more than they may shine. With 1 a sun
-/// of 1e5 is smeared (diffuse error of that hard case a fifth larger), with 2 holes between what photos show stay dark
-/// (held-out errors of the hard cases 0.905 of those without [`believe_narrow`], geometric mean, with 1.25 0.878).
+/// By which power of the scale of a texel it may differ from its neighbours: suns more than they may shine. With 1 a
+/// strong sun is smeared, with 2 holes between what photos show stay dark.
 const NEIGHBOUR_POWER: f64 = 1.25;
 
 /// What is believed of the light.

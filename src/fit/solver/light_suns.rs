@@ -14,8 +14,7 @@ const SUN_RADIUS_DEGREES: f32 = 20.0;
 /// What narrow hats are believed to be (one standard deviation), over the usual radiance of their channel, by the light
 /// before the step, given with its coefficients. Where all channels are bright there is a sun, and it may be much
 /// brighter; elsewhere there is sky. One channel alone is no sun: solved by themselves, channels put blue or red suns where
-/// only held-out views look. On eight hard cases (geometric means) held-out errors are .063 so, .126 with a scale of each
-/// channel's own, errors of the light .48 and .60.
+/// only held-out views look.
 pub fn narrow_scales(shape: &LightShape, light: &[[f32; 3]], coefficients: &[Vec<f32>; 3], suns: Suns) -> Vec<f64> {
     let usual = coefficients.each_ref().map(|x| usual_radiance(shape, x));
     let brightness = |&texel: &u32| {

@@ -58,7 +58,7 @@ impl KindEvidence {
     ///
     /// Diffuse reflectance is integrated out, and it is at least zero: in a channel where it would be less at the best
     /// F0 it is held at zero, and F0 found anew. Without that, wide and strong lobes over what they outshine, made up
-    /// for by less than black below, took over photographs (`saharov_bmvs`: RMSE of the maps .0446, with it .0367).
+    /// for by less than black below, take over photographs.
     #[inline(always)]
     pub(super) fn at_widths(&self, (inverse_ee, volume): ([f64; 3], f64), sums: [&FourWidths; 3]) -> KindAtWidths {
         // Array by array, loop by loop: closures are compiled for any processor.

@@ -47,10 +47,8 @@ pub enum SurfaceKinds {
     #[default]
     Any,
     /// Hardly any metal, and no more of what maps show. What is wrong with mesh, cameras and light of photographs goes
-    /// together over whole tiles and counts for more than a metal's share: of `saharov_bmvs` granite came out as rough
-    /// metal over an orange ground, F0 0.27 in the mean where it is 0.07 so, with held-out pictures further off. Metal that
-    /// pixels show is found all the same: on the built-in scene rendered by Mitsuba, polished, specular errors are 0.1556
-    /// for 0.1535.
+    /// together over whole tiles and counts for more than a metal's share: granite comes out as rough metal over an orange
+    /// ground, with held-out pictures further off. Metal that pixels show is found all the same.
     Outdoors,
 }
 

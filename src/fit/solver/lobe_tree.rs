@@ -71,8 +71,8 @@ struct ColourCut {
 
 /// The first cut by colour,
 const FIRST_CUT: ColourCut = ColourCut { grey: 1.0, least_difference: 0.03 };
-/// and those inside of its parts. With all of the grey, specular reflectance of `toys` is further off (in the mean of three
-/// seeds .0744 for .0735) and that of the demo's scene as near (.1380, .1378), its pictures .0361 for .0342.
+/// and those inside of its parts. With all of the grey, specular reflectance and pictures are further
+/// off.
 const INNER_CUT: ColourCut = ColourCut { grey: 0.3, least_difference: 0.12 };
 
 /// A group smaller than this is not cut by colour.
@@ -80,7 +80,7 @@ const LEAST_TO_CLUSTER: usize = 12;
 /// Nor a square of fewer texels along its side.
 const LEAST_SIDE_TO_CLUSTER: usize = 8;
 /// Texels along the side of the smallest squares. One texel has too few pixels of its own for a lobe of its own: with
-/// squares of one texel maps of `toys` were the same, and three quarters of all groups are such squares.
+/// squares of one texel maps are the same, and three quarters of all groups are such squares.
 const SMALLEST: usize = 2;
 
 /// Texels along the side of the largest squares whose groups are kept, to be found again: as many as a mask has bits.
@@ -162,7 +162,7 @@ struct Tree<'a> {
     /// How often all of its texels may be cut by colour.
     colour_cuts: u8,
     /// Small groups that were grown. Cuts by colour of all sizes lead to them again and again: where a colour fills a
-    /// square, they are those of the square itself. On photographs of a statue that halves what asking all groups takes.
+    /// square, they are those of the square itself. On photographs that halves what asking all groups takes.
     kept: RefCell<HashMap<GroupKey, Rc<Node>>>,
 }
 

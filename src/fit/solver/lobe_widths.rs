@@ -1,8 +1,8 @@
 //! Widths at which lobes are weighed: those that were integrated, and halves between wide ones.
 //!
 //! From one integrated width to the next a lobe's peak halves, so both may fit far worse than what lies between, with an
-//! F0 that is off by half: weighed at integrated widths alone, metals of the exchange scene `toys` came out with F0 .3
-//! for .5. Integrals are smooth in the logarithm of the width, so those between follow from four neighbours (Lagrange).
+//! F0 that is off by half: weighed at integrated widths alone, metals come out too dull by as much. Integrals are smooth in
+//! the logarithm of the width, so those between follow from four neighbours (Lagrange).
 
 use std::ops::Range;
 

@@ -248,8 +248,8 @@ fn background_pixels(
 
 /// Sets by how much pixels that look at one texel disagree with the light that explains them all best.
 ///
-/// Not by how much they differ: beside a sun they do, and would say nothing of the texels around it, although all agree
-/// (`patina bench hard`, plain: the sun leaked into its neighbours, picture error .225).
+/// Not by how much they differ: beside a sun they do, and would say nothing of the texels around it, although all agree; the
+/// sun would leak into its neighbours.
 fn set_scatter(pixels: &mut [BackgroundPixel], texels: usize) {
     let mut of_texel: Vec<Vec<(usize, f64)>> = vec![Vec::new(); texels];
     for (index, pixel) in pixels.iter().enumerate() {

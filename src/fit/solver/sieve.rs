@@ -4,8 +4,7 @@
 //! other; each pixel draws a lot by its place alone, and a block that has too many asks for better lots from then on, by
 //! halves. What is left is an even sample of all views, whichever came first. Where no block has too many, as in scenes of
 //! some dozen photos, or where all pixels are few, all stay: diffuse reflectance is solved with all of them at the end.
-//! Small photos over coarse maps were thinned at first, which made diffuse maps of the hard cases worse by 4 % in the mean,
-//! under the strongest sun by two fifths.
+//! Thinning small photos over coarse maps makes diffuse maps worse, most of all under a strong sun.
 
 use super::observations::Observation;
 use crate::math::random::mix;

@@ -19,7 +19,7 @@ const PASSES: usize = 2;
 /// Sweeps of Gauss and Seidel over the reflectances of a tile.
 pub(super) const SWEEPS: usize = 8;
 /// Residuals of bright pixels are forgiven: at the mean radiance a fifth of the noise's variance goes with the radiance.
-/// With half of it highlights were too dull (the vase: specular .136, with a fifth .134; its pictures .0231, .0223).
+/// With half of it highlights are too dull.
 const RELATIVE_NOISE: f32 = 0.5;
 /// A pixel this many times further off than the median (squared) counts half.
 const TOLERANCE: f32 = 30.0;

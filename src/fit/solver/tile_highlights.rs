@@ -8,10 +8,10 @@ use super::lobe_widths::{KeptStencil, log_widths};
 use super::tile::{Tile, forgiven};
 
 /// Least radiance of a lobe of F0 = 1 over that of a white diffuse surface in the same place for a highlight. Where lobes
-/// are no brighter any error of the light is explained by F0: in a deep bowl of plaster its error grew from .019 to .042.
+/// are no brighter any error of the light is explained by F0, as in a deep bowl of plaster.
 const LEAST_CONTRAST: f32 = 1.0;
-/// How much of what is forgiven for its brightness a highlight loses. Pictures on the demo's scene are .0394 with none,
-/// .0367 so, .0363 with all of it; but then the vase's roughness goes from .064 to .075.
+/// How much of what is forgiven for its brightness a highlight loses. Most of what pictures gain they gain so; with all
+/// of it roughness gets worse.
 const NOT_FORGIVEN: f32 = 0.3;
 
 impl Tile {

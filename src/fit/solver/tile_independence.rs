@@ -1,11 +1,10 @@
 //! How much of a tile's evidence is independent, as its own residuals tell.
 //!
 //! Light that is a little wrong, a gain, a normal: such errors are alike in all pixels of one view of a tile, and however
-//! many pixels there are, they are one error. Counted as many, they were explained by lobes: on photographs of a statue
-//! (`saharov_bmvs`) whole tiles of ground and pavement came out as rough metal over black beside others of the same
-//! stone that did not. By how much the mean residual of a view varies more than it would if pixels were independent is
-//! the design effect (Kish 1965, Survey Sampling, section 5.4); its median over tiles is 1.5 on the exchange scene `toys`
-//! and 9.5 there.
+//! many pixels there are, they are one error. Counted as many, they are explained by lobes: on photographs whole tiles of
+//! stone come out as rough metal over black beside others of the same stone that do not. By how much the mean residual of
+//! a view varies more than it would if pixels were independent is the design effect (Kish 1965, Survey Sampling, section
+//! 5.4); its median over tiles is below 2 where the model holds, and several times that on photographs.
 
 use super::tile::Tile;
 use std::collections::BTreeMap;
@@ -27,9 +26,8 @@ impl Tile {
     /// The share of pixels that counts as independent evidence, at most `most`, by their residuals and weights as they are.
     ///
     /// It falls with the square of the design effect: once since so many pixels are one, and once more since what they
-    /// share is a fault of the model, which pixels of other views are not free of. With the first power squares stayed
-    /// visible on the statue, and specular maps gained less (`toys` .0742 for .0732; hard cases .974 and .967 times those
-    /// of before, geometric means), roughness as much (.0939 for .0938; 1.001 and 1.006 times).
+    /// share is a fault of the model, which pixels of other views are not free of. With the first power squares stay
+    /// visible on photographs, and specular maps gain less.
     pub(super) fn independence(&self, most: f64) -> f64 {
         most * (ALLOWED_FOR / self.design_effect().max(ALLOWED_FOR)).powi(2)
     }

@@ -13,8 +13,8 @@ use std::time::Instant;
 
 /// What is believed of diffuse reflectance before looking: this standard deviation.
 const DIFFUSE_SPREAD: f64 = 0.35;
-/// Standard deviation of a texel's diffuse reflectance from that of the group that shares its lobe. With 0.2 dark texels
-/// went below zero in what was weighed, under lobes that are too bright (`toys`: specular .085, with 0.05 .080).
+/// Standard deviation of a texel's diffuse reflectance from that of the group that shares its lobe. With four times as
+/// much dark texels go below zero in what is weighed, under lobes that are too bright.
 const TEXEL_SPREAD: f64 = 0.05;
 /// By how much a width that was not looked at counts as worse, per unit of its logarithm.
 const UNSEEN_WIDTH: f64 = 20.0;

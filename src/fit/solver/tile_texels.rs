@@ -14,10 +14,10 @@ use super::tile::{SWEEPS, Tile};
 use super::tile_spread::Spread;
 
 /// How much more pixels count here than as evidence for lobes. There what they have in common, errors of the model, would
-/// otherwise be taken for other lobes; here one texel has few pixels, and F0 is held. With 20 the specular map of `toys`
-/// followed the noise (.077 for .075).
+/// otherwise be taken for other lobes; here one texel has few pixels, and F0 is held. With four times as much the specular map
+/// follows the noise.
 const TRUST: f64 = 5.0;
-/// Times that it is solved. Three times give the demo pictures of .0326 for .0329, and the roughness .163 for .160.
+/// Times that it is solved. A third time brings pictures nearer by little, and roughness no nearer.
 const PASSES: usize = 2;
 /// How far the logarithm of a width may go in one sweep, and from what was believed of it: farther off its slope is another.
 const WIDTH_REACH: [f64; 2] = [0.2, 0.3];

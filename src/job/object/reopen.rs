@@ -33,7 +33,7 @@ pub fn reopen(folder: &Path) -> Result<ReopenedObject> {
             findings.push(
                 Finding::new(Severity::Warning, "photos-not-opened", message)
                     .at(error.place().clone())
-                    .remedy("put them back; light and reflectance can be looked at without them"),
+                    .remedy("put them back; environment and reflectance can be viewed without them"),
             );
             Vec::new()
         }

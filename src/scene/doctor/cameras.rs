@@ -36,12 +36,15 @@ pub fn check(scene: &Scene, report: &mut Report) -> Vec<bool> {
                     Severity::Warning,
                     "camera-off-centre",
                     format!(
-                        "the principal point ({:.0}, {:.0}) lies far from the centre of a {} x {} photo",
+                        "the principal point ({:.0}, {:.0}) is far from the centre of a {} x {} photo",
                         camera.centre_pixels.x, camera.centre_pixels.y, camera.width, camera.height
                     ),
                 )
                 .at(Place::View(view.name.clone()))
-                .remedy("the intrinsics may be for photos of another size: scale them, or use the photos they were made for"),
+                .remedy(
+                    "the intrinsics may belong to photos of another size: scale them, or use the photos they were \
+                     calibrated on",
+                ),
             );
         }
     }
@@ -61,10 +64,10 @@ fn check_count(scene: &Scene, report: &mut Report) {
             Finding::new(
                 Severity::Warning,
                 "few-views",
-                format!("only {training} views are fitted: highlights are seen from few sides"),
+                format!("only {training} training views: highlights are seen from few directions"),
             )
             .remedy(
-                "roughness and specular stay near their start where no view shows a highlight: read the coverage map",
+                "where no view shows a highlight, roughness and specular stay near their start values: see the view count map",
             ),
         );
     }
@@ -76,15 +79,15 @@ fn check_count(scene: &Scene, report: &mut Report) {
     let twins: Vec<&str> = places.windows(2).filter(|pair| pair[0].0 == pair[1].0).map(|pair| pair[1].1).collect();
     if !twins.is_empty() && twins.len() + 1 == scene.views.len() {
         report.findings.push(
-            Finding::new(Severity::Warning, "cameras-at-one-place", "all cameras stand at the same place")
-                .remedy("a highlight moves only when the camera does: photograph from several places"),
+            Finding::new(Severity::Warning, "cameras-at-one-place", "all cameras are at the same position")
+                .remedy("highlights only move when the camera does: take photos from several positions"),
         );
     } else if !twins.is_empty() {
         report.findings.push(
             Finding::new(
                 Severity::Note,
                 "cameras-repeated",
-                format!("{} views stand where another one does: {}", twins.len(), names_of(&twins)),
+                format!("{} views have the same camera position as another: {}", twins.len(), names_of(&twins)),
             )
             .remedy("check that their camera files are not copies"),
         );
@@ -107,10 +110,10 @@ fn check_upright(scene: &Scene, usable: &[bool], report: &mut Report) {
         Finding::new(
             Severity::Warning,
             if most { "up-inverted" } else { "cameras-upside-down" },
-            format!("{} of {} pictures are upside down: {}", turned.len(), scene.views.len(), names_of(&turned)),
+            format!("{} of {} photos are upside down: {}", turned.len(), scene.views.len(), names_of(&turned)),
         )
         .remedy(if most {
-            "the up axis is wrong: give --up, or leave it to be estimated"
+            "the up axis is wrong: set it with --up, or leave it on auto"
         } else {
             "check the orientation of these photos and cameras"
         }),
@@ -129,7 +132,7 @@ pub fn check_sight(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
     let all_blind = blind.len() == scene.views.len() && !blind.is_empty();
     if all_blind {
         report.findings.push(Finding::new(Severity::Fatal, "views-see-nothing", "no view sees the mesh").remedy(
-            "mesh and cameras lie in different worlds: check axes, units and the direction of the camera matrix",
+            "mesh and cameras are in different coordinate systems: check axes, units and the direction of the camera matrix",
         ));
     } else {
         for name in &blind {
@@ -137,10 +140,10 @@ pub fn check_sight(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
                 Finding::new(
                     Severity::Warning,
                     "view-sees-nothing",
-                    "the view does not see the mesh: it says nothing of the surface",
+                    "the view does not see the mesh, so it contributes nothing",
                 )
                 .at(Place::View((*name).into()))
-                .remedy("check its camera, or leave the view out"),
+                .remedy("check its camera, or exclude the view"),
             );
         }
     }
@@ -214,7 +217,7 @@ fn explain(scene: &Scene, asked: f64, report: &mut Report) {
                 Severity::Warning,
                 "camera-convention",
                 format!(
-                    "{:.0} % of the mesh lies in the pictures; if {name}, it would be {:.0} %",
+                    "{:.0} % of the mesh is inside the photos; if {name}, it would be {:.0} %",
                     100.0 * asked,
                     100.0 * share
                 ),

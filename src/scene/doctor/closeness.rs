@@ -12,7 +12,7 @@ use crate::trace::{Bvh, Ray};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Share of what is seen beyond which thin walls are told: of sound meshes up to 1.7 % is thin, of thin shells 36 %.
+/// Share of what is seen beyond which thin walls are told: sound meshes have less, thin shells a multiple.
 const TOLD_THIN: f64 = 0.02;
 /// Share beyond which gaps are told: things that stand on a floor have two or three thousandths where they meet it.
 const TOLD_TOUCHING: f64 = 0.005;
@@ -53,12 +53,12 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
     if share(all.thin) > TOLD_THIN {
         let message =
             format!("{:.0} % of what the photos show are walls thinner than a pixel", 100.0 * share(all.thin));
-        report.findings.push(
-            Finding::new(Severity::Warning, "mesh-thin", message).at(most(&|counts| counts.thin)).remedy(
-                "at their rims pixels and texels of both sides mix: give the wall its true thickness, or take photos \
-                 from nearer",
-            ),
-        );
+        report
+            .findings
+            .push(Finding::new(Severity::Warning, "mesh-thin", message).at(most(&|counts| counts.thin)).remedy(
+            "pixels and texels of both sides mix at their rims: give walls their true thickness, or take photos from \
+                 closer up",
+        ));
     }
     if share(all.touching) > TOLD_TOUCHING {
         let message = format!(
@@ -67,8 +67,8 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
         );
         report.findings.push(
             Finding::new(Severity::Warning, "mesh-touching", message).at(most(&|counts| counts.touching)).remedy(
-                "maps there are known badly, since little light falls in and pixels mix; photograph things apart where \
-                 their maps matter",
+                "maps are unreliable there, since little light gets in and pixels mix; photograph objects \
+                 separately where their maps matter",
             ),
         );
     }

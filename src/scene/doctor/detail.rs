@@ -42,15 +42,15 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
     let most = (0..of_views.len()).max_by_key(|&view| (of_views[view][1], std::cmp::Reverse(view)));
     if let Some(view) = most.filter(|_| share > TOLD_SHARE) {
         let message = format!(
-            "{:.0} % of what the photos show differs more from pixel to pixel than over several: a texture finer than \
-             the photos resolve, reflections of small things, or noise",
+            "{:.0} % of what the photos show varies more from pixel to pixel than over several: a texture finer than \
+             the photos resolve, reflections of small objects, or noise",
             100.0 * share
         );
         report.findings.push(
             Finding::new(Severity::Warning, "detail-too-fine", message)
                 .at(Place::View(scene.views[view].name.clone()))
                 .remedy(
-                    "take photos from nearer, or use larger ones: maps hold the mean of what a pixel shows, and the \
+                    "take photos from closer up, or use larger ones: maps hold the mean of what a pixel shows, and the \
                      highlights of its parts are taken for one rougher whole",
                 ),
         );

@@ -85,7 +85,7 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
     if share > TOLD_SHARE {
         let message = format!(
             "{:.0} % of what the photos show are triangles some {:.0} pixels wide that turn by some {:.0} degrees from \
-             one to the next: the mesh is coarser than the thing",
+             one to the next: the mesh is coarser than the object",
             100.0 * share,
             pixels / coarse as f64,
             degrees / coarse as f64

@@ -81,7 +81,7 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
         "mesh-degenerate",
         "triangles have no area, this is the first",
         first_degenerate,
-        "no ray meets them and the atlas dissolves them",
+        "rays miss them, and the atlas removes them",
     );
     note(
         counts.duplicate_triangles,
@@ -102,7 +102,7 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
         "mesh-non-manifold",
         "edges are shared by more than two triangles",
         None,
-        "the atlas cuts there; a cleaner mesh gives larger charts",
+        "the atlas cuts there; a cleaner mesh gives larger UV islands",
     );
     check_sides(scene, probes, report);
 }

@@ -62,7 +62,7 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
         let severity = if black.len() == views { Severity::Fatal } else { Severity::Warning };
         report.findings.push(
             Finding::new(severity, "photo-black", format!("{} views are black: {}", black.len(), names_of(&black)))
-                .remedy("check the files, or leave these views out"),
+                .remedy("check the files, or exclude these views"),
         );
     }
     if !white.is_empty() {
@@ -71,9 +71,9 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
             Finding::new(
                 severity,
                 "photo-white",
-                format!("{} views are clipped all over: {}", white.len(), names_of(&white)),
+                format!("{} photos are clipped everywhere: {}", white.len(), names_of(&white)),
             )
-            .remedy("they tell no radiance: check the files and their exposure, or leave these views out"),
+            .remedy("they hold no radiance: check the files and their exposure, or exclude these views"),
         );
     }
     if linear_looking * 2 > views {

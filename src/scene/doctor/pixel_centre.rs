@@ -303,7 +303,7 @@ pub fn check(scene: &Scene, bvh: &Bvh, report: &mut Report) {
                 Severity::Warning,
                 "pixel-centre-off",
                 format!(
-                    "the photos lie half a pixel beside the mesh: pixel centres are at {}, not at (0.5, 0.5)",
+                    "the photos are half a pixel off the mesh: pixel centres are at {}, not at (0.5, 0.5)",
                     measurement.figures(0.0)
                 ),
             )

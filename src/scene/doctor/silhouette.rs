@@ -41,8 +41,14 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
     let median = quantile(&overlaps, 0.5);
     if median < FATAL_OVERLAP {
         report.findings.push(
-            Finding::new(Severity::Fatal, "masks-and-mesh-disagree", format!("masks and mesh overlap by {:.0} % only (median over the views)", 100.0 * median))
-                .remedy("look at the overlays: masks may be inverted (255 is object), or the cameras may be those of another mesh"),
+            Finding::new(
+                Severity::Fatal,
+                "masks-and-mesh-disagree",
+                format!("masks and mesh overlap by only {:.0} % (median over the views)", 100.0 * median),
+            )
+            .remedy(
+                "check the overlays: masks may be inverted (255 is object), or the cameras may belong to another mesh",
+            ),
         );
     } else if !low.is_empty() {
         report.findings.push(
@@ -57,7 +63,7 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
                 ),
             )
             .remedy(
-                "look at the overlays of these views: the mask may hold more than the mesh, or the camera may be off",
+                "check the overlays of these views: the mask may cover more than the mesh, or the camera may be off",
             ),
         );
     }

@@ -16,15 +16,11 @@
 //! By default no map changes: what is chosen is told, not taken over. Lobes of their own are means over all ways to cut
 //! the surface, weighed by their evidence, so a texel that needs none of its own has one that is nearly its neighbours';
 //! and a region whose pixels no lobe explains better still has a roughness, which nothing but that evidence tells. Taken
-//! over, maps of the exchange scene `toys` under its true light, six views held out and judging, got worse: diffuse
-//! (aligned) .0454 for .0431, specular .089 for .083, roughness .224 for .097. Pictures may gain all the same: those of
-//! `saharov_bmvs` at 192 x 144 pixels, a matte statue, in four views that neither judged nor were fitted to: 21.26 dB for
-//! 21.10 and structural similarity .644 for .620, yet linear RMSE .0584 for .0575. Hence `--solver-choices apply`;
-//! training views judge then, so that held-out ones still judge the fit.
+//! over, maps get worse, roughness most of all. Pictures of matte things in photographs may gain all the same: hence
+//! `--solver-choices apply`; training views judge then, so that held-out ones still judge the fit.
 //!
-//! It costs two more solutions of diffuse reflectance for each alternative and no lobe's integral but at judging pixels:
-//! 6 % of the fit on the demo scene, 2 % on `saharov_bmvs`. Where views have to be withheld the beliefs about lobes are
-//! made once more: 3 % there.
+//! It costs two more solutions of diffuse reflectance for each alternative and no lobe's integral but at judging pixels, some
+//! hundredths of the fit. Where views have to be withheld the beliefs about lobes are made once more.
 
 pub mod alternatives;
 pub mod apply;
