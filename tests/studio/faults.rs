@@ -95,7 +95,7 @@ fn a_run_folder_that_cannot_be_written_is_a_warning_and_is_tried_again() {
     std::fs::remove_file(&run).unwrap();
     std::fs::rename(&aside, &run).unwrap();
     studio.click("Checkpoint");
-    studio.wait_for_word("could be written again");
+    studio.wait_for_word("is saved again");
 }
 
 #[test]
@@ -121,7 +121,7 @@ fn a_disk_that_is_full_is_told_and_the_last_checkpoint_stays() {
     assert_lives(&mut studio);
 
     studio.click("Checkpoint");
-    studio.wait_for_word("could be written again");
+    studio.wait_for_word("is saved again");
     assert!(std::fs::read(&checkpoint).unwrap() != before);
 
     // Full again when it stops: the steps since the last checkpoint are lost, which is an error, not a warning.

@@ -60,7 +60,7 @@ fn a_checkpoint_that_cannot_be_written_is_a_warning_and_is_tried_again() {
         })
         .collect();
     assert_eq!(warnings.len(), 1, "told once: {warnings:?}");
-    assert!(warnings[0].place.contains("settings.toml") && warnings[0].remedy.contains("tried again"));
+    assert!(warnings[0].place.contains("settings.toml") && warnings[0].remedy.contains("retried"));
     gate.next();
     assert_eq!(taken_up(&folder).state().step, 5);
     drop(gate);
