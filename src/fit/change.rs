@@ -65,6 +65,7 @@ reaches! {
     solver_levels: Fit,
     solver_choices: Fit,
     solver_polish: NextSteps,
+    solver_refine: NextSteps,
     held_out_interval: NextSteps,
     exclude: StageWork,
 }

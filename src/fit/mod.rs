@@ -19,6 +19,7 @@ pub mod adam;
 mod advance;
 mod batch;
 pub mod by_name;
+mod cached_pictures;
 mod change;
 pub mod checkpoint;
 pub mod consistency;
@@ -50,6 +51,7 @@ pub mod views;
 mod weigh;
 mod work;
 
+pub use cached_pictures::{CachedPicture, CachedView};
 pub use fitter::{Fitter, StepOutcome};
 pub use presets::Preset;
 pub use settings::{FitSettings, Method};

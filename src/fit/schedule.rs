@@ -19,6 +19,8 @@ pub enum StageKind {
     NarrowLight,
     /// The solver makes all maps under the light that was found.
     Maps,
+    /// The solver makes diffuse maps of full size from whole pixels.
+    Refine,
     /// Optimiser steps on everything, after the solver's maps.
     Polish,
 }
@@ -26,7 +28,7 @@ pub enum StageKind {
 impl StageKind {
     /// Whether its steps are the solver's own, each as long as many of the optimiser.
     pub fn is_of_solver(self) -> bool {
-        matches!(self, StageKind::WideLight | StageKind::NarrowLight | StageKind::Maps)
+        matches!(self, StageKind::WideLight | StageKind::NarrowLight | StageKind::Maps | StageKind::Refine)
     }
 }
 
@@ -64,6 +66,7 @@ impl Stage {
             StageKind::WideLight => "wide light",
             StageKind::NarrowLight => "narrow light",
             StageKind::Maps => "maps",
+            StageKind::Refine => "refine",
             StageKind::Polish => "polish",
         };
         if self.photo_level == 0 && !matches!(self.kind, StageKind::Diffuse | StageKind::All) {
@@ -97,7 +100,7 @@ impl Stage {
         match self.kind {
             StageKind::Diffuse => 0.0,
             StageKind::All if ramp == 0 => 1.0,
-            StageKind::WideLight | StageKind::NarrowLight | StageKind::Maps | StageKind::Polish => 1.0,
+            StageKind::WideLight | StageKind::NarrowLight | StageKind::Maps | StageKind::Refine | StageKind::Polish => 1.0,
             StageKind::All => ((self.steps_before + step + 1) as f32 / ramp as f32).min(1.0),
         }
     }

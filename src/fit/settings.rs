@@ -186,6 +186,9 @@ pub struct FitSettings {
     /// holds, they make maps worse.
     #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().solver_polish))]
     pub solver_polish: usize,
+    /// Solutions for the diffuse map from whole pixels of full size, after the solver's other steps.
+    #[arg(long, default_value_t = FitSettings::default().solver_refine)]
+    pub solver_refine: usize,
     /// Held-out evaluation interval in optimiser steps; 0 evaluates at the end only.
     #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().held_out_interval))]
     pub held_out_interval: usize,
@@ -228,6 +231,7 @@ impl Default for FitSettings {
             solver_levels: 2,
             solver_choices: Choosing::Tell,
             solver_polish: 0,
+            solver_refine: 1,
             held_out_interval: 10,
             exclude: Vec::new(),
         }

@@ -31,7 +31,8 @@ impl Fitter {
         let check_choices = whole.check_choices && last_maps.is_some_and(|last| last.is_of_level_of(stage));
         let is_last = last_maps == Some(stage);
         // The grid is not halved with the maps: light that reaches points too far apart bounds what small maps can show.
-        let settings = SolverSettings { map_size: stage.map_size, check_choices, ..whole };
+        let whole_pixels = stage.kind == StageKind::Refine;
+        let settings = SolverSettings { map_size: stage.map_size, check_choices, whole_pixels, ..whole };
         let level = (stage.photo_level, stage.map_size);
         let is_of_level = |solver: &SolverScene| (self.solver_photo_level, solver.settings.map_size) == level;
         if !self.solver.as_ref().is_some_and(is_of_level) {
@@ -46,6 +47,7 @@ impl Fitter {
         solver.settings.check_choices = check_choices && is_last;
         let step = match stage.kind {
             StageKind::Maps => SolverStep::Maps,
+            StageKind::Refine => SolverStep::Refine,
             _ => SolverStep::Light(self.light_rounds_done()),
         };
         self.grow_maps(stage.map_size);

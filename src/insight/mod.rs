@@ -18,6 +18,7 @@ pub mod intervals;
 pub mod label;
 pub mod material_pictures;
 pub mod memory;
+pub mod nearest_photo;
 pub mod plot;
 pub mod record;
 pub mod report;

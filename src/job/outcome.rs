@@ -5,7 +5,7 @@ use super::explained;
 use super::facts::{describe, loss_rows};
 use super::pictures::parameters;
 use super::prepare::{Prepared, RunSettings, covered, timed};
-use super::shown::{exposure_of, go_on, relit_strips, score_views};
+use super::shown::{ScoredView, exposure_of, go_on, relit_strips, score_views};
 use super::solver_told::SolverTold;
 use super::{Event, FinishingStage};
 use crate::atlas::{dilate, nearest_covered};
@@ -17,11 +17,14 @@ use crate::image::{GreyImage, Image};
 use crate::insight::report::choice_table::ChoiceTable;
 use crate::insight::report::data::{NamedAggregate, ReportData, StageTime, ViewLine};
 use crate::insight::report::{ReportImages, write_report};
-use crate::insight::scores::aggregate;
+use crate::insight::scores::{ViewScores, aggregate};
 use crate::insight::{capture, coverage, memory};
 use crate::material::MaterialMaps;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
+
+/// What a picture without a light is worth on a view.
+type Baseline = fn(&ScoredView) -> Option<&ViewScores>;
 
 /// Renders, scores and writes everything into the run folder; returns what the report says. What is wrong with the capture
 /// is told on the way, as events.
@@ -90,6 +93,16 @@ pub fn write(
         if !of_kind.is_empty() {
             let score = aggregate(of_kind.iter().map(|view| &view.scores));
             data.aggregates.push(NamedAggregate { name: name.into(), score });
+        }
+    }
+    let baselines: [(&str, Baseline); 2] = [
+        ("held-out views, a texture without a light", |view| view.of_texture.as_ref()),
+        ("held-out views, the nearest photo", |view| view.of_nearest.as_ref()),
+    ];
+    for (name, scores) in baselines {
+        let scores: Vec<_> = views.iter().filter_map(scores).collect();
+        if !scores.is_empty() {
+            data.aggregates.push(NamedAggregate { name: name.into(), score: aggregate(scores) });
         }
     }
     data.truth = truth_errors(scene, surface, &result.maps, told.deviations.as_deref(), &result.environment)?;

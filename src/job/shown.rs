@@ -6,10 +6,11 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::export::RunResult;
 use crate::fit::targets::Target;
 use crate::fit::views::views_of;
-use crate::fit::{Fitter, ViewUse};
+use crate::fit::{CachedPicture, Fitter, ViewUse};
 use crate::image::{Image, RgbImage};
 use crate::insight::report::{RelitPicture, RelitStrip, ViewPictures};
-use crate::insight::scores::{ViewScores, mean_of, score_halves};
+use crate::insight::nearest_photo::{Reprojected, reprojected};
+use crate::insight::scores::{ViewScores, mean_of, score_halves, score_view};
 use crate::light::sky::BuiltInSky;
 use crate::render::picture::{Picture, PictureSettings, render};
 use crate::render::{Parameters, Surface};
@@ -17,7 +18,9 @@ use crate::scene::{Background, PixelState, Scene};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Pixels of a held-out view in the report, at most; larger photos are halved first.
-const HELD_OUT_PIXELS: usize = 400_000;
+const HELD_OUT_PIXELS: usize = 4_000_000;
+/// The same where paths are traced.
+const TRACED_PIXELS: usize = 400_000;
 /// Pixels of a training view in the report, at most.
 const TRAINING_PIXELS: usize = 60_000;
 /// Paths a pixel in the report's pictures of held-out views.
@@ -34,7 +37,30 @@ pub(super) struct ScoredView {
     pub index: usize,
     pub kind: ViewUse,
     pub scores: ViewScores,
+    /// Of the texture without a light, on the same pixels.
+    pub of_texture: Option<ViewScores>,
+    /// Of the nearest photo, on those of the same pixels that it shows.
+    pub of_nearest: Option<ViewScores>,
     pub pictures: ViewPictures,
+}
+
+/// A picture in two halves, which are the same where it has no noise.
+struct Drawn {
+    halves: [RgbImage; 2],
+    coverage: Image<bool>,
+    texture: Option<RgbImage>,
+}
+
+impl Drawn {
+    fn of_cache(picture: CachedPicture) -> Self {
+        let CachedPicture { radiance, texture, covered } = picture;
+        Drawn { halves: [radiance.clone(), radiance], coverage: covered, texture }
+    }
+
+    fn of_paths(halves: [Picture; 2]) -> Self {
+        let coverage = fully_covered(&halves);
+        Drawn { halves: halves.map(|half| half.radiance), coverage, texture: None }
+    }
 }
 
 fn picture_settings(scene: &Scene, settings: &RunSettings, samples: usize) -> PictureSettings {
@@ -72,34 +98,51 @@ pub(super) fn score_views(
     stop: &AtomicBool,
 ) -> Result<Vec<ScoredView>> {
     let scene = fitter.scene().as_ref();
+    let cached = fitter.cached_view();
+    let has_held_out = fitter.view_uses().contains(&ViewUse::HeldOut);
+    let texture = has_held_out.then(|| fitter.bake(stop)).flatten().map(|bake| bake.rho);
+    let training = views_of(fitter.view_uses(), ViewUse::Training);
     let mut scored = Vec::with_capacity(scene.views.len());
     for (index, (view, &kind)) in scene.views.iter().zip(fitter.view_uses()).enumerate() {
         let (most, samples) = match kind {
-            ViewUse::HeldOut => (HELD_OUT_PIXELS, HELD_OUT_SAMPLES),
+            ViewUse::HeldOut if cached.is_some() => (HELD_OUT_PIXELS, HELD_OUT_SAMPLES),
+            ViewUse::HeldOut => (TRACED_PIXELS, HELD_OUT_SAMPLES),
             ViewUse::Training | ViewUse::LeftOut => (TRAINING_PIXELS, TRAINING_SAMPLES),
         };
         let picture_settings = picture_settings(scene, settings, samples);
         let target = Target::new(scene, index, scene.views[index].camera.level_within(most));
         let gain = fitter.state().log_gains[index].exp();
         let camera = &target.camera;
-        let halves = in_halves(&picture_settings, |settings| {
-            let mut half = render(surface, camera, own, index as u32, settings, stop);
-            half.radiance.pixels_mut().iter_mut().for_each(|pixel| *pixel *= gain);
-            half
-        });
+        let is_held_out = kind == ViewUse::HeldOut;
+        let Drawn { halves, coverage, texture } = match &cached {
+            Some(cached) => Drawn::of_cache(cached.picture(&target, texture.as_deref().filter(|_| is_held_out))),
+            None => Drawn::of_paths(in_halves(&picture_settings, |settings| {
+                render(surface, camera, own, index as u32, settings, stop)
+            })),
+        };
         go_on(stop)?;
-        let pictures = halves.each_ref().map(|half| &half.radiance);
+        let halves = halves.map(|half| half.map(|&pixel| pixel * gain));
+        let pictures = halves.each_ref();
         let (width, height) = (target.camera.width, target.camera.height);
         let pixel = |row: usize, column: usize| target.at(scene, row * width + column);
         let photo: RgbImage = Image::from_fn(width, height, |row, column| pixel(row, column).0);
         let states: Image<PixelState> = Image::from_fn(width, height, |row, column| pixel(row, column).1);
-        let coverage = fully_covered(&halves);
-        let scores = score_halves(&photo, pictures, &states, Some(&coverage), exposure_of(scene))?;
+        let stops = exposure_of(scene);
+        let scores = score_halves(&photo, pictures, &states, Some(&coverage), stops)?;
+        let of_texture =
+            texture.map(|texture| score_view(&photo, &texture, &states, Some(&coverage), stops)).transpose()?;
+        let of_nearest = if is_held_out {
+            let Reprojected { radiance, known } = reprojected(scene, surface, camera, &training);
+            let both = Image::from_fn(width, height, |row, column| coverage[(row, column)] && known[(row, column)]);
+            Some(score_view(&photo, &radiance, &states, Some(&both), stops)?)
+        } else {
+            None
+        };
         let fit = mean_of(pictures);
         let counted = crate::insight::scores::counted_pixels(&states, Some(&coverage));
         let pictures =
             ViewPictures { name: view.name.clone(), held_out: view.held_out, photo, fit, counted: Some(counted) };
-        scored.push(ScoredView { index, kind, scores, pictures });
+        scored.push(ScoredView { index, kind, scores, of_texture, of_nearest, pictures });
     }
     Ok(scored)
 }

@@ -43,6 +43,7 @@ fn relative_cost(plan: &[Stage], stage: &Stage, step: usize) -> f64 {
         + match stage.kind {
             StageKind::WideLight | StageKind::NarrowLight => shrunk.sqrt(),
             StageKind::Maps => 10.0 * shrunk * shrunk.sqrt(),
+            StageKind::Refine => 10.0,
             StageKind::Diffuse | StageKind::All | StageKind::Polish => 0.3,
         }
 }

@@ -49,9 +49,9 @@ pub(super) struct SolverShare {
 
 impl SolverShare {
     pub(super) fn of(settings: &FitSettings) -> Self {
-        let is_polished = settings.solver_polish > 0;
+        let is_polished = settings.solver_polish > 0 || std::env::var("PX_SHARE").as_deref() == Ok("photo");
         SolverShare {
-            finest: if is_polished { Finest::Polish } else { Finest::Solver },
+            finest: if is_polished || std::env::var("PX_FINEST").as_deref() == Ok("refine") { Finest::Polish } else { Finest::Solver },
             coarse_maps: CoarseMaps::Halved,
             visits_again: !is_polished,
             finer_rounds: if is_polished { FINER_ROUNDS_BEFORE_POLISHING } else { FINER_ROUNDS },
@@ -114,6 +114,7 @@ pub(super) fn positions_of_solver(settings: &FitSettings, share: SolverShare) ->
         add(StageKind::NarrowLight, finer_rounds, level);
         add(StageKind::Maps, 1, level);
     }
+    add(StageKind::Refine, settings.solver_refine, 0);
     add(StageKind::Polish, settings.solver_polish, 0);
     positions
 }

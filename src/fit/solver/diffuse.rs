@@ -11,13 +11,22 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Texels that one sum of a dot product goes over: sums are the same whatever the number of threads.
 const DOT_CHUNK: usize = 1 << 14;
 
-/// What texels lean on, in units of the mean diagonal of the normal equations.
+/// What texels lean on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leaning {
-    /// Weight of the start values.
+    /// Weight of the start values, in units of the mean diagonal of the normal equations.
     pub start: f32,
     /// Weight of the difference between neighbours that pixels show: what is finer than the photos is smooth.
-    pub neighbours: f32,
+    pub neighbours: Neighbours,
+}
+
+/// By how much neighbouring texels are believed to differ.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Neighbours {
+    /// A weight in units of the mean diagonal of the normal equations, the same for all.
+    Alike(f32),
+    /// A standard deviation of the difference of their logarithms, where weights are those of the pixels' noise.
+    Relative(f32),
 }
 
 /// Leaning of the texels of square maps on their start and on each other.
@@ -26,15 +35,46 @@ struct Held {
     /// Diagonal of the pixels' normal equations; a texel that no pixel shows has none.
     diagonal: Vec<[f32; 3]>,
     ridge: f32,
-    stiffness: f32,
+    stiffness: Stiffness,
 }
 
+/// Weight of the difference between two texels.
+enum Stiffness {
+    Alike(f32),
+    /// Of differences relative to these values.
+    Relative { precision: f32, least: f32, values: Vec<[f32; 3]> },
+}
+
+impl Stiffness {
+    #[inline]
+    fn between(&self, one: usize, other: usize, channel: usize) -> f32 {
+        match self {
+            Stiffness::Alike(stiffness) => *stiffness,
+            Stiffness::Relative { precision, least, values } => {
+                precision / (values[one][channel].max(*least) * values[other][channel].max(*least))
+            }
+        }
+    }
+}
+
+/// Texels darker than this share of the mean count as that bright where differences are relative.
+const LEAST_SHARE: f32 = 0.05;
+
 impl Held {
-    fn new(diagonal: Vec<[f32; 3]>, leaning: Leaning) -> Self {
+    fn new(diagonal: Vec<[f32; 3]>, leaning: Leaning, rho: &[[f32; 3]]) -> Self {
         let seen = diagonal.iter().filter(|d| d[0] > 0.0).count().max(1);
         let mean = diagonal.iter().map(|d| f64::from(d[0] + d[1] + d[2]) / 3.0).sum::<f64>() / seen as f64;
-        let [ridge, stiffness] = [leaning.start, leaning.neighbours].map(|weight| (f64::from(weight) * mean) as f32);
-        Held { size: diagonal.len().isqrt(), diagonal, ridge, stiffness }
+        let scaled = |weight: f32| (f64::from(weight) * mean) as f32;
+        let stiffness = match leaning.neighbours {
+            Neighbours::Alike(weight) => Stiffness::Alike(scaled(weight)),
+            Neighbours::Relative(deviation) => {
+                let shown = rho.iter().zip(&diagonal).filter(|(_, diagonal)| diagonal[0] > 0.0);
+                let sum: f64 = shown.map(|(rho, _)| f64::from(rho.iter().sum::<f32>()) / 3.0).sum();
+                let least = LEAST_SHARE * (sum / seen as f64).max(1e-6) as f32;
+                Stiffness::Relative { precision: 1.0 / (deviation * deviation), least, values: rho.to_vec() }
+            }
+        };
+        Held { size: diagonal.len().isqrt(), diagonal, ridge: scaled(leaning.start), stiffness }
     }
 
     /// The texels beside one that pixels show as well.
@@ -60,7 +100,7 @@ impl Held {
             }
             for other in self.neighbours(texel) {
                 for c in 0..3 {
-                    product[c] += self.stiffness * (own[c] - x[other][c]);
+                    product[c] += self.stiffness.between(texel, other, c) * (own[c] - x[other][c]);
                 }
             }
         });
@@ -69,8 +109,10 @@ impl Held {
     /// Residual over the diagonal.
     fn precondition(&self, residual: &[[f32; 3]], made: &mut [[f32; 3]]) {
         made.par_iter_mut().enumerate().for_each(|(texel, made)| {
-            let held = self.ridge + self.stiffness * self.neighbours(texel).count() as f32;
-            *made = [0, 1, 2].map(|c| residual[texel][c] / (self.diagonal[texel][c] + held).max(1e-20));
+            *made = [0, 1, 2].map(|c| {
+                let pulls: f32 = self.neighbours(texel).map(|other| self.stiffness.between(texel, other, c)).sum();
+                residual[texel][c] / (self.diagonal[texel][c] + self.ridge + pulls).max(1e-20)
+            });
         });
     }
 }
@@ -107,7 +149,7 @@ pub fn solve(
     iterations: usize,
     stop: &AtomicBool,
 ) -> bool {
-    let held = Held::new(system.transposed(|row| row.arriving.map(|arriving| row.weight * arriving.powi(2))), leaning);
+    let held = Held::new(system.transposed(|row| row.arriving.map(|arriving| row.weight * arriving.powi(2))), leaning, rho);
     let mut residual = system.transposed(|row| [0, 1, 2].map(|c| row.weight * row.arriving[c] * row.radiance[c]));
     // What is leaned on is the start itself: there only neighbours pull.
     let mut applied = system.normal_product(rho);
@@ -157,13 +199,13 @@ mod tests {
         for row in &mut rows {
             row.radiance = [0, 1, 2].map(|c| row.arriving[c] * (0.4 + 0.2 * row.radiance[c]));
         }
-        let leaning = Leaning { start: 0.05, neighbours: 0.1 };
+        let leaning = Leaning { start: 0.05, neighbours: Neighbours::Alike(0.1) };
         let start = vec![[0.3f32; 3]; size * size];
         let mut rho = start.clone();
         let mut system = DiffuseSystem::new(&footprints, &observations, &rows, size);
         assert!(solve(&mut system, &mut rho, leaning, 200, &AtomicBool::new(false)));
         let diagonal = system.transposed(|row| row.arriving.map(|arriving| row.weight * arriving.powi(2)));
-        let held = Held::new(diagonal, leaning);
+        let held = Held::new(diagonal, leaning, &start);
         // The objective, with what is leaned on, by channel: no small step from the solution makes it less.
         let objective = |x: &[[f32; 3]], c: usize| -> f64 {
             let models = plain_models(&footprints, &observations, &rows, x);
@@ -175,7 +217,7 @@ mod tests {
                 let own = f64::from(x[texel][c]);
                 let pulls = held.neighbours(texel).map(|other| (own - f64::from(x[other][c])).powi(2)).sum::<f64>();
                 f64::from(held.ridge) * (own - f64::from(start[texel][c])).powi(2)
-                    + 0.5 * f64::from(held.stiffness) * pulls
+                    + 0.5 * f64::from(held.stiffness.between(texel, texel, c)) * pulls
             });
             pixels.sum::<f64>() + leaning.sum::<f64>()
         };

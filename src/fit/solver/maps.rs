@@ -3,7 +3,7 @@
 use super::choice::alternatives::TileAlternatives;
 use super::choice::apply::Undecided;
 use super::choice::check::Check;
-use super::diffuse::{self, Leaning};
+use super::diffuse::{self, Leaning, Neighbours};
 use super::diffuse_system::{DiffuseRow, DiffuseSystem};
 use super::estimate::{Estimate, TexelVariance};
 use super::lobe_families;
@@ -24,7 +24,7 @@ use std::time::Instant;
 /// Most observations of a block.
 const MOST_OBSERVATIONS: usize = 256;
 /// What reflectances lean on where all are solved together.
-const LEANING: Leaning = Leaning { start: 0.01, neighbours: 0.02 };
+const LEANING: Leaning = Leaning { start: 0.01, neighbours: Neighbours::Alike(0.02) };
 /// Iterations of conjugate gradients.
 const ITERATIONS: usize = 20;
 

@@ -54,6 +54,8 @@ pub mod maps;
 pub mod non_negative;
 pub mod normal_equations;
 pub mod observations;
+pub mod photo_gains;
+pub mod pixel_noise;
 pub mod pixel_terms;
 pub mod plan;
 pub mod report;
@@ -72,6 +74,7 @@ mod tile_lobes;
 mod tile_spread;
 mod tile_texels;
 pub mod transport_check;
+pub mod whole_pixels;
 
 #[cfg(test)]
 mod tests;

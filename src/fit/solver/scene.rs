@@ -104,7 +104,11 @@ impl SolverScene {
         };
         let first_hits = FootprintSettings {
             map_size: settings.map_size,
-            ..if settings.fine_edges { FootprintSettings::default() } else { FootprintSettings::COARSE }
+            ..match (settings.fine_edges, settings.whole_pixels) {
+                (true, _) => FootprintSettings::default(),
+                (false, true) => FootprintSettings::WHOLE,
+                (false, false) => FootprintSettings::COARSE,
+            }
         };
         let traced = |target: &Target, sieve: Option<&Sieve>| {
             let grid = &transport.grid;

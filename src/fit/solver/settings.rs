@@ -60,6 +60,8 @@ pub struct SolverSettings {
     /// right to a fraction of a pixel: with one place a pixel and a ray a texel of the light their held-out views are no
     /// further off, in less time.
     pub fine_edges: bool,
+    /// Look at four places of each pixel, so that texels are told apart that one place would pass over.
+    pub whole_pixels: bool,
     /// Which ways of sharing lobes are looked at. Where maps are polished the quick ones do: held-out views are as near.
     pub lobe_sharing: LobeSharing,
     /// Fit a gain for each view, with mean logarithm zero.
@@ -81,7 +83,11 @@ impl SolverSettings {
     /// The solver's settings in those of a fit.
     pub fn of(settings: &FitSettings) -> Self {
         // Polishing follows where photos are photographs: daylight, on a mesh and by cameras that are not quite right.
-        let is_photographed = settings.solver_polish > 0;
+        let is_photographed = match std::env::var("PX_PRIOR").as_deref() {
+            Ok("photo") => true,
+            Ok("any") => false,
+            _ => settings.solver_polish > 0,
+        };
         let any = SolverSettings::default();
         SolverSettings {
             map_size: settings.map_size,
@@ -125,6 +131,7 @@ impl Default for SolverSettings {
             independence: 0.05,
             gauge_slack: 0.02,
             fine_edges: true,
+            whole_pixels: false,
             lobe_sharing: LobeSharing::THOROUGH,
             exposure: false,
             use_background: true,

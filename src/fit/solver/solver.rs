@@ -21,6 +21,8 @@ pub enum SolverStep {
     Light(usize),
     /// All maps, under the light with its holes filled.
     Maps,
+    /// Diffuse maps from whole pixels.
+    Refine,
 }
 
 impl SolverScene {
@@ -28,6 +30,7 @@ impl SolverScene {
     pub fn step(&self, step: SolverStep, estimate: &mut Estimate, stop: &AtomicBool) -> Option<StepReport> {
         match step {
             SolverStep::Light(number) => self.light_round(estimate, number, stop),
+            SolverStep::Refine => self.refine(estimate, stop),
             SolverStep::Maps => {
                 let mut next = estimate.clone();
                 self.fill_holes(&mut next.light);

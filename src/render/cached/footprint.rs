@@ -99,6 +99,8 @@ pub struct FootprintSettings {
 impl FootprintSettings {
     /// One ray a pixel, through its middle.
     pub const COARSE: FootprintSettings = FootprintSettings { map_size: 512, coarse_side: 1, fine_side: 1 };
+    /// Four rays a pixel: the whole of it, but for shares of edges.
+    pub const WHOLE: FootprintSettings = FootprintSettings { map_size: 512, coarse_side: 2, fine_side: 2 };
 }
 
 impl Default for FootprintSettings {
