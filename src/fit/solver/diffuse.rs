@@ -140,12 +140,13 @@ fn combine(a: &mut [[f32; 3]], factor_of_a: [f32; 3], b: &[[f32; 3]], factor_of_
     });
 }
 
-/// Solves for the reflectance of all texels of square maps, in place. `false` when `stop` was raised: `rho` is then of
+/// Solves for the reflectance of all texels of square maps, in place; none is above `most`. `false` when `stop` was raised: `rho` is then of
 /// no use.
 pub fn solve(
     system: &mut DiffuseSystem,
     rho: &mut [[f32; 3]],
     leaning: Leaning,
+    most: f32,
     iterations: usize,
     stop: &AtomicBool,
 ) -> bool {
@@ -181,7 +182,7 @@ pub fn solve(
         power = next;
     }
     for value in rho.iter_mut() {
-        *value = value.map(|v| if v.is_finite() { v.clamp(0.0, 1.0) } else { 0.0 });
+        *value = value.map(|v| if v.is_finite() { v.clamp(0.0, most) } else { 0.0 });
     }
     true
 }
@@ -203,7 +204,7 @@ mod tests {
         let start = vec![[0.3f32; 3]; size * size];
         let mut rho = start.clone();
         let mut system = DiffuseSystem::new(&footprints, &observations, &rows, size);
-        assert!(solve(&mut system, &mut rho, leaning, 200, &AtomicBool::new(false)));
+        assert!(solve(&mut system, &mut rho, leaning, 1.0, 200, &AtomicBool::new(false)));
         let diagonal = system.transposed(|row| row.arriving.map(|arriving| row.weight * arriving.powi(2)));
         let held = Held::new(diagonal, leaning, &start);
         // The objective, with what is leaned on, by channel: no small step from the solution makes it less.

@@ -15,7 +15,6 @@ use super::photo_gains::{GainSums, gains};
 use super::pixel_noise::{PixelNoise, Residual};
 use super::report::{ErrorSums, StepReport};
 use super::scene::SolverScene;
-use crate::material::Material;
 use crate::render::cached::{CachedTransport, LightPlanes, PointLight, SeenLight};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -36,6 +35,8 @@ pub struct WholePixels {
     pub arriving: Vec<[f32; 3]>,
     /// What lobes send.
     pub lobe: Vec<[f32; 3]>,
+    /// What no reflectance is above: 1, and of a texture without a light any colour.
+    most: f32,
 }
 
 /// A solution.
@@ -58,7 +59,7 @@ impl SolverScene {
     /// Pixels under no light at all.
     fn unlit_pixels(&self) -> WholePixels {
         let count = self.observations.list.len();
-        WholePixels { arriving: vec![[1.0; 3]; count], lobe: vec![[0.0; 3]; count] }
+        WholePixels { arriving: vec![[1.0; 3]; count], lobe: vec![[0.0; 3]; count], most: f32::MAX }
     }
 
     /// Pixels under the light and with the lobes of an estimate. `None` when `stop` was raised.
@@ -88,14 +89,14 @@ impl SolverScene {
                 order.sort_by_key(|&index| of(index).1.lobe_point);
                 for index in order {
                     let (view, point) = of(index);
-                    let material =
-                        Material { diffuse: [0.0; 3], ..CachedTransport::material_of(view, point, &estimate.texels) };
-                        sent[index] = self.transport.shade(planes, at_points, view, point, &material, seen);
+                    let mut material = CachedTransport::material_of(view, point, &estimate.texels);
+                    material[..3].fill(0.0);
+                    sent[index] = self.transport.shade(planes, at_points, view, point, &material, seen);
                 }
                 sent
             })
             .collect();
-        (!stop.load(Ordering::Relaxed)).then(|| WholePixels { arriving, lobe: lobe.concat() })
+        (!stop.load(Ordering::Relaxed)).then(|| WholePixels { arriving, lobe: lobe.concat(), most: 1.0 })
     }
 
     /// Solves for all reflectances together, with noise and gains, from `rho`. `None` when `stop` was raised.
@@ -118,7 +119,7 @@ impl SolverScene {
                 noise = Some(learned);
             }
             self.drop_clipped(&mut rows, &rho);
-            let solved = diffuse::solve(&mut self.system(&rows), &mut rho, LEANING, iterations, stop);
+            let solved = diffuse::solve(&mut self.system(&rows), &mut rho, LEANING, pixels.most, iterations, stop);
             if !solved {
                 return None;
             }
