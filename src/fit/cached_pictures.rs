@@ -70,15 +70,22 @@ impl CachedView<'_> {
         CachedPicture {
             radiance: image(pixels),
             texture: texture.map(|texture| image(textured(&footprints, texture))),
-            covered: Image::from_pixels(camera.width, camera.height, shares.iter().map(|&share| share > 0.999).collect()),
+            covered: Image::from_pixels(
+                camera.width,
+                camera.height,
+                shares.iter().map(|&share| share > 0.999).collect(),
+            ),
         }
     }
 
     /// Adds the light itself where rays pass the surface.
     fn add_background(&self, target: &Target, escaped: &[f32], pixels: &mut [[f32; 3]]) {
         let (width, height) = self.solver.settings.light_size;
-        for (index, (pixel, &share)) in pixels.iter_mut().zip(escaped).enumerate().filter(|(_, (_, share))| **share > 0.0) {
-            let place = Vec2::new((index % target.camera.width) as f32 + 0.5, (index / target.camera.width) as f32 + 0.5);
+        for (index, (pixel, &share)) in
+            pixels.iter_mut().zip(escaped).enumerate().filter(|(_, (_, share))| **share > 0.0)
+        {
+            let place =
+                Vec2::new((index % target.camera.width) as f32 + 0.5, (index / target.camera.width) as f32 + 0.5);
             let tap = tap_of_direction(target.camera.ray_through(place).direction, width, height);
             for (texel, weight) in tap.index.into_iter().zip(tap.weight) {
                 let radiance = self.fitter.state.light[texel as usize];

@@ -51,7 +51,7 @@ pub mod views;
 mod weigh;
 mod work;
 
-pub use cached_pictures::{CachedPicture, CachedView};
+pub use cached_pictures::CachedPicture;
 pub use fitter::{Fitter, StepOutcome};
 pub use presets::Preset;
 pub use settings::{FitSettings, Method};

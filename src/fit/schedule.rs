@@ -100,7 +100,9 @@ impl Stage {
         match self.kind {
             StageKind::Diffuse => 0.0,
             StageKind::All if ramp == 0 => 1.0,
-            StageKind::WideLight | StageKind::NarrowLight | StageKind::Maps | StageKind::Refine | StageKind::Polish => 1.0,
+            StageKind::WideLight | StageKind::NarrowLight | StageKind::Maps | StageKind::Refine | StageKind::Polish => {
+                1.0
+            }
             StageKind::All => ((self.steps_before + step + 1) as f32 / ramp as f32).min(1.0),
         }
     }
@@ -261,6 +263,7 @@ fn of_steps(settings: &FitSettings, kind: StageKind, message: String) -> Error {
     let name = match (kind, settings.steps) {
         (StageKind::Diffuse, _) => "steps-diffuse",
         (StageKind::All, _) => "steps-all",
+        (StageKind::Refine, _) => "solver-refine",
         (StageKind::Polish, _) => "solver-polish",
         _ => "solver-rounds",
     };

@@ -178,16 +178,18 @@ pub struct FitSettings {
     /// What becomes of the judgement of held-out views on lobes, interreflection and resolution of the environment.
     #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
     pub solver_choices: Choosing,
-    /// Refinement steps after the solver: Adam on all maps and the environment along gradients of the path tracer [default:
-    /// 110 for 8-bit photos, else 0].
+    /// Refinement steps of Adam after the solver, on all maps and the environment along gradients of the path tracer.
     ///
     /// They are for photos of real places, whose edges, background and geometry the solver's model does not carry. The
-    /// solver then leaves the finest maps to them, and believes in a single sun and hardly any metal. Where its model
-    /// holds, they make maps worse.
+    /// solver then leaves the finest maps to what follows, and believes in a single sun and hardly any metal. Where its
+    /// model holds, they make maps worse.
     #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().solver_polish))]
     pub solver_polish: usize,
-    /// Solutions for the diffuse map from whole pixels of full size, after the solver's other steps.
-    #[arg(long, default_value_t = FitSettings::default().solver_refine)]
+    /// Whole-pixel refinement after the solver: solutions for the diffuse map from all pixels of full size, with a gain for
+    /// each photo and channel and noise learned from the photos [default: 1 for 8-bit photos, else 0].
+    ///
+    /// It makes the finest maps in place of the solver's tiles, which then believes in a single sun and hardly any metal.
+    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().solver_refine))]
     pub solver_refine: usize,
     /// Held-out evaluation interval in optimiser steps; 0 evaluates at the end only.
     #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().held_out_interval))]
@@ -231,7 +233,7 @@ impl Default for FitSettings {
             solver_levels: 2,
             solver_choices: Choosing::Tell,
             solver_polish: 0,
-            solver_refine: 1,
+            solver_refine: 0,
             held_out_interval: 10,
             exclude: Vec::new(),
         }
@@ -244,9 +246,15 @@ impl FitSettings {
         self.method != Method::Adam || self.steps == Steps::OneStep || self.steps_all > 0
     }
 
-    /// Takes over whether others polish the solver's maps, and what goes with it.
+    /// Whether the finest maps are made after the solver's tiles, by whole pixels or by polishing.
+    pub fn is_refined(&self) -> bool {
+        self.solver_refine > 0 || self.solver_polish > 0
+    }
+
+    /// Takes over whether others refine the solver's maps, and what goes with it.
     pub fn polish_as(&mut self, other: &FitSettings) {
         self.solver_polish = other.solver_polish;
+        self.solver_refine = other.solver_refine;
         self.solver_levels = other.solver_levels;
         self.solver_grid = other.solver_grid;
     }

@@ -13,18 +13,15 @@ use crate::scene::{Scene, View};
 pub struct Suited {
     /// The method that came nearer to the truth with such photos, and sooner.
     pub method: Method,
-    /// Steps of polishing after the solver's maps.
-    pub solver_polish: usize,
+    /// Solutions from whole pixels after the solver's coarser maps; 0 leaves the finest maps to the solver's tiles.
+    pub solver_refine: usize,
     /// Whether each photo gets a gain.
     pub exposure: bool,
     /// Width and height of maps with about as many texels as photos resolve; `None` where that is not known.
     pub map_size: Option<usize>,
 }
 
-/// As many as take no longer than what photographs do not need of the solver: finer edges, a finer grid, larger and second
-/// maps on halved photos. A preset of more or fewer steps has so many more or fewer of these.
-const POLISH_OF_PHOTOGRAPHS: usize = 110;
-/// So much coarser is the solver's grid where polishing follows, by whole paths: shadows as fine as maps need are theirs.
+/// So much coarser is the solver's grid where whole pixels or polishing follow: the finest detail of their maps is the photos'.
 const COARSER_GRID: usize = 2;
 /// Share of an atlas that charts cover, at the least, as a rule.
 const COVERED_SHARE: f64 = 0.6;
@@ -35,9 +32,9 @@ impl Suited {
     /// What suits a scene of which the check found what `report` says.
     ///
     /// Linear radiance in all photos is what renderers write, and what the solver's model follows: there it ends nearer in
-    /// maps, light and pictures under another light than Adam, in less time, and needs no polishing. On photographs of
-    /// real places, 8 bits a channel, it does so in held-out pictures once it is polished and once the photos' exposures,
-    /// which cameras choose, are no riddle to the light. The README has both tables. Maps with more texels than photos
+    /// maps, light and pictures under another light than Adam, in less time. On photographs of real places, 8 bits a
+    /// channel, it does so in held-out pictures once its diffuse maps are solved from whole pixels, with what photos and
+    /// channels differ by, and once the photos' exposures, which cameras choose, are no riddle to the light. Maps with more texels than photos
     /// have pixels to tell them apart cost time and show the photos' noise. Where there are no photos there is nothing to
     /// solve.
     pub fn to(scene: &Scene, report: &Report) -> Self {
@@ -46,7 +43,7 @@ impl Suited {
         let is_photographed = scene.views.iter().any(by_camera);
         Suited {
             method: if scene.views.is_empty() { Method::Adam } else { Method::Solver },
-            solver_polish: if is_photographed { POLISH_OF_PHOTOGRAPHS } else { 0 },
+            solver_refine: usize::from(is_photographed),
             exposure: is_photographed && exposure::differ(&report.views),
             map_size: report.texels_resolved.map(map_size_for),
         }
@@ -77,16 +74,16 @@ impl Suited {
         if settings.method == Method::Automatic {
             settings.method = if Method::means_adam(chosen) { Method::Adam } else { self.method };
         }
-        if is_free("solver-polish") {
-            settings.solver_polish =
-                self.solver_polish.saturating_mul(settings.steps_all) / FitSettings::default().steps_all;
+        if is_free("solver-refine") {
+            settings.solver_refine = self.solver_refine;
         }
-        // Polishing leaves the solver the sizes below the full one, and it does with one more of them.
+        // What follows leaves the solver the sizes below the full one, and it does with one more of them.
+        let is_refined = settings.is_refined();
         if is_free("solver-levels") {
-            settings.solver_levels = FitSettings::default().solver_levels + usize::from(settings.solver_polish > 0);
+            settings.solver_levels = FitSettings::default().solver_levels + usize::from(is_refined);
         }
         if is_free("solver-grid") {
-            let coarser = if settings.solver_polish > 0 { COARSER_GRID } else { 1 };
+            let coarser = if is_refined { COARSER_GRID } else { 1 };
             settings.solver_grid = FitSettings::default().solver_grid / coarser;
         }
         if is_free("exposure") {
@@ -102,12 +99,16 @@ impl Suited {
     pub fn told(&self, asked: &FitSettings, settings: &FitSettings) -> Vec<String> {
         let mut told = Vec::new();
         if asked.method == Method::Automatic && settings.method == Method::Solver {
-            let why = match (self.solver_polish, settings.solver_polish) {
-                (0, _) => ", since all photos hold linear radiance".into(),
-                (_, 0) => String::new(),
-                (_, steps) => format!(" with {steps} refinement steps of Adam"),
+            let polished = match settings.solver_polish {
+                0 => String::new(),
+                steps => format!(", then {steps} refinement steps of Adam"),
             };
-            told.push(format!("Using the solver{why}; --method adam takes Adam only"));
+            let why = match (self.solver_refine, settings.solver_refine) {
+                (0, _) => ", since all photos hold linear radiance",
+                (_, 0) => "",
+                _ => " with whole-pixel refinement of the diffuse map",
+            };
+            told.push(format!("Using the solver{why}{polished}; --method adam takes Adam only"));
         }
         if settings.exposure != asked.exposure {
             told.push(
@@ -134,7 +135,6 @@ fn map_size_for(texels: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::Preset;
     use crate::image::Image;
     use crate::scene::Photo;
     use crate::scene::demo::{DemoSettings, build};
@@ -159,11 +159,11 @@ mod tests {
     }
 
     #[test]
-    fn photos_are_for_the_solver_unless_adam_is_meant_and_photographs_are_polished() {
+    fn photos_are_for_the_solver_unless_adam_is_meant_and_photographs_are_refined() {
         let mut scene = linear_scene();
         let suits = |scene: &Scene, chosen: &[&str]| {
             let settings = applied(&Suited::to(scene, &Report::default()), FitSettings::default(), chosen);
-            (settings.method, settings.solver_polish)
+            (settings.method, settings.solver_refine)
         };
         assert_eq!(suits(&scene, &[]), (Method::Solver, 0));
         assert_eq!(suits(&scene, &["map-size"]), (Method::Solver, 0));
@@ -172,7 +172,7 @@ mod tests {
         let kept = applied(&Suited::to(&scene, &Report::default()), own.clone(), &["bounces"]);
         assert_eq!(kept, own, "a method that was chosen stays, and Adam is not given what is the solver's");
         scene.views[1].photo = Photo::Srgb8(Image::filled(8, 6, [200; 3]));
-        assert_eq!(suits(&scene, &[]), (Method::Solver, POLISH_OF_PHOTOGRAPHS));
+        assert_eq!(suits(&scene, &[]), (Method::Solver, 1));
         assert_eq!(suits(&scene, &["samples"]).0, Method::Adam);
         scene.views.clear();
         assert_eq!(suits(&scene, &[]).0, Method::Adam);
@@ -198,13 +198,15 @@ mod tests {
 
     #[test]
     fn what_was_taken_is_told_and_nothing_else() {
-        let suited = Suited { method: Method::Solver, solver_polish: 110, exposure: true, map_size: Some(512) };
+        let suited = Suited { method: Method::Solver, solver_refine: 1, exposure: true, map_size: Some(512) };
         let told = |asked: &FitSettings, chosen: &[&str]| suited.told(asked, &applied(&suited, asked.clone(), chosen));
         let usual = FitSettings::default();
         let all = told(&usual, &[]);
         assert_eq!(all.len(), 3, "{all:?}");
         assert!(all[0].contains("solver") && all[1].contains("gain") && all[2].contains("512 x 512"), "{all:?}");
-        assert!(all[0].contains("110 refinement") && !told(&usual, &["solver-polish"])[0].contains("refinement"));
+        assert!(all[0].contains("whole-pixel") && !told(&usual, &["solver-refine"])[0].contains("whole-pixel"));
+        let polished = FitSettings { solver_polish: 7, ..usual.clone() };
+        assert!(told(&polished, &["solver-polish"])[0].contains("then 7 refinement steps"));
         let solver = FitSettings { method: Method::Solver, ..usual.clone() };
         assert_eq!(told(&solver, &["exposure", "map-size"]), Vec::<String>::new());
         let as_it_is = FitSettings { exposure: true, map_size: 256, ..solver };
@@ -212,26 +214,25 @@ mod tests {
     }
 
     #[test]
-    fn polishing_and_its_sizes_go_together() {
-        let photographs = Suited { method: Method::Solver, solver_polish: 110, exposure: false, map_size: None };
-        let rendered = Suited { solver_polish: 0, ..photographs.clone() };
-        let of = |suited: &Suited, polish: usize, chosen: &[&str]| {
-            let from = FitSettings { solver_polish: polish, solver_levels: 1, ..FitSettings::default() };
+    fn refinement_and_its_sizes_go_together() {
+        let photographs = Suited { method: Method::Solver, solver_refine: 1, exposure: false, map_size: None };
+        let rendered = Suited { solver_refine: 0, ..photographs.clone() };
+        let of = |suited: &Suited, (refine, polish): (usize, usize), chosen: &[&str]| {
+            let from = FitSettings {
+                solver_refine: refine,
+                solver_polish: polish,
+                solver_levels: 1,
+                ..FitSettings::default()
+            };
             let settings = applied(suited, from, chosen);
-            (settings.solver_polish, settings.solver_levels, settings.solver_grid)
+            (settings.solver_refine, settings.solver_polish, settings.solver_levels, settings.solver_grid)
         };
-        assert_eq!((of(&photographs, 0, &[]), of(&rendered, 0, &[])), ((110, 3, 128), (0, 2, 256)));
-        assert_eq!(of(&rendered, 5, &["solver-polish"]), (5, 3, 128));
-        assert_eq!(of(&photographs, 0, &["solver-polish"]), (0, 2, 256));
-        assert_eq!(of(&photographs, 0, &["solver-levels"]), (110, 1, 128));
-        assert_eq!(of(&photographs, 0, &["solver-grid"]), (110, 3, 256));
-    }
-
-    #[test]
-    fn a_preset_says_how_long_to_polish() {
-        let photographs = Suited { method: Method::Solver, solver_polish: 110, exposure: false, map_size: None };
-        let steps = Preset::ALL.map(|preset| applied(&photographs, FitSettings::preset(preset), &[]).solver_polish);
-        assert_eq!(steps, [36, 110, 220]);
+        assert_eq!(of(&photographs, (0, 0), &[]), (1, 0, 3, 128));
+        assert_eq!(of(&rendered, (0, 0), &[]), (0, 0, 2, 256));
+        assert_eq!(of(&rendered, (0, 5), &["solver-polish"]), (0, 5, 3, 128));
+        assert_eq!(of(&photographs, (0, 0), &["solver-refine"]), (0, 0, 2, 256));
+        assert_eq!(of(&photographs, (0, 0), &["solver-levels"]), (1, 0, 1, 128));
+        assert_eq!(of(&photographs, (0, 0), &["solver-grid"]), (1, 0, 3, 256));
     }
 
     #[test]
@@ -239,7 +240,7 @@ mod tests {
         // Charts cover six tenths of a map.
         let sizes = [0.0, 100.0, 78_000.0, 79_000.0, 157_000.0, 630_000.0, 5e6, 5.1e6, 1e30].map(map_size_for);
         assert_eq!(sizes, [256, 256, 256, 512, 512, 1024, 2048, 4096, 8192]);
-        let suited = |size| Suited { method: Method::Adam, solver_polish: 0, exposure: false, map_size: size };
+        let suited = |size| Suited { method: Method::Adam, solver_refine: 0, exposure: false, map_size: size };
         let usual = FitSettings::default;
         assert_eq!(applied(&suited(Some(512)), usual(), &[]).map_size, 512);
         assert_eq!(applied(&suited(Some(512)), usual(), &["map-size"]).map_size, 2048);

@@ -63,7 +63,9 @@ fn sampled(scene: &Scene, view: usize, place: Vec2) -> Option<Vec3> {
     }
     let (u, v) = (x - column as f32, y - row as f32);
     let mut sum = Vec3::ZERO;
-    for (step, weight) in [((0, 0), (1.0 - u) * (1.0 - v)), ((0, 1), u * (1.0 - v)), ((1, 0), (1.0 - u) * v), ((1, 1), u * v)] {
+    for (step, weight) in
+        [((0, 0), (1.0 - u) * (1.0 - v)), ((0, 1), u * (1.0 - v)), ((1, 0), (1.0 - u) * v), ((1, 1), u * v)]
+    {
         let at = (row + step.0, column + step.1);
         if view.states[at] != PixelState::Surface {
             return None;

@@ -49,12 +49,12 @@ pub(super) struct SolverShare {
 
 impl SolverShare {
     pub(super) fn of(settings: &FitSettings) -> Self {
-        let is_polished = settings.solver_polish > 0 || std::env::var("PX_SHARE").as_deref() == Ok("photo");
+        let is_refined = settings.is_refined();
         SolverShare {
-            finest: if is_polished || std::env::var("PX_FINEST").as_deref() == Ok("refine") { Finest::Polish } else { Finest::Solver },
+            finest: if is_refined { Finest::Polish } else { Finest::Solver },
             coarse_maps: CoarseMaps::Halved,
-            visits_again: !is_polished,
-            finer_rounds: if is_polished { FINER_ROUNDS_BEFORE_POLISHING } else { FINER_ROUNDS },
+            visits_again: !is_refined,
+            finer_rounds: if is_refined { FINER_ROUNDS_BEFORE_POLISHING } else { FINER_ROUNDS },
         }
     }
 

@@ -42,7 +42,11 @@ struct Held {
 enum Stiffness {
     Alike(f32),
     /// Of differences relative to these values.
-    Relative { precision: f32, least: f32, values: Vec<[f32; 3]> },
+    Relative {
+        precision: f32,
+        least: f32,
+        values: Vec<[f32; 3]>,
+    },
 }
 
 impl Stiffness {
@@ -150,7 +154,8 @@ pub fn solve(
     iterations: usize,
     stop: &AtomicBool,
 ) -> bool {
-    let held = Held::new(system.transposed(|row| row.arriving.map(|arriving| row.weight * arriving.powi(2))), leaning, rho);
+    let held =
+        Held::new(system.transposed(|row| row.arriving.map(|arriving| row.weight * arriving.powi(2))), leaning, rho);
     let mut residual = system.transposed(|row| [0, 1, 2].map(|c| row.weight * row.arriving[c] * row.radiance[c]));
     // What is leaned on is the start itself: there only neighbours pull.
     let mut applied = system.normal_product(rho);

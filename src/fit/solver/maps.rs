@@ -137,7 +137,8 @@ impl SolverScene {
         stop: &AtomicBool,
     ) -> Option<ErrorSums> {
         let mut system = DiffuseSystem::new(&self.footprints, &self.observations, rows, self.settings.map_size);
-        diffuse::solve(&mut system, rho, LEANING, 1.0, ITERATIONS, stop).then(|| self.errors_of(rows, &system.models(rho)))
+        diffuse::solve(&mut system, rho, LEANING, 1.0, ITERATIONS, stop)
+            .then(|| self.errors_of(rows, &system.models(rho)))
     }
 
     /// Blocks by the tile they begin in, with the tile's corner.

@@ -40,8 +40,12 @@ impl PixelNoise {
     /// The noise under which these residuals are likeliest, about. Of no residuals, noise of one.
     pub fn learn(residuals: &[Residual]) -> Self {
         let stride = residuals.len().div_ceil(MOST_LOOKED_AT).max(1);
-        let mut looked_at: Vec<Residual> =
-            residuals.iter().step_by(stride).filter(|own| own.square.is_finite() && own.radiance.is_finite()).copied().collect();
+        let mut looked_at: Vec<Residual> = residuals
+            .iter()
+            .step_by(stride)
+            .filter(|own| own.square.is_finite() && own.radiance.is_finite())
+            .copied()
+            .collect();
         looked_at.sort_by(|a, b| a.radiance.total_cmp(&b.radiance));
         let middle = looked_at.get(looked_at.len() / 2).map_or(1.0, |own| f64::from(own.radiance));
         let least = (LEAST * middle).powi(2).max(1e-24);
@@ -137,7 +141,10 @@ mod tests {
             }
         }
         let flat = PixelNoise::learn(&residuals(1e-4, 0.0, 0));
-        assert!((flat.deviation(0.0) / 0.01 - 1.0).abs() < 0.1 && (flat.deviation(2.0) / 0.01 - 1.0).abs() < 0.1, "{flat:?}");
+        assert!(
+            (flat.deviation(0.0) / 0.01 - 1.0).abs() < 0.1 && (flat.deviation(2.0) / 0.01 - 1.0).abs() < 0.1,
+            "{flat:?}"
+        );
     }
 
     #[test]
@@ -155,7 +162,11 @@ mod tests {
 
     #[test]
     fn nothing_and_nothing_but_zeros_are_no_trouble() {
-        for residuals in [vec![], vec![Residual { radiance: 0.0, square: 0.0 }; 9], vec![Residual { radiance: f32::NAN, square: 1.0 }]] {
+        for residuals in [
+            vec![],
+            vec![Residual { radiance: 0.0, square: 0.0 }; 9],
+            vec![Residual { radiance: f32::NAN, square: 1.0 }],
+        ] {
             let noise = PixelNoise::learn(&residuals);
             let weight = noise.weight(Residual { radiance: 0.5, square: 0.1 });
             assert!(weight.is_finite() && weight > 0.0, "{noise:?}");

@@ -82,12 +82,8 @@ pub struct SolverSettings {
 impl SolverSettings {
     /// The solver's settings in those of a fit.
     pub fn of(settings: &FitSettings) -> Self {
-        // Polishing follows where photos are photographs: daylight, on a mesh and by cameras that are not quite right.
-        let is_photographed = match std::env::var("PX_PRIOR").as_deref() {
-            Ok("photo") => true,
-            Ok("any") => false,
-            _ => settings.solver_polish > 0,
-        };
+        // Whole pixels or polishing follow where photos are photographs: daylight, on a mesh and by cameras that are not quite right.
+        let is_photographed = settings.is_refined();
         let any = SolverSettings::default();
         SolverSettings {
             map_size: settings.map_size,

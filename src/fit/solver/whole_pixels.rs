@@ -248,8 +248,10 @@ impl SolverScene {
         for (texel, precision) in solved.precision.iter().enumerate() {
             if precision[0] > 0.0 {
                 let own = &mut estimate.variances[texel];
-                own.variance.diffuse =
-                    precision.map(|precision| 1.0 / (self.settings.independence as f32 * precision).max(1e-12));
+                // What errs in common over many pixels, as the coarser maps knew it, is not made less by more of them.
+                for (variance, precision) in own.variance.diffuse.iter_mut().zip(precision) {
+                    *variance += 1.0 / (self.settings.independence as f32 * precision).max(1e-12);
+                }
                 own.lobe_cluster_size = own.lobe_cluster_size.max(1.0);
             } else {
                 // What no pixel shows takes over what its neighbours have.
@@ -266,5 +268,113 @@ impl SolverScene {
             view_errors: solved.errors.of_views(&self.views),
             ..StepReport::default()
         })
+    }
+}
+
+#[cfg(all(test, feature = "cli"))]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::super::SolverSettings;
+    use super::super::solver::Solver;
+    use super::*;
+    use crate::core_tests::hard_scenes::bowl_of_plaster;
+    use crate::light::Environment;
+    use crate::material::Material;
+    use crate::math::random::SequentialRandom;
+    use crate::render::Surface;
+    use glam::Vec3;
+
+    const SIZE: usize = 64;
+
+    /// A bowl whose photos are what the cache makes of a surface of patches under gains, and one pixel in fifty is wrong.
+    fn photographed(gains: impl Fn(usize) -> [f32; 3]) -> (Solver, Vec<Material<f32>>) {
+        let scene = bowl_of_plaster(SIZE);
+        let surface = Surface::new(scene.mesh.clone()).unwrap();
+        let settings = SolverSettings { map_size: SIZE, grid: SIZE, light_size: (32, 16), ..SolverSettings::default() };
+        let light = Environment::constant(32, 16, Vec3::new(0.8, 1.0, 1.2));
+        let mut solver = Solver::new(&scene, &surface, settings, Some(&light)).unwrap();
+        let truth: Vec<Material<f32>> = (0..SIZE * SIZE)
+            .map(|texel| {
+                let patch = (texel / SIZE / 8 + texel % SIZE / 8) % 2;
+                let diffuse = [[0.2, 0.3, 0.1], [0.5, 0.4, 0.6]][patch];
+                Material { diffuse, specular: [0.04; 3], log_width: -0.5 }
+            })
+            .collect();
+        solver.estimate.texels.clone_from(&truth);
+        let planes = solver.scene.transport.basis.planes(&solver.estimate.light);
+        let at_points = solver.scene.point_light(&solver.estimate, &planes);
+        let pixels = solver.scene.lit_pixels(&solver.estimate, &planes, &at_points, &AtomicBool::new(false)).unwrap();
+        let rho = solver.estimate.diffuse();
+        let mut rows = vec![DiffuseRow::default(); pixels.lobe.len()];
+        let one = vec![[1.0; 3]; solver.scene.views.len()];
+        solver.scene.set_rows(&pixels, &one, |_| 1.0, &mut rows);
+        let models = solver.scene.system(&rows).models(&rho);
+        let mut random = SequentialRandom::new(7);
+        for (index, observation) in solver.scene.observations.list.iter_mut().enumerate() {
+            let gain = gains(observation.view as usize);
+            let noise = 1.0 + 0.002 * random.next_normal();
+            let wrong = if index % 50 == 0 { 2.0 } else { 1.0 };
+            observation.radiance =
+                [0, 1, 2].map(|c| wrong * noise * gain[c] * (models[index][c] + pixels.lobe[index][c]));
+        }
+        (solver, truth)
+    }
+
+    /// Root mean square of the difference of diffuse reflectance, relative to the truth, over texels that pixels show.
+    fn error(solver: &Solver, shown: &[[f32; 3]], found: &[[f32; 3]], truth: &[Material<f32>]) -> f64 {
+        let well = |texel: &usize| shown[*texel][0] > 0.0 && solver.scene.observations.range(*texel).len() > 3;
+        let (mut sum, mut count) = (0.0, 0.0);
+        for texel in (0..truth.len()).filter(well) {
+            for c in 0..3 {
+                sum += f64::from(found[texel][c] / truth[texel].diffuse[c] - 1.0).powi(2);
+                count += 1.0;
+            }
+        }
+        assert!(count > 1000.0, "{count}");
+        f64::sqrt(sum / count)
+    }
+
+    #[test]
+    fn reflectance_and_gains_are_found_beside_pixels_that_are_wrong() {
+        let gains = |view: usize| [1.3f32, 0.8, 1.0 / (1.3 * 0.8)].map(|gain| if view < 3 { gain } else { 1.0 });
+        let (mut solver, truth) = photographed(gains);
+        solver.estimate.texels.iter_mut().for_each(|texel| texel.diffuse = [0.4; 3]);
+        let never = AtomicBool::new(false);
+        let planes = solver.scene.transport.basis.planes(&solver.estimate.light);
+        let mut known = solver.estimate.clone();
+        known.texels.clone_from(&truth);
+        let at_points = solver.scene.point_light(&known, &planes);
+        let pixels = solver.scene.lit_pixels(&solver.estimate, &planes, &at_points, &never).unwrap();
+        let found = solver.scene.solve_whole(&pixels, solver.estimate.diffuse(), &never).unwrap();
+        // Gains have mean one over the views, and what that leaves is a factor of all reflectances.
+        for c in 0..3 {
+            let ratio = found.gains[0][c] / found.gains[7][c];
+            assert!((ratio / gains(0)[c] - 1.0).abs() < 0.02, "{:?}", found.gains);
+        }
+        let factor = [0, 1, 2].map(|c| gains(7)[c] / found.gains[7][c]);
+        let rho: Vec<[f32; 3]> = found.rho.iter().map(|rho| [0, 1, 2].map(|c| rho[c] / factor[c])).collect();
+        let off = error(&solver, &found.precision, &rho, &truth);
+        assert!(off < 0.03, "{off}");
+        // The same by the step, which begins at what it knows; light between surfaces follows then.
+        let before = solver.estimate.diffuse();
+        let Solver { scene, estimate } = &mut solver;
+        let report = scene.refine(estimate, &never).unwrap();
+        assert!(report.squared_error > 0.0 && estimate.diffuse() != before);
+        let stopped = scene.refine(&mut estimate.clone(), &AtomicBool::new(true));
+        assert!(stopped.is_none());
+    }
+
+    #[test]
+    fn with_light_pixels_are_explained_no_worse_than_by_a_texture_alone() {
+        let (mut solver, _) = photographed(|_| [1.0; 3]);
+        solver.estimate.texels.iter_mut().for_each(|texel| texel.diffuse = [0.4; 3]);
+        let never = AtomicBool::new(false);
+        let texture = solver.scene.bake(&never).unwrap();
+        let planes = solver.scene.transport.basis.planes(&solver.estimate.light);
+        let at_points = solver.scene.point_light(&solver.estimate, &planes);
+        let pixels = solver.scene.lit_pixels(&solver.estimate, &planes, &at_points, &never).unwrap();
+        let lit = solver.scene.solve_whole(&pixels, solver.estimate.diffuse(), &never).unwrap();
+        let (lit, texture) = (lit.noise.deviation(0.3), texture.noise.deviation(0.3));
+        assert!(lit < texture, "{lit} {texture}");
     }
 }

@@ -23,7 +23,7 @@ const FIRST: [&str; 5] = ["method", "map-size", "bounces", "background", "exposu
 /// The same of Adam alone,
 const FIRST_OF_ADAM: [&str; 4] = ["steps-diffuse", "steps-all", "samples", "consistency"];
 /// and of the solver.
-const FIRST_OF_SOLVER: [&str; 2] = ["solver-rounds", "solver-polish"];
+const FIRST_OF_SOLVER: [&str; 2] = ["solver-rounds", "solver-refine"];
 
 /// Draws the form. `live` while a fit runs: what cannot change then is grey.
 pub fn show(ui: &mut Ui, settings: &mut FitSettings, live: bool, memory: &mut FormMemory) {
@@ -109,6 +109,7 @@ fn is_read(name: &str, settings: &FitSettings) -> bool {
 pub fn words(name: &str) -> String {
     let named = [
         ("solver-rounds", "Light iterations"),
+        ("solver-refine", "Whole-pixel refinement"),
         ("solver-polish", "Refinement steps (Adam)"),
         ("bounces", "Max bounces"),
         ("exposure", "Per-photo exposure compensation"),

@@ -91,13 +91,13 @@ fn photos_are_given_to_the_solver_unless_something_else_was_asked_for() {
     assert_eq!(of(&bytes, &["--samples", "8"]), Method::Adam, "paths a pixel are Adam's");
     let polish = |scene: &Scene, more: &[&str]| {
         let settings = suited(scene, None, &[&["--method", "solver"], more].concat());
-        (settings.solver_polish, settings.solver_levels, settings.solver_grid)
+        (settings.solver_refine, settings.solver_polish, settings.solver_levels, settings.solver_grid)
     };
-    assert_eq!((polish(&linear, &[]), polish(&bytes, &[])), ((0, 2, 256), (110, 3, 128)));
-    assert_eq!(polish(&linear, &["--solver-polish", "5"]), (5, 3, 128));
-    assert_eq!(polish(&bytes, &["--solver-polish", "0"]), (0, 2, 256));
-    assert_eq!(polish(&bytes, &["--solver-levels", "1"]), (110, 1, 128));
-    assert_eq!(polish(&bytes, &["--solver-grid", "256"]), (110, 3, 256));
+    assert_eq!((polish(&linear, &[]), polish(&bytes, &[])), ((0, 0, 2, 256), (1, 0, 3, 128)));
+    assert_eq!(polish(&linear, &["--solver-polish", "5"]), (0, 5, 3, 128));
+    assert_eq!(polish(&bytes, &["--solver-refine", "0"]), (0, 0, 2, 256));
+    assert_eq!(polish(&bytes, &["--solver-levels", "1"]), (1, 0, 1, 128));
+    assert_eq!(polish(&bytes, &["--solver-grid", "256"]), (1, 0, 3, 256));
 
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("settings.toml");
