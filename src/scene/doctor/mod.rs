@@ -1,8 +1,8 @@
 //! The pre-flight check: can a fit work on this scene, and what would spoil it?
 //!
 //! [`check`] returns a [`Report`]: findings with code, place and remedy, and one line of figures per view. A fit must
-//! not start when [`Report::is_fatal`]. [`overlay()`] draws the mesh's outline over a photo, so that a person can judge
-//! in one glance what no figure tells.
+//! not start when [`Report::is_fatal`]. [`overlay()`] draws the mesh's outline over a photo, [`contact_sheet()`] all
+//! photos so on one picture, so that a person can judge in one glance what no figure tells.
 //!
 //! | file | what it asks |
 //! |---|---|
@@ -13,7 +13,7 @@
 //! | [`pixel_centre`], [`edge_profile`] | where do pixel centres lie in the intrinsics, to a hundredth of a pixel |
 //! | [`pictures`] | encoding, clipping, darkness |
 //! | [`agreement`] | do photos belong to their cameras, by the photos alone |
-//! | [`lights`] | is the light one, does it turn with the camera, does it fall into groups |
+//! | [`lights`], `shading` | is the light one, does it turn with the camera, does it fall into groups |
 //! | [`exposure`] | do views agree on the radiance of what they share |
 //! | [`resolution`] | how much detail of the surface do the photos resolve |
 //! | [`facets`], [`closeness`], [`detail`] | is the mesh too coarse, are walls or gaps or patterns as fine as pixels |
@@ -23,6 +23,7 @@
 pub mod agreement;
 pub mod cameras;
 pub mod closeness;
+pub mod contact_sheet;
 pub mod detail;
 pub mod edge_profile;
 pub mod exposure;
@@ -36,8 +37,10 @@ pub mod pictures;
 pub mod pixel_centre;
 pub mod probe;
 pub mod resolution;
+mod shading;
 pub mod silhouette;
 
+pub use contact_sheet::contact_sheet;
 pub use overlay::overlay;
 pub use pixel_centre::CentreMeasurement;
 

@@ -3,7 +3,7 @@
 use super::probe::{centre_of, hit_at, surface_at};
 use crate::image::transfer::srgb8_from_linear_value;
 use crate::image::{Image, RgbImage};
-use crate::scene::{Photo, Scene, View};
+use crate::scene::{Mesh, Photo, Scene, View};
 use crate::trace::Bvh;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -36,14 +36,18 @@ struct Sight {
 /// # Panics
 /// When there is no view of this index: a defect of the caller.
 pub fn overlay(scene: &Scene, bvh: &Bvh, view: usize) -> Image<[u8; 3]> {
-    let view = &scene.views[view];
+    overlay_of(&scene.mesh, bvh, &scene.views[view])
+}
+
+/// [`overlay`] of a view that need not be one of a scene.
+pub fn overlay_of(mesh: &Mesh, bvh: &Bvh, view: &View) -> Image<[u8; 3]> {
     let (width, height) = (view.camera.width, view.camera.height);
     let sights: Vec<Option<Sight>> = (0..height)
         .into_par_iter()
         .flat_map_iter(|row| {
             (0..width).map(move |column| {
                 let hit = hit_at(&view.camera, bvh, centre_of(row, column))?;
-                let (point, normal, _) = surface_at(&scene.mesh, &hit)?;
+                let (point, normal, _) = surface_at(mesh, &hit)?;
                 Some(Sight { depth: hit.t, point, normal })
             })
         })

@@ -1,0 +1,365 @@
+//! Least squares over what several photos see of the same points: which function of directions explains the shading?
+//!
+//! `ln I(point, view) = reflectance(point) + gain(view) + b(view) . normal(point) + f . features(point, view)`
+//!
+//! with weights that leave out shadows and what shines (Geman and McClure's). Reflectances are eliminated as weighted means
+//! over the views of a point, so that only differences between views are explained. The normal equations are made once for
+//! everything; an explanation is a choice among their unknowns.
+//!
+//! It refuses to say what a share means: [`lights`](super::lights) does.
+
+use glam::{DMat3, DVec3};
+
+/// Linear and quadratic terms of a direction: the spherical harmonics of the first two bands, but for constants.
+const TERMS: usize = 8;
+/// Terms of the normal in the camera, of the mirrored direction in the camera, of the mirrored direction in the world.
+const FEATURES: usize = 3 * TERMS;
+/// The normal in the camera: with these alone, a vector that stands still there.
+const OF_NORMAL: std::ops::Range<usize> = 0..3;
+/// Those of the camera.
+const OF_CAMERA: std::ops::Range<usize> = 0..2 * TERMS;
+/// Those of the world.
+const OF_WORLD: std::ops::Range<usize> = 2 * TERMS..FEATURES;
+/// Unknowns of a view: its gain and a vector.
+const OF_VIEW: usize = 4;
+/// Rounds of weighting.
+const ROUNDS: usize = 4;
+
+/// A point seen by several views.
+pub(super) struct Sighted {
+    /// Shading normal in the world.
+    pub normal: DVec3,
+    /// What each view sees of it.
+    pub sights: Vec<Sight>,
+}
+
+/// What a view sees of a point.
+pub(super) struct Sight {
+    /// The view's place in the list of rotations.
+    pub view: usize,
+    /// Natural logarithm of the luminance.
+    pub log: f64,
+    features: [f64; FEATURES],
+}
+
+impl Sight {
+    /// A sight along `to_eye`, a unit vector in the world from the point to the camera.
+    pub fn new(view: usize, log: f64, normal: DVec3, to_eye: DVec3, camera_from_world: &DMat3) -> Self {
+        let mirrored = 2.0 * normal.dot(to_eye) * normal - to_eye;
+        let mut features = [0.0; FEATURES];
+        let directions = [*camera_from_world * normal, *camera_from_world * mirrored, mirrored];
+        for (terms, direction) in features.chunks_exact_mut(TERMS).zip(directions) {
+            let DVec3 { x, y, z } = direction;
+            terms.copy_from_slice(&[x, y, z, x * y, y * z, z * x, x * x - y * y, 3.0 * z * z - 1.0]);
+        }
+        Sight { view, log, features }
+    }
+}
+
+/// Of the squared residuals under one light without gloss, the share in [0, 1] that each explanation takes away.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shares {
+    /// Root mean square of the residuals under one light, in natural logarithms.
+    pub residual: f64,
+    /// One vector that stands still in the cameras.
+    pub with_camera: f64,
+    /// One function of where normal and mirrored direction point in the camera.
+    pub shine_with_camera: f64,
+    /// One function of where the mirrored direction points in the world.
+    pub shine_in_world: f64,
+    /// Two groups of views with a vector each, cut at the best place.
+    pub in_groups: f64,
+    /// A vector for each view.
+    pub of_each: f64,
+    /// The first view of the second group.
+    pub cut: usize,
+}
+
+/// Measures the shares; `None` where the equations have no solution.
+pub(super) fn explain(points: &[Sighted], views: usize) -> Option<Shares> {
+    let features_begin = OF_VIEW * views;
+    let whole: Vec<Vec<(usize, f64)>> = (0..features_begin + FEATURES).map(|unknown| vec![(unknown, 1.0)]).collect();
+    let mut weights: Vec<Vec<f64>> = points.iter().map(|point| vec![1.0; point.sights.len()]).collect();
+    for _ in 0..ROUNDS {
+        let (_, found) = Equations::of(points, views, &weights).least_squares(whole.len(), &whole)?;
+        reweigh(points, &found, &mut weights);
+    }
+    let equations = Equations::of(points, views, &weights);
+    // Gains stay free; behind them stand the unknowns that `named` gives to the vectors' parts and to the features.
+    let residual = |more: usize, named: &dyn Fn(Unknown) -> Option<usize>| {
+        let of: Vec<Vec<(usize, f64)>> = (0..features_begin + FEATURES)
+            .map(|unknown| match (unknown.checked_sub(features_begin), unknown % OF_VIEW) {
+                (None, 0) => vec![(unknown / OF_VIEW, 1.0)],
+                (None, part) => list(views, named(Unknown::Vector { view: unknown / OF_VIEW, axis: part - 1 })),
+                (Some(feature), _) => list(views, named(Unknown::Feature(feature))),
+            })
+            .collect();
+        equations.least_squares(views + more, &of).map(|found| found.0)
+    };
+    let only = |range: std::ops::Range<usize>| {
+        residual(range.len(), &|unknown| match unknown {
+            Unknown::Feature(feature) if range.contains(&feature) => Some(feature - range.start),
+            _ => None,
+        })
+    };
+    let of_one = residual(0, &|_| None)?;
+    let of_each = residual(3 * views, &|unknown| match unknown {
+        Unknown::Vector { view, axis } => Some(3 * view + axis),
+        Unknown::Feature(_) => None,
+    })?;
+    let (of_vector, of_camera, of_world) = (only(OF_NORMAL)?, only(OF_CAMERA)?, only(OF_WORLD)?);
+    let least_group = (views / 8).max(2);
+    let (cut, of_groups) = (least_group..=views.checked_sub(least_group)?)
+        .filter_map(|cut| {
+            let of_cut = residual(3, &|unknown| match unknown {
+                Unknown::Vector { view, axis } if view >= cut => Some(axis),
+                _ => None,
+            })?;
+            Some((cut, of_cut))
+        })
+        .min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let share = |residual: f64| if of_one > 0.0 { (1.0 - residual / of_one).clamp(0.0, 1.0) } else { 0.0 };
+    let total: f64 = weights.iter().flatten().sum();
+    Some(Shares {
+        residual: (of_one / total.max(1e-12)).sqrt(),
+        with_camera: share(of_vector),
+        shine_with_camera: share(of_camera),
+        shine_in_world: share(of_world),
+        in_groups: share(of_groups),
+        of_each: share(of_each),
+        cut,
+    })
+}
+
+/// What an unknown behind the gains stands for.
+enum Unknown {
+    /// A part of a view's vector.
+    Vector { view: usize, axis: usize },
+    /// The factor of a feature.
+    Feature(usize),
+}
+
+fn list(views: usize, number: Option<usize>) -> Vec<(usize, f64)> {
+    number.map(|number| (views + number, 1.0)).into_iter().collect()
+}
+
+/// The normal equations of gains and vectors of all views and of the features, with reflectances eliminated.
+struct Equations {
+    size: usize,
+    /// Upper and lower half, row by row.
+    matrix: Vec<f64>,
+    right: Vec<f64>,
+    squares: f64,
+}
+
+impl Equations {
+    fn of(points: &[Sighted], views: usize, weights: &[Vec<f64>]) -> Self {
+        let begin = OF_VIEW * views;
+        let size = begin + FEATURES;
+        let mut equations = Equations { size, matrix: vec![0.0; size * size], right: vec![0.0; size], squares: 0.0 };
+        for (point, weights) in points.iter().zip(weights) {
+            equations.add(point, weights, begin);
+        }
+        for row in begin..size {
+            for column in 0..begin {
+                equations.matrix[row * size + column] = equations.matrix[column * size + row];
+            }
+        }
+        equations
+    }
+
+    fn add(&mut self, point: &Sighted, weights: &[f64], begin: usize) {
+        let size = self.size;
+        let total: f64 = weights.iter().sum();
+        if total <= 0.0 {
+            return;
+        }
+        let seen = || point.sights.iter().zip(weights);
+        // The weighted mean over the views of a point is its reflectance: what is left are differences from it.
+        let mean = seen().map(|(sight, weight)| weight * sight.log).sum::<f64>() / total;
+        let mut mean_features = [0.0; FEATURES];
+        for (sight, weight) in seen() {
+            for (mean, feature) in mean_features.iter_mut().zip(&sight.features) {
+                *mean += weight / total * feature;
+            }
+        }
+        let unknowns = [1.0, point.normal.x, point.normal.y, point.normal.z];
+        for (a, &weight_a) in seen() {
+            let rest = a.log - mean;
+            self.squares += weight_a * rest.powi(2);
+            let features: [f64; FEATURES] = std::array::from_fn(|index| a.features[index] - mean_features[index]);
+            for (i, &x) in unknowns.iter().enumerate() {
+                let row = OF_VIEW * a.view + i;
+                self.right[row] += weight_a * x * rest;
+                for (column, feature) in features.iter().enumerate() {
+                    self.matrix[row * size + begin + column] += weight_a * x * feature;
+                }
+            }
+            for (i, &x) in features.iter().enumerate() {
+                self.right[begin + i] += weight_a * x * rest;
+                let row = (begin + i) * size + begin;
+                for (own, &y) in self.matrix[row..row + FEATURES].iter_mut().zip(&features) {
+                    *own += weight_a * x * y;
+                }
+            }
+            for (b, &weight_b) in seen() {
+                let own = if a.view == b.view { weight_a } else { 0.0 };
+                let coupling = own - weight_a * weight_b / total;
+                for (i, &x) in unknowns.iter().enumerate() {
+                    let row = (OF_VIEW * a.view + i) * size + OF_VIEW * b.view;
+                    for (j, &y) in unknowns.iter().enumerate() {
+                        self.matrix[row + j] += coupling * x * y;
+                    }
+                }
+            }
+        }
+    }
+
+    /// The least sum of squared residuals when all unknowns are combinations of fewer, and those combined: each unknown
+    /// is a list of (number among the fewer, factor).
+    fn least_squares(&self, fewer: usize, of: &[Vec<(usize, f64)>]) -> Option<(f64, Vec<f64>)> {
+        let mut matrix = vec![0.0; fewer * fewer];
+        let mut right = vec![0.0; fewer];
+        for (row, from_row) in of.iter().enumerate() {
+            for &(i, x) in from_row {
+                right[i] += x * self.right[row];
+            }
+            for (column, from_column) in of.iter().enumerate() {
+                let value = self.matrix[row * self.size + column];
+                if value != 0.0 {
+                    for &(i, x) in from_row {
+                        for &(j, y) in from_column {
+                            matrix[i * fewer + j] += x * y * value;
+                        }
+                    }
+                }
+            }
+        }
+        let found = solve(matrix, &right)?;
+        let explained: f64 = found.iter().zip(&right).map(|(x, y)| x * y).sum();
+        let whole = of.iter().map(|from| from.iter().map(|&(i, x)| x * found[i]).sum()).collect();
+        Some(((self.squares - explained).max(0.0), whole))
+    }
+}
+
+/// Solves a symmetric system by Cholesky's method. What all views have in common has no equation, and what is said twice has
+/// one too many unknowns: a little is added to the diagonal, which keeps them small.
+fn solve(mut matrix: Vec<f64>, right: &[f64]) -> Option<Vec<f64>> {
+    let size = right.len();
+    let trace: f64 = (0..size).map(|i| matrix[i * size + i]).sum();
+    let little = 1e-7 * trace / size as f64;
+    for i in 0..size {
+        for j in 0..=i {
+            let mut value = matrix[i * size + j] + if i == j { little } else { 0.0 };
+            value -= (0..j).map(|k| matrix[i * size + k] * matrix[j * size + k]).sum::<f64>();
+            if i == j {
+                if !(value > 0.0) {
+                    return None;
+                }
+                matrix[i * size + i] = value.sqrt();
+            } else {
+                matrix[i * size + j] = value / matrix[j * size + j];
+            }
+        }
+    }
+    let mut found = right.to_vec();
+    for i in 0..size {
+        let known: f64 = (0..i).map(|k| matrix[i * size + k] * found[k]).sum();
+        found[i] = (found[i] - known) / matrix[i * size + i];
+    }
+    for i in (0..size).rev() {
+        let known: f64 = (i + 1..size).map(|k| matrix[k * size + i] * found[k]).sum();
+        found[i] = (found[i] - known) / matrix[i * size + i];
+    }
+    Some(found)
+}
+
+/// Weights by how far each logarithm is from what gains, vectors and features say.
+fn reweigh(points: &[Sighted], found: &[f64], weights: &mut [Vec<f64>]) {
+    let features = &found[found.len() - FEATURES..];
+    let of_point = |point: &Sighted, weights: &[f64]| -> Vec<f64> {
+        let rest: Vec<f64> = point
+            .sights
+            .iter()
+            .map(|sight| {
+                let own = &found[OF_VIEW * sight.view..][..OF_VIEW];
+                let of_features: f64 = sight.features.iter().zip(features).map(|(x, factor)| x * factor).sum();
+                sight.log - own[0] - point.normal.dot(DVec3::new(own[1], own[2], own[3])) - of_features
+            })
+            .collect();
+        let total: f64 = weights.iter().sum();
+        let mean = rest.iter().zip(weights).map(|(rest, weight)| rest * weight).sum::<f64>() / total.max(1e-12);
+        rest.into_iter().map(|rest| rest - mean).collect()
+    };
+    let rests: Vec<Vec<f64>> =
+        points.iter().zip(weights.iter()).map(|(point, weights)| of_point(point, weights)).collect();
+    let mut sizes: Vec<f64> = rests.iter().flatten().map(|rest| rest.abs()).collect();
+    let half = sizes.len() / 2;
+    let median = *sizes.select_nth_unstable_by(half, f64::total_cmp).1;
+    let scale = (2.0 * median).max(1e-6);
+    for (weights, rests) in weights.iter_mut().zip(rests) {
+        for (weight, rest) in weights.iter_mut().zip(rests) {
+            *weight = (1.0 + (rest / scale).powi(2)).powi(-2);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::SequentialRandom;
+
+    /// A ball of random reflectance, photographed from a ring; `shading` says what each view sees in a normal and in the
+    /// direction mirrored by it, both in the world.
+    fn ball(shading: impl Fn(usize, &DMat3, DVec3, DVec3) -> f64) -> Shares {
+        let rotations: Vec<DMat3> = (0..16).map(|view| DMat3::from_rotation_y(f64::from(view) * 0.39)).collect();
+        let mut random = SequentialRandom::new(9);
+        let mut number = || f64::from(2.0 * random.next_number() - 1.0);
+        let mut points = Vec::new();
+        while points.len() < 1500 {
+            let Some(normal) = DVec3::new(number(), number(), number()).try_normalize() else { continue };
+            let reflectance = number();
+            let mut sights = Vec::new();
+            for (view, rotation) in rotations.iter().enumerate() {
+                let to_eye = rotation.transpose() * DVec3::NEG_Z;
+                if normal.dot(to_eye) < 0.3 {
+                    continue;
+                }
+                // Some are in shadow, some in a highlight; each photo has an exposure of its own.
+                let disturbance = if number() > 0.9 { 2.0 * number() } else { 0.05 * number() };
+                let mirrored = 2.0 * normal.dot(to_eye) * normal - to_eye;
+                let seen = shading(view, rotation, normal, mirrored);
+                let log = reflectance + 0.1 * (view % 3) as f64 + seen + disturbance;
+                sights.push(Sight::new(view, log, normal, to_eye, rotation));
+            }
+            if sights.len() >= 3 {
+                points.push(Sighted { normal, sights });
+            }
+        }
+        explain(&points, rotations.len()).unwrap()
+    }
+
+    #[test]
+    fn one_light_a_turning_light_and_two_lights_are_told_apart() {
+        let light = DVec3::new(0.5, 0.6, -0.2);
+        let one = ball(|_, _, normal, _| light.dot(normal));
+        assert!(one.of_each < 0.1 && one.shine_with_camera < 0.1, "{one:?}");
+        let turning = ball(|_, rotation, normal, _| (rotation.transpose() * light).dot(normal));
+        assert!(turning.with_camera > 0.8 && turning.in_groups < turning.with_camera, "{turning:?}");
+        let other = DVec3::new(-0.4, 0.5, 0.3);
+        let two = ball(|view, _, normal, _| if view < 6 { light } else { other }.dot(normal));
+        assert!(two.in_groups > 0.8 && two.cut == 6, "{two:?}");
+    }
+
+    #[test]
+    fn what_shines_under_one_light_is_told_from_what_shines_under_a_turning_one() {
+        // Rough gloss: as much as the mirrored direction is near the light.
+        let light = DVec3::new(0.5, 0.7, -0.5).normalize();
+        let gloss = |mirrored: DVec3, light: DVec3| 0.8 * mirrored.dot(light).max(0.0).powi(3);
+        let still = ball(|_, _, _, mirrored| gloss(mirrored, light));
+        assert!(still.shine_in_world > 0.8 && still.shine_with_camera < still.shine_in_world - 0.2, "{still:?}");
+        let turning = ball(|_, rotation, _, mirrored| gloss(mirrored, rotation.transpose() * light));
+        assert!(turning.shine_with_camera > turning.shine_in_world + 0.2, "{turning:?}");
+        assert!(turning.shine_with_camera > 0.8 && turning.with_camera < turning.shine_with_camera, "{turning:?}");
+    }
+}
