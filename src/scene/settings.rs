@@ -223,6 +223,8 @@ pub enum ColourEncoding {
     Srgb,
     /// Linear radiance, integers too, with the primaries of the file.
     Linear,
+    /// A power of 2.2 for integers, as some data sets write it, with the primaries of the file.
+    Gamma22,
 }
 
 #[cfg(test)]

@@ -48,7 +48,7 @@ pub struct ReadOptions {
     /// Masks of the photos: use or ignore [default: use].
     #[arg(long, help_heading = groups::SCENE)]
     pub masks: Option<MaskUse>,
-    /// Colour encoding of the photos: auto, srgb or linear [default: auto].
+    /// Colour encoding of the photos: auto, srgb, linear or gamma22 [default: auto].
     #[arg(long, help_heading = groups::SCENE)]
     pub encoding: Option<ColourEncoding>,
     /// Which layer of OpenEXR photographs is read, such as ViewLayer.Combined or Combined; the layer of radiance when not

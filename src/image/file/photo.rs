@@ -14,6 +14,8 @@ pub enum Encoding {
     Srgb,
     /// Linear, with the primaries of the file.
     Linear,
+    /// A power of 2.2, with the primaries of the file.
+    Gamma22,
 }
 
 /// How a photo is read.

@@ -237,6 +237,7 @@ fn interpretation(
         Encoding::Auto => None,
         Encoding::Srgb => Some(Curve::Srgb),
         Encoding::Linear => Some(Curve::Linear),
+        Encoding::Gamma22 => Some(Curve::Gamma(2.2)),
     };
     let with_curve = |space: ColourSpace| match &curve {
         Some(curve) => ColourSpace {

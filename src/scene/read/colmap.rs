@@ -1,7 +1,8 @@
 //! A COLMAP model, text or binary, with its photos; also a dense workspace with its mesh.
 //!
 //! ```text
-//! sparse/0/ or sparse/ or the folder itself:   cameras, images (.bin preferred to .txt); rigs and frames are not needed
+//! sparse/0/ or sparse/ or the folder itself:   cameras, images (.bin preferred to .txt); rigs and frames are not needed;
+//!                                              of sparse/0/, sparse/1/, ... the one with the most images
 //! images/                                      photos, in subfolders too; masks/ by the names of photos
 //! meshed-poisson.ply, textured/mesh.ply, ...   or any other mesh; dense/0/ is looked into
 //! ```
@@ -14,23 +15,14 @@ use super::colmap_lens::{lens_of, model_of_id, model_of_name};
 use super::mesh_choice;
 use super::photo_index::{PhotoIndex, Posed, views_of};
 use super::source::{SourceCamera, SourceScene};
-use crate::error::{Error, ErrorKind, Place, Result};
+use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use glam::{DMat3, DQuat, DVec3};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Folders the model may lie in.
-const MODEL_FOLDERS: [&str; 9] = [
-    "sparse/0",
-    "sparse",
-    "",
-    "colmap/sparse/0",
-    "colmap/sparse",
-    "dense/sparse",
-    "dense/0/sparse",
-    "0",
-    "undistorted/sparse",
-];
+/// Folders the model may lie in, or models in folders that are numbers.
+const MODEL_FOLDERS: [&str; 6] =
+    ["sparse", "", "colmap/sparse", "dense/sparse", "dense/0/sparse", "undistorted/sparse"];
 
 /// A camera of `cameras`.
 struct ColmapCamera {
@@ -49,25 +41,81 @@ struct ColmapImage {
     place: Place,
 }
 
-/// The folder of the model under a scene's folder.
+/// The folder of the model under a scene's folder; of several the one with the most images.
 pub fn model_folder(folder: &Path) -> Option<PathBuf> {
-    MODEL_FOLDERS.iter().map(|inner| folder.join(inner)).find(|inner| {
-        ["bin", "txt"].iter().any(|extension| {
-            ["cameras", "images"].iter().all(|name| inner.join(format!("{name}.{extension}")).is_file())
-        })
-    })
+    models_of(folder).into_iter().next().map(|(model, _)| model)
+}
+
+fn holds_model(folder: &Path) -> bool {
+    ["bin", "txt"]
+        .iter()
+        .any(|extension| ["cameras", "images"].iter().all(|name| folder.join(format!("{name}.{extension}")).is_file()))
+}
+
+/// The models that lie side by side under a scene's folder, with how many images each has; the largest first. What cannot
+/// be connected becomes a model of its own, `sparse/0`, `sparse/1` and so on.
+fn models_of(folder: &Path) -> Vec<(PathBuf, usize)> {
+    for base in MODEL_FOLDERS.iter().map(|inner| folder.join(inner)) {
+        // In a folder of cameras and images nothing else is looked for.
+        if base == folder.join("") && holds_model(&base) {
+            return vec![(base, 0)];
+        }
+        let is_number = |path: &PathBuf| {
+            path.file_name().is_some_and(|name| name.to_string_lossy().bytes().all(|byte| byte.is_ascii_digit()))
+        };
+        let entries = std::fs::read_dir(&base).into_iter().flatten();
+        let mut numbered: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+        numbered.retain(|path| is_number(path) && holds_model(path));
+        numbered.sort();
+        if numbered.len() > 1 {
+            let mut counted: Vec<(PathBuf, usize)> =
+                numbered.into_iter().map(|model| (model.clone(), images_of(&model))).collect();
+            counted.sort_by(|a, b| b.1.cmp(&a.1));
+            return counted;
+        }
+        if let Some(only) = numbered.pop().or_else(|| holds_model(&base).then_some(base)) {
+            return vec![(only, 0)];
+        }
+    }
+    Vec::new()
+}
+
+/// How many images a model has; 0 for one that cannot be read.
+fn images_of(model: &Path) -> usize {
+    let binary = model.join("images.bin");
+    if model.join("cameras.bin").is_file() && binary.is_file() {
+        let count = Bytes::open(&binary).and_then(|mut bytes| bytes.count("the number of images", 73));
+        return count.unwrap_or(0);
+    }
+    read_images_txt(&model.join("images.txt")).map_or(0, |images| images.len())
+}
+
+/// That one of several models is read.
+fn told_of_others(models: &[(PathBuf, usize)], folder: &Path) -> Option<Finding> {
+    let ((chosen, count), others) = models.split_first().filter(|(_, others)| !others.is_empty())?;
+    let shown = |path: &Path| path.strip_prefix(folder).unwrap_or(path).display().to_string();
+    let others: Vec<String> = others.iter().map(|(path, count)| format!("{} has {count}", shown(path))).collect();
+    let message = format!(
+        "of {} models the largest is read: {} has {count} images, {}",
+        others.len() + 1,
+        shown(chosen),
+        super::photo_index::some_of(&others)
+    );
+    let remedy = "each model has a frame of its own: to read another, move the larger ones out of the folder";
+    Some(Finding::new(Severity::Note, "model-chosen", message).at(Place::File(chosen.clone())).remedy(remedy))
 }
 
 /// Lists a COLMAP scene and reads its cameras.
 pub fn read(folder: &Path) -> Result<SourceScene> {
-    let model = model_folder(folder).unwrap_or_else(|| folder.into());
+    let models = models_of(folder);
+    let model = models.first().map_or_else(|| folder.to_path_buf(), |(model, _)| model.clone());
     let is_binary = model.join("cameras.bin").is_file() && model.join("images.bin").is_file();
     let (cameras, images) = if is_binary {
         (read_cameras_bin(&model.join("cameras.bin"))?, read_images_bin(&model.join("images.bin"))?)
     } else {
         (read_cameras_txt(&model.join("cameras.txt"))?, read_images_txt(&model.join("images.txt"))?)
     };
-    let mut findings = Vec::new();
+    let mut findings: Vec<Finding> = told_of_others(&models, folder).into_iter().collect();
     let mut posed = Vec::new();
     for image in images {
         let camera = cameras.get(&image.camera).ok_or_else(|| {

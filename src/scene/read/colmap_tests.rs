@@ -144,3 +144,22 @@ fn a_distorted_photo_becomes_a_pinhole_of_the_same_size() {
     assert_eq!(view.states[(0, 0)], crate::scene::PixelState::Ignored, "it lies outside of what was taken");
     assert!(scene.findings.iter().any(|finding| finding.code == "lens-undone"));
 }
+
+#[test]
+fn of_several_models_the_largest_is_read_and_told() {
+    let folder = folder_with_photos(&PHOTOS);
+    let root = folder.path();
+    std::fs::create_dir_all(root.join("sparse/1")).unwrap();
+    let (cameras, images) = binary();
+    for (name, cameras_text, images_text) in [("0", CAMERAS, "1 1 0 0 0 0 0 4 2 right/b.png\n\n")] {
+        std::fs::write(root.join("sparse").join(name).join("cameras.txt"), cameras_text).unwrap();
+        std::fs::write(root.join("sparse").join(name).join("images.txt"), images_text).unwrap();
+    }
+    std::fs::write(root.join("sparse/1/cameras.bin"), cameras).unwrap();
+    std::fs::write(root.join("sparse/1/images.bin"), images).unwrap();
+    assert_eq!(model_folder(root), Some(root.join("sparse/1")));
+    let scene = read(root).unwrap();
+    assert_eq!(scene.views.len(), 3);
+    let told = scene.findings.iter().find(|finding| finding.code == "model-chosen").unwrap();
+    assert!(told.message.contains("1 has 3 images") && told.message.contains("0 has 1"), "{told}");
+}

@@ -2,8 +2,8 @@
 
 use super::source::SourceScene;
 use super::{
-    alicevision, blended_mvs, bundler, colmap, exchange, manifest, metashape, neural_scenes, openmvs, opensfm,
-    realitycapture, transforms,
+    alicevision, blended_mvs, bundler, colmap, exchange, manifest, metashape, neural_scenes, objects_with_lighting,
+    openmvs, opensfm, realitycapture, realitycapture_csv, transforms,
 };
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::scene::settings::ReadSettings;
@@ -29,6 +29,8 @@ pub enum Format {
     MetashapeCameras,
     /// A COLMAP model.
     Colmap,
+    /// An object of Objects with Lighting.
+    ObjectsWithLighting,
     /// An OpenSfM reconstruction.
     OpenSfm,
     /// An AliceVision or Meshroom scene.
@@ -47,7 +49,7 @@ pub enum Format {
 
 impl Format {
     /// All of them.
-    pub const ALL: [Format; 14] = [
+    pub const ALL: [Format; 15] = [
         Format::Manifest,
         Format::Exchange,
         Format::BlendedMvs,
@@ -55,6 +57,7 @@ impl Format {
         Format::Transforms,
         Format::MetashapeCameras,
         Format::Colmap,
+        Format::ObjectsWithLighting,
         Format::OpenSfm,
         Format::AliceVision,
         Format::OpenMvs,
@@ -74,10 +77,13 @@ impl Format {
             Format::Transforms => "transforms.json or transforms_train.json",
             Format::MetashapeCameras => "an XML file of exported cameras",
             Format::Colmap => "cameras and images, .bin or .txt, in sparse/0/, sparse/ or the folder itself",
+            Format::ObjectsWithLighting => "image_*.png with camera_*.txt in test/inputs/ or inputs/",
             Format::OpenSfm => "reconstruction.json",
             Format::AliceVision => "sfm.json or a .sfm file",
             Format::OpenMvs => "an interface file .mvs",
-            Format::RealityCapture => "an .xmp file beside each photo",
+            Format::RealityCapture => {
+                "an .xmp file beside each photo, or a .csv of internal and external camera parameters"
+            }
             Format::Bundler => "bundle.out and list.txt",
             Format::Neus => "cameras_sphere.npz or cameras.npz",
             Format::Llff => "poses_bounds.npy",
@@ -95,10 +101,11 @@ impl Format {
             Format::Transforms => transforms::file_of(folder),
             Format::MetashapeCameras => metashape::export_of(folder),
             Format::Colmap => colmap::model_folder(folder),
+            Format::ObjectsWithLighting => objects_with_lighting::inputs_of(folder),
             Format::OpenSfm => Some(folder.join(opensfm::FILE_NAME)).filter(|path| path.is_file()),
             Format::AliceVision => alicevision::file_of(folder),
             Format::OpenMvs => openmvs::file_of(folder),
-            Format::RealityCapture => realitycapture::folder_of(folder),
+            Format::RealityCapture => realitycapture::folder_of(folder).or_else(|| realitycapture_csv::file_of(folder)),
             Format::Bundler => bundler::files_of(folder).map(|(bundle, _)| bundle),
             Format::Neus => neural_scenes::neus_file(folder),
             Format::Llff => neural_scenes::llff_file(folder),
@@ -116,6 +123,7 @@ impl fmt::Display for Format {
             Format::Transforms => "transforms.json",
             Format::MetashapeCameras => "Metashape cameras",
             Format::Colmap => "COLMAP",
+            Format::ObjectsWithLighting => "Objects with Lighting",
             Format::OpenSfm => "OpenSfM",
             Format::AliceVision => "AliceVision",
             Format::OpenMvs => "OpenMVS",
@@ -172,9 +180,11 @@ impl Located {
             Format::Transforms => transforms::read(&self.folder),
             Format::MetashapeCameras => metashape::read_export(&self.evidence),
             Format::Colmap => colmap::read(&self.folder),
+            Format::ObjectsWithLighting => objects_with_lighting::read(&self.folder),
             Format::OpenSfm => opensfm::read(&self.folder),
             Format::AliceVision => alicevision::read(&self.evidence),
             Format::OpenMvs => openmvs::read(&self.evidence),
+            Format::RealityCapture if self.evidence.is_file() => realitycapture_csv::read(&self.evidence),
             Format::RealityCapture => realitycapture::read(&self.folder),
             Format::Bundler => bundler::read(&self.folder),
             Format::Neus => neural_scenes::read_neus(&self.evidence),
@@ -198,10 +208,11 @@ pub fn locate(path: &Path) -> Result<Located> {
             "xml" => Format::MetashapeCameras,
             "sfm" => Format::AliceVision,
             "mvs" => Format::OpenMvs,
+            "csv" => Format::RealityCapture,
             _ => {
                 return Err(Error::new(
                     ErrorKind::Unsupported,
-                    "a scene is a folder, or a file scene.toml, .psx, .xml, .sfm or .mvs in it",
+                    "a scene is a folder, or a file scene.toml, .psx, .xml, .sfm, .mvs or .csv in it",
                 )
                 .at(Place::File(path.into()))
                 .remedy("give the folder that holds the photos and the mesh"));

@@ -154,6 +154,12 @@ fn without_marks(name: &str) -> &str {
     if bare.is_empty() { name } else { bare }
 }
 
+/// The stems that a mask beside a photo may have, in lower case.
+pub fn names_of_masks(stem: &str) -> Vec<String> {
+    let behind = SUFFIXES.iter().map(|suffix| format!("{stem}{suffix}"));
+    behind.chain(PREFIXES.iter().map(|prefix| format!("{prefix}{stem}"))).collect()
+}
+
 /// The photo that a file among the photos masks, if its name marks it so: `a` of `a_mask` or `mask_a`.
 pub fn masked_photo(stem: &str) -> Option<&str> {
     let bare = without_marks(stem);

@@ -29,8 +29,8 @@ pub fn read_one(path: &Path) -> Result<SourceMesh> {
 
 /// Reads several files as pieces of one mesh and joins what they share.
 ///
-/// Texture coordinates are kept for a single file with a single texture only: pieces with a texture each would
-/// overlap. Vertices that agree in every kept attribute are joined.
+/// Texture coordinates are kept for a single file with a single texture, or with a UDIM tile for each: pieces with a
+/// texture each would overlap. Vertices that agree in every kept attribute are joined.
 pub fn read_pieces(paths: &[PathBuf]) -> Result<SourceMesh> {
     let mut whole = SourceMesh::default();
     let mut all_have_normals = true;
@@ -70,6 +70,7 @@ pub fn read_pieces(paths: &[PathBuf]) -> Result<SourceMesh> {
         );
     }
     join_equal_vertices(&mut whole);
+    super::udim::lay_out(&mut whole);
     outliers::leave_out(&mut whole);
     leave_out_copies(&mut whole);
     Ok(whole)

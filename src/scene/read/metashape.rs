@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! NAME.files/project.zip            doc.xml: chunks        NAME.files/C/chunk.zip        doc.xml: sensors, cameras
-//! NAME.files/C/F/frame.zip          doc.xml: paths of photos
+//! NAME.files/C/F/frame.zip          doc.xml: paths of photos  NAME.files/C/F/masks/masks.zip    masks by camera
 //! ```
 //! Camera to chunk, OpenCV axes. PhotoScan up to 1.2 writes `fx fy cx cy` in pixels and p1 p2 in OpenCV's order (measured on
 //! tie points); later versions write `f`, offsets from the middle, an affinity b1 b2, and P1 P2 the other way round
@@ -102,11 +102,12 @@ fn sensor(node: Node, place: &Place) -> Result<Option<Sensor>> {
     Ok(Some(Sensor { size, intrinsics: matrix([focal_x, focal], centre), lens }))
 }
 
-/// The cameras of a chunk. `paths` are those of the photos by the number of their camera; the label stands in for one that is
-/// not known.
+/// The cameras of a chunk. `paths` and `masks` are those of the photos by the number of their camera; the label stands in for
+/// a path that is not known.
 pub fn posed_of(
     chunk: Node,
     paths: &BTreeMap<String, String>,
+    masks: &BTreeMap<String, PathBuf>,
     file: &Path,
     findings: &mut Vec<Finding>,
 ) -> Result<Vec<Posed>> {
@@ -143,7 +144,8 @@ pub fn posed_of(
         let (camera, mut noticed) = SourceCamera::new(sensor.intrinsics, rotation, translation, &place)?;
         findings.append(&mut noticed);
         let listed = node.attribute("id").and_then(|id| paths.get(id)).cloned().unwrap_or(label);
-        posed.push(Posed { listed, camera, lens: sensor.lens.clone(), size: Some(sensor.size), mask: None, place });
+        let mask = node.attribute("id").and_then(|id| masks.get(id)).cloned();
+        posed.push(Posed { listed, camera, lens: sensor.lens.clone(), size: Some(sensor.size), mask, place });
     }
     for (names, code, what) in [
         (unaligned, "camera-not-aligned", "are not aligned and are skipped"),
@@ -200,7 +202,7 @@ pub fn read_export(file: &Path) -> Result<SourceScene> {
     let mut findings = Vec::new();
     let mut best: Option<(usize, Vec<Posed>, Option<DMat4>)> = None;
     for chunk in document.descendants().filter(|node| node.has_tag_name("chunk")) {
-        let posed = posed_of(chunk, &BTreeMap::new(), file, &mut findings)?;
+        let posed = posed_of(chunk, &BTreeMap::new(), &BTreeMap::new(), file, &mut findings)?;
         let here = photos.count(posed.iter().map(|own| own.listed.as_str()));
         if best.as_ref().is_none_or(|(most, ..)| here > *most) {
             best = Some((here, posed, chunk_transform(chunk)));
@@ -223,7 +225,13 @@ pub fn read_project(file: &Path, asked: Option<&str>) -> Result<SourceScene> {
     let mut findings = vec![chosen.1];
     let chunk = chosen.0;
     let document = parse(&chunk.text, &chunk.file)?;
-    let posed = posed_of(document.root_element(), &chunk.photos, &chunk.file, &mut findings)?;
+    let posed = posed_of(document.root_element(), &chunk.photos, &chunk.masks, &chunk.file, &mut findings)?;
+    if let Some(absent) = &chunk.absent_masks {
+        let message = "the project has masks of its own, but their archive is not there";
+        let remedy = "copy it along with the project, or put masks named after the photos into a folder masks/";
+        findings
+            .push(Finding::new(Severity::Note, "masks-absent", message).at(Place::File(absent.clone())).remedy(remedy));
+    }
     finish(folder, posed, chunk_transform(document.root_element()), &photos, findings)
 }
 

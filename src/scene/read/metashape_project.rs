@@ -18,6 +18,10 @@ pub struct Chunk {
     pub text: String,
     /// Paths of photos by the number of their camera, of the first frame.
     pub photos: BTreeMap<String, String>,
+    /// Masks by the number of their camera: the path of an archive, and in it the entry.
+    pub masks: BTreeMap<String, PathBuf>,
+    /// The archive of masks that the frame names but that is not there.
+    pub absent_masks: Option<PathBuf>,
 }
 
 /// A text file of XML as a document.
@@ -85,21 +89,45 @@ pub fn chunks(project: &Path) -> Result<Vec<Chunk>> {
             (root.attribute("label").unwrap_or_default().to_owned(), frame.map(str::to_owned))
         };
         let frame = frame.map(|path| inside(file.parent().unwrap_or(base), &path, &file)).transpose()?;
-        let photos = frame.filter(|path| path.is_file()).map(|path| photos_of_frame(&path)).transpose()?;
+        let frame = frame.filter(|path| path.is_file()).map(|path| read_frame(&path)).transpose()?;
+        let Frame { photos, masks, absent_masks } = frame.unwrap_or_default();
         let id = node.attribute("id").unwrap_or_default().to_owned();
-        found.push(Chunk { id, label, file, text, photos: photos.unwrap_or_default() });
+        found.push(Chunk { id, label, file, text, photos, masks, absent_masks });
     }
     Ok(found)
 }
 
-fn photos_of_frame(archive: &Path) -> Result<BTreeMap<String, String>> {
+/// What a frame says of its photos.
+#[derive(Default)]
+struct Frame {
+    photos: BTreeMap<String, String>,
+    masks: BTreeMap<String, PathBuf>,
+    absent_masks: Option<PathBuf>,
+}
+
+fn read_frame(archive: &Path) -> Result<Frame> {
     let text = document(archive)?;
-    let frame = parse(&text, archive)?;
-    let cameras = frame.descendants().filter(|node| node.has_tag_name("camera"));
-    Ok(cameras
+    let document_of_frame = parse(&text, archive)?;
+    let cameras = document_of_frame.descendants().filter(|node| node.has_tag_name("camera"));
+    let photos = cameras
         .filter_map(|camera| {
             let photo = camera.descendants().find(|node| node.has_tag_name("photo"))?;
             Some((camera.attribute("camera_id")?.to_owned(), photo.attribute("path")?.to_owned()))
         })
-        .collect())
+        .collect();
+    let mut frame = Frame { photos, ..Default::default() };
+    let named = document_of_frame.descendants().find(|node| node.has_tag_name("masks"));
+    let Some(path) = named.and_then(|node| node.attribute("path")) else { return Ok(frame) };
+    let masks = inside(archive.parent().unwrap_or(Path::new("")), path, archive)?;
+    if !masks.is_file() {
+        frame.absent_masks = Some(masks);
+        return Ok(frame);
+    }
+    let text = document(&masks)?;
+    let listing = parse(&text, &masks)?;
+    let entries = listing.descendants().filter(|node| node.has_tag_name("mask"));
+    frame.masks = entries
+        .filter_map(|mask| Some((mask.attribute("camera_id")?.to_owned(), masks.join(mask.attribute("path")?))))
+        .collect();
+    Ok(frame)
 }

@@ -70,7 +70,10 @@ fn the_chunk_whose_photos_are_here_is_read_unless_another_is_asked_for() {
         )
     };
     let frame = |path: &str| {
-        format!(r#"<frame><cameras><camera camera_id="7"><photo path="{path}"/></camera></cameras></frame>"#)
+        format!(
+            r#"<frame><cameras><camera camera_id="7"><photo path="{path}"/></camera></cameras>
+            <masks path="masks/masks.zip"/></frame>"#
+        )
     };
     let write = |path: &str, text: &str| {
         let path = root.join(path);
@@ -81,6 +84,14 @@ fn the_chunk_whose_photos_are_here_is_read_unless_another_is_asked_for() {
         "project.zip",
         r#"<document version="1.2.0"><chunks><chunk id="0" path="0/chunk.zip"/><chunk id="3" path="3/chunk.zip"/></chunks></document>"#,
     );
+    let mask = Image::from_fn(80, 60, |_, column| if column < 20 { [255u8; 3] } else { [0; 3] });
+    let mask = file::encode_png_srgb8(&mask).unwrap();
+    std::fs::create_dir_all(root.join("3/0/masks")).unwrap();
+    std::fs::write(
+        root.join("3/0/masks/masks.zip"),
+        packed(&[("doc.xml", br#"<masks><mask camera_id="7" path="c7.png"/></masks>"#), ("c7.png", &mask)]),
+    )
+    .unwrap();
     write("0/chunk.zip", &chunk("Elsewhere", "x.png"));
     write("0/0/frame.zip", &frame("../../far/x.png"));
     write("3/chunk.zip", &chunk("Here", "renamed"));
@@ -90,6 +101,12 @@ fn the_chunk_whose_photos_are_here_is_read_unless_another_is_asked_for() {
     let scene = read_project(&project, None).unwrap();
     assert_eq!((scene.views.len(), scene.views[0].name.as_str()), (1, "b"));
     assert!(scene.findings[0].message.contains("Here"), "{}", scene.findings[0]);
+    assert_eq!(scene.views[0].mask, Some(root.join("3/0/masks/masks.zip/c7.png")));
+    // The mask is of the size the photo was masked at, twice that of the photo that is here.
+    let settings = crate::scene::ReadSettings::default();
+    let loaded = super::super::photos::load_all(&scene.views, &[(40, 30)], Default::default(), &settings).unwrap();
+    let object = loaded[0].states.pixels().iter().filter(|state| state.is_surface()).count();
+    assert_eq!(object, 10 * 30);
     assert_eq!(read_project(&project, Some("0")).unwrap_err().kind(), ErrorKind::Missing, "its photo is not here");
     let error = read_project(&project, Some("no")).unwrap_err();
     assert!(error.remedy_text().contains("--chunk") && error.remedy_text().contains("Elsewhere (0)"), "{error}");

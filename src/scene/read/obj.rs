@@ -7,7 +7,7 @@
 
 use super::obj_elements::{Elements, NONE};
 use super::source_mesh::SourceMesh;
-use super::text;
+use super::{text, udim};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use glam::{DVec3, Vec2, Vec3};
 use std::fmt::Write;
@@ -24,8 +24,13 @@ pub fn read(path: &Path) -> Result<SourceMesh> {
     let mut findings = elements.findings(path);
     let with_uvs = keep(&triangles, 1, &elements.uvs, "texture coordinates", &mut findings, path);
     let with_normals = keep(&triangles, 2, &elements.normals, "normals", &mut findings, path);
-    let with_uvs = with_uvs && elements.materials.len() < 2;
-    if elements.materials.len() > 1 && !elements.uvs.is_empty() {
+    // A texture each is no matter where each has a tile of its own.
+    let uv_of =
+        |corner: [u32; 3]| elements.uvs.get(corner[1] as usize).copied().flatten().map_or(Vec2::NAN, Vec2::from_array);
+    let has_one_texture = elements.materials.len() < 2
+        || (with_uvs && udim::are_tiles(triangles.iter().map(|corners| corners.map(uv_of))));
+    let with_uvs = with_uvs && has_one_texture;
+    if !has_one_texture && !elements.uvs.is_empty() {
         let message =
             format!("the texture coordinates refer to {} textures and are not kept", elements.materials.len());
         findings.push(

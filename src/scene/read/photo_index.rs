@@ -3,14 +3,13 @@
 //! Projects are moved: paths in them lead to other machines. A photo is the file whose path agrees best from its end:
 //! first the whole listed path, then as many folders as possible, then the name without its extension.
 
+use super::mask_names::{Masks, PHOTO_EXTENSIONS, names_of_masks};
 use super::source::{SourceCamera, SourceView};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::scene::lens::Lens;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// Extensions of photos.
-const EXTENSIONS: [&str; 8] = ["jpg", "jpeg", "png", "tif", "tiff", "exr", "hdr", "pfm"];
 /// Folders that hold pictures of other kinds, by the beginnings of their names.
 const NOT_PHOTOS: [&str; 9] =
     ["__macosx", "mask", "depth", "normal", "stereo", "texture", "thumb", "rendered_depth", "segmentation"];
@@ -96,6 +95,26 @@ impl PhotoIndex {
             .or_else(|| best(self.by_stem.get(&lower(relative))))
     }
 
+    /// A photo's path below the root it lies under.
+    fn below_root<'a>(&self, photo: &'a Path) -> &'a Path {
+        self.roots.iter().find_map(|root| photo.strip_prefix(root).ok()).unwrap_or(photo)
+    }
+
+    /// A file beside a photo whose name says that it masks it, or one of its own name in a folder whose name says so:
+    /// `train_mask/0001.png` of `train/0001.exr`.
+    fn mask_beside(&self, photo: &Path) -> Option<PathBuf> {
+        let candidates = names_of_masks(&lower_stem(photo));
+        let mut files = candidates.iter().filter_map(|name| self.by_stem.get(name)).flatten();
+        let beside = files.find(|mask| mask.parent() == photo.parent()).cloned();
+        beside.or_else(|| {
+            let folder = photo.parent()?;
+            let folders = names_of_masks(&lower(folder));
+            let of_its_name = self.by_stem.get(&lower_stem(photo))?;
+            let is_masks = |own: &Path| own.parent() == folder.parent() && folders.contains(&lower(own));
+            of_its_name.iter().find(|mask| mask.parent().is_some_and(is_masks)).cloned()
+        })
+    }
+
     /// How many of some listed paths have a photo here.
     pub fn count<'a>(&self, listed: impl Iterator<Item = &'a str>) -> usize {
         listed.filter(|listed| self.find(listed).is_some()).count()
@@ -115,10 +134,9 @@ fn collect(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<()> 
             if depth < DEEPEST && !NOT_PHOTOS.iter().any(|start| name.starts_with(start)) {
                 collect(&path, depth + 1, files)?;
             }
-        } else if path
-            .extension()
-            .is_some_and(|extension| EXTENSIONS.contains(&extension.to_string_lossy().to_ascii_lowercase().as_str()))
-            && !files.contains(&path)
+        } else if path.extension().is_some_and(|extension| {
+            PHOTO_EXTENSIONS.contains(&extension.to_string_lossy().to_ascii_lowercase().as_str())
+        }) && !files.contains(&path)
         {
             files.push(path);
         }
@@ -136,7 +154,8 @@ pub fn views_of(
     masks: &[PathBuf],
     findings: &mut Vec<Finding>,
 ) -> Result<Vec<SourceView>> {
-    let masks = mask_files(masks);
+    let masks_folder = masks.iter().find(|folder| folder.is_dir());
+    let mut masks = masks_folder.map(|folder| Masks::of_folder(folder)).transpose()?.unwrap_or_default();
     let listed = posed.len();
     let (mut views, mut missing) = (Vec::new(), Vec::new());
     for own in posed {
@@ -144,9 +163,8 @@ pub fn views_of(
             missing.push(own.listed);
             continue;
         };
-        let mask = own.mask.or_else(|| {
-            masks.get(&lower(&photo)).or_else(|| masks.get(&lower_stem(&photo))).filter(|mask| **mask != photo).cloned()
-        });
+        let mask =
+            own.mask.or_else(|| masks.of_photo(photos.below_root(&photo))).or_else(|| photos.mask_beside(&photo));
         views.push(SourceView {
             name: String::new(),
             photo,
@@ -182,6 +200,11 @@ pub fn views_of(
             .remedy("copy their photos as well to use them"),
         );
     }
+    if let Some(folder) = masks_folder {
+        // Those of photos that take no part were meant for somebody too.
+        photos.by_name.values().flatten().for_each(|photo| drop(masks.of_photo(photos.below_root(photo))));
+        masks.tell_unused(folder, false, findings)?;
+    }
     name_views(&mut views);
     Ok(views)
 }
@@ -211,23 +234,6 @@ fn name_views(views: &mut [SourceView]) {
     }
 }
 
-/// Masks by the name of what they belong to, without extension: `a.png`, `a.jpg.png` and `a_mask.png` are masks of `a.jpg`.
-fn mask_files(folders: &[PathBuf]) -> BTreeMap<String, PathBuf> {
-    let mut masks = BTreeMap::new();
-    for folder in folders.iter().filter(|folder| folder.is_dir()) {
-        let mut files = Vec::new();
-        if collect(folder, 0, &mut files).is_ok() {
-            for path in files {
-                let stem = lower_stem(&path);
-                let bare =
-                    stem.strip_suffix("_mask").or_else(|| stem.strip_suffix(".mask")).unwrap_or(&stem).to_owned();
-                masks.entry(bare).or_insert(path);
-            }
-        }
-    }
-    masks
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -249,7 +255,16 @@ mod tests {
         assert_eq!(found("../elsewhere/b.png").unwrap(), Path::new("images/b.png"));
         assert_eq!(found("./b").unwrap(), Path::new("images/b.png"));
         assert_eq!(found("c.png"), None);
-        let masks = mask_files(&[root.join("masks")]);
-        assert_eq!(masks["b"], root.join("masks/b.png"));
+        assert_eq!(index.below_root(&root.join("images/left/0001.JPG")), Path::new("left/0001.JPG"));
+        std::fs::write(root.join("images/b_mask.png"), b"").unwrap();
+        let index = PhotoIndex::of_folders(&[root.join("images")]).unwrap();
+        assert_eq!(index.mask_beside(&root.join("images/b.png")), Some(root.join("images/b_mask.png")));
+        assert_eq!(index.mask_beside(&root.join("images/left/0001.JPG")), None);
+        std::fs::create_dir(root.join("images/left_mask")).unwrap();
+        std::fs::write(root.join("images/left_mask/0001.png"), b"").unwrap();
+        let index = PhotoIndex::of_folders(&[root.join("images")]).unwrap();
+        let mask = index.mask_beside(&root.join("images/left/0001.JPG"));
+        assert_eq!(mask, Some(root.join("images/left_mask/0001.png")));
+        assert_eq!(index.mask_beside(&root.join("images/right/0001.JPG")), None);
     }
 }

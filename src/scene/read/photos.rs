@@ -2,16 +2,18 @@
 
 use super::orientation;
 use super::source::SourceView;
+use super::zip::Archive;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::file::{self, Encoding, PhotoFile, PhotoOptions, PhotoPixels};
-use crate::image::{GreyImage, Image, RgbImage};
+use crate::image::{GreyImage, Image, RgbImage, resize};
 use crate::scene::lens::{Undistorted, undistort};
 use crate::scene::settings::{ColourEncoding, MaskUse, ReadSettings};
 use crate::scene::{Photo, PixelState};
 use glam::Vec3;
 use half::f16;
 use rayon::prelude::*;
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 /// 8-bit values from here on are clipped: cameras and JPEG move a saturated 255 by one.
 pub const CLIPPED_BYTE: u8 = 254;
@@ -65,8 +67,9 @@ pub fn load_all(
     let pixels: usize = sizes.iter().map(|(width, height)| width * height).sum();
     let shrink = settings.shrink;
     let as_half = pixels / (shrink * shrink) * std::mem::size_of::<Vec3>() > MOST_FLOAT_BYTES;
+    let packed = if settings.masks == MaskUse::Use { archives_of_masks(views)? } else { BTreeMap::new() };
     let loaded: Vec<Result<LoadedPhoto>> =
-        views.par_iter().map(|view| load(view, encoding, settings, as_half)).collect();
+        views.par_iter().map(|view| load(view, encoding, settings, as_half, &packed)).collect();
     let mut loaded = loaded.into_iter().collect::<Result<Vec<_>>>()?;
     let mut gathered = gather(views, &loaded);
     gathered.extend(centre_exposures(&mut loaded));
@@ -74,6 +77,34 @@ pub fn load_all(
         first.findings.splice(0..0, gathered);
     }
     Ok(loaded)
+}
+
+/// The archives that hold masks, each opened once: the mask of such a view is the archive's path with the entry's name.
+fn archives_of_masks(views: &[SourceView]) -> Result<BTreeMap<PathBuf, Archive>> {
+    let mut archives = BTreeMap::new();
+    for archive in views.iter().filter_map(|view| view.mask.as_ref()?.parent()) {
+        if !archives.contains_key(archive) && archive.is_file() {
+            archives.insert(archive.to_path_buf(), Archive::open(archive)?);
+        }
+    }
+    Ok(archives)
+}
+
+/// A mask from a file or from an archive. One from an archive was made on the photo that the project knows: it is brought to
+/// the size of the photo that is here, where that has the same shape.
+fn read_mask(path: &Path, photo: &Photo, packed: &BTreeMap<PathBuf, Archive>) -> Result<GreyImage> {
+    /// What rounding of the sides may make of a shape.
+    const SAME_SHAPE: f64 = 0.01;
+    let Some(archive) = path.parent().and_then(|parent| packed.get(parent)) else { return file::read_grey(path) };
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let mask = file::read_grey_from(path, archive.read(&name)?)?;
+    let (width, height) = (photo.width(), photo.height());
+    let across = mask.width() as f64 / width as f64;
+    let down = mask.height() as f64 / height as f64;
+    if (mask.width(), mask.height()) == (width, height) || (across / down - 1.0).abs() > SAME_SHAPE {
+        return Ok(mask);
+    }
+    Ok(resize::enlarge(&resize::shrink(&mask, across as usize), width, height))
 }
 
 /// What undoing the distortion of lenses did, over all photos.
@@ -134,13 +165,20 @@ fn centre_exposures(loaded: &mut [LoadedPhoto]) -> Option<Finding> {
     (span > SAME_STOPS).then(|| Finding::new(Severity::Note, "exposure-by-exif", message))
 }
 
-fn load(view: &SourceView, encoding: ColourEncoding, settings: &ReadSettings, as_half: bool) -> Result<LoadedPhoto> {
+fn load(
+    view: &SourceView,
+    encoding: ColourEncoding,
+    settings: &ReadSettings,
+    as_half: bool,
+    packed: &BTreeMap<PathBuf, Archive>,
+) -> Result<LoadedPhoto> {
     let (mut findings, mut shared) = (Vec::new(), Vec::new());
     let options = PhotoOptions {
         encoding: match encoding {
             ColourEncoding::Auto => Encoding::Auto,
             ColourEncoding::Srgb => Encoding::Srgb,
             ColourEncoding::Linear => Encoding::Linear,
+            ColourEncoding::Gamma22 => Encoding::Gamma22,
         },
         layer: settings.layer.as_deref(),
     };
@@ -164,7 +202,9 @@ fn load(view: &SourceView, encoding: ColourEncoding, settings: &ReadSettings, as
     let file_size = (photo.width(), photo.height());
     if settings.masks == MaskUse::Use {
         match (&view.mask, &alpha) {
-            (Some(mask), _) => apply_mask(mask, view, &photo, stored, &mut states, &mut findings)?,
+            (Some(mask), _) => {
+                apply_mask(mask, read_mask(mask, &photo, packed)?, view, &photo, stored, &mut states, &mut findings)?;
+            }
             (None, Some(alpha)) => apply_alpha(alpha, is_float, &mut states, &mut shared),
             (None, None) => {}
         }
@@ -310,6 +350,7 @@ fn apply_alpha(alpha: &GreyImage, is_float: bool, states: &mut Image<PixelState>
 /// lie as the file does or as the camera sees it.
 fn apply_mask(
     path: &Path,
+    mut mask: GreyImage,
     view: &SourceView,
     photo: &Photo,
     stored: ((usize, usize), u8),
@@ -317,7 +358,6 @@ fn apply_mask(
     findings: &mut Vec<Finding>,
 ) -> Result<()> {
     let is_twin = path.file_stem().is_some_and(|stem| stem.to_string_lossy().ends_with("_masked"));
-    let mut mask = file::read_grey(path)?;
     let size = (photo.width(), photo.height());
     if (mask.width(), mask.height()) != size && (mask.width(), mask.height()) == stored.0 {
         mask = file::turned(mask, stored.1);

@@ -175,6 +175,13 @@ impl Transforms {
     }
 }
 
+/// The folder of the scanned mesh of Stanford-ORB, `ground_truth/NAME/mesh_blender` beside the folder of all scenes.
+fn orb_mesh(folder: &Path) -> Option<PathBuf> {
+    let whole = std::path::absolute(folder).ok()?;
+    let mesh = whole.parent()?.parent()?.join("ground_truth").join(whole.file_name()?).join("mesh_blender");
+    mesh.is_dir().then_some(mesh)
+}
+
 /// Lists a scene of transforms and reads its cameras.
 pub fn read(folder: &Path) -> Result<SourceScene> {
     let main = file_of(folder).unwrap_or_else(|| folder.join(WHOLE));
@@ -215,7 +222,10 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
             format!("the source holds out {} of {} views: {}", held_out.len(), views.len(), some_of(&held_out)),
         ));
     }
-    let mesh = mesh_choice::find(&[folder.into()], &mut findings);
+    let mesh = mesh_choice::find(
+        &[Some(folder.to_path_buf()), orb_mesh(folder)].into_iter().flatten().collect::<Vec<_>>(),
+        &mut findings,
+    );
     let mut scene = SourceScene::of_photographs(folder, mesh, views);
     if !held_out.is_empty() && held_out.len() < scene.views.len() {
         scene.held_out = Some(held_out);

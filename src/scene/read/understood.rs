@@ -43,6 +43,20 @@ pub struct Understood {
     pub distances: (f32, f32),
     /// What the background shows.
     pub background: Background,
+    /// Whether the mesh stood in the frame of the cameras, was moved into it, or may stand in another.
+    pub frames: Frames,
+}
+
+/// How the frame of the mesh was found to be beside that of the cameras.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Frames {
+    /// The same.
+    Shared,
+    /// Another, which the source knows: the mesh was moved.
+    Moved,
+    /// Cameras look past the mesh, and no known transform helps.
+    Doubtful,
 }
 
 /// Says what was made of a scene that was read from `path` with `settings`.
@@ -89,6 +103,11 @@ pub fn understand(path: &Path, settings: &ReadSettings, scene: &Scene) -> Result
         origin_in_source: world.origin_in_source.to_array(),
         distances: span(&mut cameras().map(|own| own.position_in_world().distance(middle))),
         background: scene.background,
+        frames: match &scene.findings {
+            findings if findings.iter().any(|finding| finding.code == "mesh-frame-changed") => Frames::Moved,
+            findings if findings.iter().any(|finding| finding.code == "mesh-frame-unknown") => Frames::Doubtful,
+            _ => Frames::Shared,
+        },
     })
 }
 
@@ -99,39 +118,56 @@ impl fmt::Display for Understood {
             self.sizes.iter().map(|(width, height, count)| format!("{count} of {width} x {height}")).collect();
         let mesh: Vec<String> = self.mesh.iter().map(|path| path.display().to_string()).collect();
         let lens = match self.undistorted {
-            0 => "pinhole, photos are not resampled".to_owned(),
-            count => format!("distorted in {count} of {} views, undone", self.views),
+            0 => "without distortion: photos are used as they are".to_owned(),
+            count => format!("distortion undone in {count} of {} views", self.views),
         };
         let masks = match self.masks {
-            0 => "none: rays decide what is surface".to_owned(),
-            count => format!("{count} of {}", self.views),
+            0 => "none: what is surface is where rays meet the mesh".to_owned(),
+            count if count == self.views => "for all views".to_owned(),
+            count => format!("for {count} of {} views: elsewhere rays decide what is surface", self.views),
+        };
+        let eight_bit = self.views - self.linear;
+        let colour = match (eight_bit, self.linear) {
+            (_, 0) => "8 bits, as cameras encode them: the curve of sRGB is undone".to_owned(),
+            (0, _) => "linear radiance, as the files have it".to_owned(),
+            (encoded, linear) => {
+                format!("{encoded} photos of 8 bits by the curve of sRGB, {linear} of linear radiance")
+            }
+        };
+        let frames = match self.frames {
+            Frames::Shared => "the mesh stands in the frame of the cameras",
+            Frames::Moved => {
+                "the mesh stood in another frame and was moved to the cameras: see mesh-frame-changed below"
+            }
+            Frames::Doubtful => "the mesh may stand in another frame than the cameras: see mesh-frame-unknown below",
+        };
+        let held_out = match self.held_out {
+            0 => "none held out for validation".to_owned(),
+            count => format!("{count} of them held out for validation"),
         };
         let (narrow, wide) = self.field_of_view_degrees;
+        let angle = if wide - narrow < 0.1 { format!("{wide:.1}") } else { format!("{narrow:.1} to {wide:.1}") };
         writeln!(formatter, "format      {}: {}", self.format, self.why)?;
         writeln!(formatter, "mesh        {} triangles, {}", self.triangles, mesh.join(", "))?;
-        writeln!(formatter, "cameras     {} views, {} held out", self.views, self.held_out)?;
+        writeln!(formatter, "frames      {frames}")?;
+        writeln!(formatter, "cameras     {} views, {held_out}", self.views)?;
         writeln!(formatter, "photos      {} pixels", sizes.join(", "))?;
-        writeln!(formatter, "lens        {narrow:.1} to {wide:.1} degrees wide, {lens}")?;
-        writeln!(
-            formatter,
-            "colour      {} linear, {} of a camera's tone curve",
-            self.linear,
-            self.views - self.linear
-        )?;
+        writeln!(formatter, "lens        {angle} degrees wide, {lens}")?;
+        writeln!(formatter, "colour      {colour}")?;
         writeln!(formatter, "masks       {masks}")?;
         let background = match self.background {
-            Background::Environment => "the environment",
-            Background::Black => "black",
+            Background::Environment => "shows the environment",
+            Background::Black => "black: it says nothing",
         };
         writeln!(formatter, "background  {background}")?;
-        writeln!(formatter, "up          {} of the source", triple(self.up_in_source))?;
+        writeln!(formatter, "up          {} of the source becomes +y", triple(self.up_in_source))?;
         if self.origin_in_source != [0.0; 3] {
-            writeln!(formatter, "origin      {} of the source", triple(self.origin_in_source))?;
+            writeln!(formatter, "origin      {} of the source becomes 0", triple(self.origin_in_source))?;
         }
         let (near, far) = self.distances;
         write!(
             formatter,
-            "scale       the mesh is {:.4} across, cameras are {near:.4} to {far:.4} from its middle, in units of the source",
+            "scale       the mesh is {:.4} across and cameras stand {near:.4} to {far:.4} from its middle, in units of the source",
             self.diagonal
         )
     }

@@ -47,6 +47,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ReadingMemory) {
                 (ColourEncoding::Auto, "By the file"),
                 (ColourEncoding::Srgb, "sRGB"),
                 (ColourEncoding::Linear, "Linear"),
+                (ColourEncoding::Gamma22, "Gamma 2.2"),
             ];
             let name = names.iter().find(|(own, _)| *own == chosen.encoding).map_or("", |(_, name)| name);
             let response = ComboBox::from_id_salt("encoding of photos").selected_text(name).show_ui(ui, |ui| {
