@@ -1,14 +1,13 @@
-//! `patina check`, `relight`, `render` and `compare`.
+//! `patina relight`, `render` and `compare`.
 
-use super::arguments::{CheckOptions, CompareOptions, Layer, ReadOptions, RelightOptions, RenderOptions};
+use super::arguments::{CompareOptions, Layer, ReadOptions, RelightOptions, RenderOptions};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::export::RunFolder;
 use crate::files::unrepeated;
-use crate::fit::Suited;
 use crate::fit::views::{ViewUse, uses_of};
 use crate::image::file;
-use crate::insight::report::number;
 use crate::insight::scores::{aggregate, score_halves};
+use crate::job::benchmark::Drawing;
 use crate::job::pictures::{OpenedLight, light_of, matched, parameters, relit, surface_of};
 use crate::job::prepare::RunSettings;
 use crate::job::regions;
@@ -16,77 +15,9 @@ use crate::job::shown::{exposure_of, fully_covered, in_halves};
 use crate::render::measured_regions::render_regions;
 use crate::render::picture::{Picture, PictureSettings, layers, render as render_picture};
 use crate::render::{Parameters, Surface};
-use crate::scene::{Background, Scene, doctor};
-use crate::trace::Bvh;
+use crate::scene::{Background, Scene};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
-
-/// Refuses a folder whose pictures a reader would take for photos or masks of the scene.
-fn refuse_folder_of_photos(output: &Path, scene: &Path) -> Result<()> {
-    let real = |path: &Path| std::fs::canonicalize(path).or_else(|_| std::path::absolute(path));
-    let Ok(output) = real(output) else { return Ok(()) };
-    let folders = crate::scene::read::picture_folders(scene)?;
-    if folders.iter().any(|folder| real(folder).is_ok_and(|folder| folder == output)) {
-        return Err(Error::new(ErrorKind::InvalidSetting, "the folder holds the photos or masks of the scene")
-            .at(Place::File(output))
-            .remedy("name another folder with --output: its pictures would be read as photos the next time"));
-    }
-    Ok(())
-}
-
-/// Checks a scene and prints what was found.
-pub fn check(options: &CheckOptions, json: bool) -> Result<()> {
-    if let Some(output) = &options.output {
-        refuse_folder_of_photos(output, &options.scene)?;
-    }
-    let settings = options.read.settings();
-    let scene = crate::scene::read(&options.scene, &settings)?;
-    let understood = crate::scene::read::understand(&options.scene, &settings, &scene)?;
-    let bvh = Bvh::build(&scene.mesh.positions, &scene.mesh.triangles)?;
-    let report = doctor::check_with(&scene, &bvh);
-    if json {
-        println!(
-            "{}",
-            serde_json::json!({"event": "check", "understood": understood, "findings": report.findings,
-            "views": report.views, "texels_resolved": report.texels_resolved, "surface": report.surface,
-            "agreement": report.agreement, "light": report.light})
-        );
-    } else {
-        println!("{}: {} triangles, {} views", scene.name, scene.mesh.triangles.len(), scene.views.len());
-        println!("{understood}");
-        if let Some(texels) = report.texels_resolved {
-            let size = Suited::to(&scene, &report).map_size.unwrap_or_default();
-            let texels = number::whole(texels as u64);
-            println!("the photos resolve some {texels} texels of the surface, about maps of {size} x {size}");
-        }
-        if let Some(agreement) = report.agreement {
-            println!("the photos agree by {agreement:.2} where they show the same surface (1 is alike)");
-        }
-        if let Some(light) = report.light.as_ref().filter(|light| light.kind() == doctor::lights::LightKind::One) {
-            let share = 100.0 * light.of_each;
-            println!(
-                "the light is one: another for each photo would explain {share:.0} % of what differs in its shading"
-            );
-        }
-        for finding in &report.findings {
-            println!("{finding}");
-        }
-    }
-    if let Some(folder) = &options.output {
-        for (index, view) in scene.views.iter().enumerate() {
-            let picture = doctor::overlay(&scene, &bvh, index);
-            file::write_png_srgb8(&folder.join(format!("{}_outline.png", view.name)), &picture)?;
-        }
-        if !json {
-            println!("outlines over the photos: {}", folder.display());
-        }
-    }
-    if report.is_fatal() {
-        return Err(Error::new(ErrorKind::InvalidScene, "a fit of this scene cannot work")
-            .remedy("fix what is marked fatal above"));
-    }
-    Ok(())
-}
 
 /// The scene whose cameras a command uses, read as the run read its own but for what was typed.
 fn camera_scene(folder: &RunFolder, given: Option<&Path>, typed: &ReadOptions) -> Result<(Scene, RunSettings)> {
@@ -305,6 +236,10 @@ pub fn compare(options: &CompareOptions, json: bool) -> Result<()> {
         lobe_strength: if settings.fit.has_lobe() { 1.0 } else { 0.0 },
         ..Default::default()
     };
+    if let Some(protocol) = options.protocol {
+        let drawing = Drawing { surface: &surface, own: &own, settings: picture_settings };
+        return super::benchmark::compare(protocol, &options.scene, &scene, &drawing, json);
+    }
     let mut scored = Vec::new();
     let uses = uses_of(&scene, &settings.fit.exclude);
     for (index, (view, kind)) in scene.views.iter().zip(uses).enumerate() {

@@ -1,8 +1,8 @@
 //! The command line; it holds no algorithm.
 //!
-//! [`arguments`] is what can be typed, [`fit`] drives a job and shows its events, [`measured`] is for measured
+//! [`arguments`] is what can be typed, [`check`] prints what was understood of a scene, [`fit`] drives a job and shows its events, [`measured`] is for measured
 //! reflectance, [`object`] is object mode, [`gauge`] moves the scale of a run, [`export`] writes it for other
-//! programs, [`turntable`] belongs to `relight`, [`guide`] prints the guide,
+//! programs, [`turntable`] belongs to `relight`, `benchmark` to `compare`, [`guide`] prints the guide,
 //! [`completions`] the script for a shell, `hint` answers what was mistyped, [`commands`] holds the rest; `say` writes lines where somebody listens, `threads` starts what everything works on.
 //! Whatever is asked here can be asked of the library in the same words.
 
@@ -17,6 +17,8 @@ macro_rules! eprintln {
 }
 
 pub mod arguments;
+mod benchmark;
+pub mod check;
 pub mod commands;
 pub mod completions;
 pub mod export;
@@ -60,7 +62,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Task::Demo(options)) => fit::demo(&options, json),
         Some(Task::Fit(options)) => fit::fit(&options, json),
         Some(Task::Resume(options)) => fit::resume(&options, json),
-        Some(Task::Check(options)) => commands::check(&options, json),
+        Some(Task::Check(options)) => check::check(&options, json),
         Some(Task::Relight(options)) => commands::relight(&options, json),
         Some(Task::Export(options)) => export::export(&options, json),
         Some(Task::Gauge(options)) => gauge::gauge(&options, json),

@@ -24,6 +24,8 @@ pub mod objective {}
 pub mod benchmarks {}
 #[doc = include_str!("../../assets/guide/export-and-run-folder.md")]
 pub mod export_and_run_folder {}
+#[doc = include_str!("../../assets/guide/many-captures.md")]
+pub mod many_captures {}
 #[doc = include_str!("../../assets/guide/limits.md")]
 pub mod limits {}
 
@@ -45,19 +47,22 @@ pub enum Topic {
     Benchmarks,
     /// The files of a run and how other programs read them.
     ExportAndRunFolder,
+    /// A workflow for hundreds of captures, on one machine or a cluster.
+    ManyCaptures,
     /// What it does not do.
     Limits,
 }
 
 impl Topic {
     /// All topics, in the order in which they are read.
-    pub const ALL: [Topic; 8] = [
+    pub const ALL: [Topic; 9] = [
         Topic::Capture,
         Topic::FileFormats,
         Topic::Window,
         Topic::ObjectMode,
         Topic::Objective,
         Topic::ExportAndRunFolder,
+        Topic::ManyCaptures,
         Topic::Benchmarks,
         Topic::Limits,
     ];
@@ -72,6 +77,7 @@ impl Topic {
             Topic::Objective => "objective",
             Topic::Benchmarks => "benchmarks",
             Topic::ExportAndRunFolder => "export-and-run-folder",
+            Topic::ManyCaptures => "many-captures",
             Topic::Limits => "limits",
         }
     }
@@ -91,6 +97,7 @@ impl Topic {
             Topic::Objective => "what a fit minimises, with a table of symbols",
             Topic::Benchmarks => "what was measured, with the commands that measure it",
             Topic::ExportAndRunFolder => "the files of a run, and how other programs read them",
+            Topic::ManyCaptures => "a workflow for hundreds of captures, on one machine or a cluster",
             Topic::Limits => "what it does not do, and where it is wrong",
         }
     }
@@ -105,6 +112,7 @@ impl Topic {
             Topic::Objective => include_str!("../../assets/guide/objective.md"),
             Topic::Benchmarks => include_str!("../../assets/guide/benchmarks.md"),
             Topic::ExportAndRunFolder => include_str!("../../assets/guide/export-and-run-folder.md"),
+            Topic::ManyCaptures => include_str!("../../assets/guide/many-captures.md"),
             Topic::Limits => include_str!("../../assets/guide/limits.md"),
         }
     }

@@ -1,7 +1,8 @@
 //! What can be said about a fit: scores and the report.
 //!
 //! Read [`scores`] first: how a picture is compared with a photograph, and which pixels count. [`truth`] compares maps
-//! and light with a known truth, [`intervals`] stated uncertainties with it, [`report`] makes the one page that shows it all.
+//! and light with a known truth, [`intervals`] stated uncertainties with it, [`protocols`] scores pictures by the rules of
+//! published benchmarks, [`report`] makes the one page that shows it all.
 //! Every score comes twice, raw and scale-aligned, because reflectance times c with light over c is the same picture.
 //!
 //! [`capture`] tells after a fit what is wrong with photos, cameras, masks or mesh.
@@ -20,6 +21,7 @@ pub mod material_pictures;
 pub mod memory;
 pub mod nearest_photo;
 pub mod plot;
+pub mod protocols;
 pub mod record;
 pub mod report;
 pub mod scores;

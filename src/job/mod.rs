@@ -12,11 +12,15 @@
 //! much light is baked into the maps, [`regions`] reads measured materials for parts of a surface,
 //! [`relight`](mod@relight) makes one picture, [`export`] writes a run for other programs.
 //!
+//! [`ask`] tells beforehand what a fit will need, [`benchmark`] scores a run by the rules of published benchmarks.
+//!
 //! [`object`] is the job of object mode, light and reflectance from photos of one object; [`materials`] its library of
 //! materials to look at.
 
 pub mod against_truth;
+pub mod ask;
 pub mod background;
+pub mod benchmark;
 pub mod demo;
 pub mod entanglement;
 mod explained;

@@ -6,6 +6,8 @@
 mod atlas;
 pub mod beside;
 mod capture;
+mod captures_check;
+mod cli_check;
 mod cli_guide;
 mod cli_process;
 mod cli_remedies;

@@ -151,6 +151,9 @@ pub struct CompareOptions {
     /// Max bounces: surface hits on the longest path, 1 to 16; those of the run when not given.
     #[arg(long, value_parser = hits)]
     pub bounces: Option<usize>,
+    /// Score by the rules of a published benchmark: its cameras, environments, masks, scales and tone curves.
+    #[arg(long, value_enum)]
+    pub protocol: Option<crate::job::benchmark::Protocol>,
     /// How the scene is read.
     #[command(flatten)]
     pub read: ReadOptions,
