@@ -9,6 +9,7 @@
 //! | [`scale`], [`tracer_speed`], [`window`] | seconds and memory of whole fits, of rays and paths, of the window |
 //! | [`atlas_quality`], [`cached_error`] | distortion of atlases; cached transport against the path tracer |
 //! | [`audit`] | derivatives against central differences |
+//! | [`fuzz`] | damaged files of every kind that is read |
 //! | [`nightly`] | what takes too long to be asked on every change |
 //! | [`consistency`], [`object_study`] | the figures of the two papers |
 //! | [`rivals`], [`neural`] | reflectance models on measured tables; training of the neural one |
@@ -22,6 +23,7 @@ pub mod cached_error;
 pub mod cli;
 pub mod consistency;
 pub mod contest;
+pub mod fuzz;
 pub mod hard;
 pub mod neural;
 pub mod nightly;

@@ -30,6 +30,9 @@ pub enum Task {
     /// Fit scenes with a known truth many times over and write tables and plots.
     #[command(subcommand)]
     Study(StudyTask),
+    /// Open damaged files of every kind that is read; fails where one ends in a panic, in too much memory or in too long a
+    /// wait.
+    Fuzz(FuzzOptions),
     /// Ask what takes too long to be asked on every change; fails where something falls short.
     Nightly(NightlyOptions),
     /// Write the demo and the study scenes as exchange folders for the Mitsuba scripts.
@@ -37,6 +40,26 @@ pub enum Task {
     /// Train the neural model of reflectance, hold models against measured tables.
     #[command(subcommand)]
     Measured(super::measured::MeasuredTask),
+}
+
+/// Options of `patina-lab fuzz`.
+#[derive(Debug, Args)]
+pub struct FuzzOptions {
+    /// Damaged files of each kind.
+    #[arg(long, default_value_t = 10_000)]
+    pub inputs: u64,
+    /// Number of the first: with --inputs 1 the one input that was told of.
+    #[arg(long, default_value_t = 0)]
+    pub from: u64,
+    /// Seed of the damage.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Only these kinds, such as obj or colmap-binary.
+    #[arg(long, value_delimiter = ',')]
+    pub kind: Vec<String>,
+    /// Folder of the inputs that went wrong; none are kept without it.
+    #[arg(short, long)]
+    pub output: Option<PathBuf>,
 }
 
 /// Options of `patina-lab nightly`.

@@ -1,10 +1,10 @@
 //! `patina-lab audit` and `patina-lab bench`.
 
-use super::arguments::{AuditOptions, BenchOptions, BenchStudioOptions, NightlyOptions};
+use super::arguments::{AuditOptions, BenchOptions, BenchStudioOptions, FuzzOptions, NightlyOptions};
 use crate::cli::fit::stop_on_interrupt;
 use crate::error::{Error, ErrorKind, Result};
 use crate::lab::audit::{AuditSettings, built_in, gradients};
-use crate::lab::scale;
+use crate::lab::{fuzz, scale};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -29,6 +29,28 @@ pub fn audit_gradients(options: &AuditOptions, json: bool) -> Result<()> {
     }
     Err(Error::new(ErrorKind::Numerical, "a derivative is not that of its function; the worst rows are above")
         .remedy("a defect of this program: report it with the table"))
+}
+
+/// Opens damaged files; one that ends in a panic, in too much memory or in too long a wait is an error.
+pub fn fuzz(options: &FuzzOptions, json: bool) -> Result<()> {
+    let FuzzOptions { inputs, from, seed, kind, output } = options;
+    let settings =
+        fuzz::Settings { inputs: *inputs, from: *from, seed: *seed, kinds: kind.clone(), output: output.clone() };
+    // Panics are what is looked for: each is told once, with its input.
+    std::panic::set_hook(Box::new(fuzz::note_panic));
+    let outcomes = fuzz::run(&settings, &super::contest::teller("fuzz", json));
+    drop(std::panic::take_hook());
+    let outcomes = outcomes?;
+    if json {
+        println!("{}", serde_json::json!({"event": "fuzz", "kinds": outcomes}));
+    }
+    let failed: u64 = outcomes.iter().map(|outcome| outcome.failed).sum();
+    if failed == 0 {
+        return Ok(());
+    }
+    let message = format!("{failed} inputs ended otherwise than read or refused: they are listed above");
+    Err(Error::new(ErrorKind::Internal, message)
+        .remedy("a defect of this program: mend the reader, and make the input a test"))
 }
 
 /// Runs the checks of a night; one that falls short is an error.

@@ -43,6 +43,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Task::Bench(BenchTask::Studio(options)) => measure::bench_studio(&options, json),
         Task::Study(StudyTask::Ibrdf(options)) => object_study::study(&options, json),
         Task::Study(StudyTask::Mvcl(options)) => study::mvcl(&options, json),
+        Task::Fuzz(options) => measure::fuzz(&options, json),
         Task::Nightly(options) => measure::nightly(&options, json),
         Task::References(options) => {
             crate::lab::scenes::write_references(&options.output, &contest::teller("references", json))
