@@ -140,7 +140,7 @@ pub use job::{Command, Event, JobHandle, JobOptions, Progress, RunSettings, Snap
 #[cfg(feature = "lab")]
 pub use lab::cli::run as run_lab;
 pub use light::Environment;
-pub use material::MaterialMaps;
+pub use material::{LobeModel, MaterialMaps};
 pub use measured::{HalfDifference, MeasuredBrdf, ReflectanceModel};
 pub use object::{Estimate, Known, ObjectGeometry, ObjectPhoto, ObjectSettings, ObjectView, StartedModel, estimate};
 pub use render::Surface;

@@ -1,7 +1,7 @@
 //! A result made ready for other programs: maps filled past their charts, at the wanted size, in the numbers that others
 //! use. Every format writes from this.
 
-use super::lobe_fit::perceptual_roughness;
+use super::between_facets::f0_without;
 use super::run_folder::RunResult;
 use super::sun::{Sun, sun_of};
 use crate::atlas::{covered_texels, dilate, nearest_covered};
@@ -9,7 +9,8 @@ use crate::image::area::area_mean;
 use crate::image::resize::enlarge;
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::light::Environment;
-use crate::material::MaterialMaps;
+use crate::material::lobe::nearest::perceptual_roughness;
+use crate::material::{LobeModel, MaterialMaps};
 use crate::scene::Mesh;
 use glam::Vec3;
 
@@ -24,6 +25,8 @@ pub struct Asset {
     pub maps: MaterialMaps,
     /// Whether the surface has a specular lobe at all.
     pub has_lobe: bool,
+    /// The lobe that was fitted.
+    pub lobe: LobeModel,
     /// The light; `None` for a run without one.
     pub light: Option<Light>,
 }
@@ -40,7 +43,7 @@ pub struct Light {
 impl Asset {
     /// Makes the asset of a result. `size` is the width of the written maps in texels; that of the result when `None`.
     pub fn new(name: &str, result: RunResult, has_light: bool, has_lobe: bool, size: Option<usize>) -> Self {
-        let RunResult { maps, environment, mesh, .. } = result;
+        let RunResult { maps, environment, mesh, lobe, .. } = result;
         let (width, height) = (maps.diffuse.width(), maps.diffuse.height());
         let nearest = nearest_covered(&covered_texels(&mesh, width, height));
         let maps = MaterialMaps {
@@ -57,12 +60,15 @@ impl Asset {
             let sun = sun_of(&environment);
             Light { whole: environment, sun }
         });
-        Asset { name: file_name_of(name), mesh, maps, has_lobe, light }
+        Asset { name: file_name_of(name), mesh, maps, has_lobe, lobe, light }
     }
 
-    /// Roughness of glTF, Disney, Blender: the square root of the width of the nearest GGX lobe.
+    /// Roughness of glTF, Disney, Blender: the square root of the width of the GGX lobe, or of the nearest one.
     pub fn perceptual_roughness(&self) -> GreyImage {
-        self.maps.roughness.map(|&roughness| perceptual_roughness(roughness))
+        self.maps.roughness.map(|&roughness| match self.lobe {
+            LobeModel::BlinnPhong => perceptual_roughness(roughness),
+            LobeModel::Ggx => roughness.max(0.0).sqrt().sqrt(),
+        })
     }
 
     /// Reflectance F0 as an index of refraction and a colour at most 1 that F0 of that index is multiplied by.
@@ -72,14 +78,6 @@ impl Asset {
         let ior = (1.0 + f0.sqrt()) / (1.0 - f0.sqrt());
         let scale = (1.0 / f0) as f32;
         Dielectric { ior, colour: self.maps.specular.map(|specular| (*specular * scale).min(Vec3::ONE)) }
-    }
-
-    /// The index of refraction of the mean F0, for readers that take one for the whole surface; at least 1.
-    pub fn ior_of_mean(&self) -> f64 {
-        let count = self.maps.specular.pixels().len().max(1) as f64;
-        let sum: f64 = self.maps.specular.pixels().iter().map(|&f0| f64::from(crate::math::luminance(f0))).sum();
-        let root = (sum / count).clamp(0.0, 0.98).sqrt();
-        (1.0 + root) / (1.0 - root)
     }
 
     /// The diffuse map for a renderer that weighs its diffuse part by one minus a mean of Fresnel's factor: divided by
@@ -124,15 +122,21 @@ impl MetalSplit {
     }
 
     /// The base colour for a renderer that weighs diffuse light by one minus a mean of Fresnel's factor, as
-    /// [`Asset::diffuse_under_fresnel`]; metals are left as they are. The second value is the share of texels held at 1.
-    pub fn base_colour_under_fresnel(&self, grazing: f32) -> (RgbImage, f64) {
+    /// [`Asset::diffuse_under_fresnel`]. With `perceptual_roughness`, for one that adds light between microfacets, metals are
+    /// lowered by that ([`f0_without`]); else they are left as they are. The second value is the share of texels held at 1.
+    pub fn base_colour_under_fresnel(&self, grazing: f32, perceptual_roughness: Option<&GreyImage>) -> (RgbImage, f64) {
         let mut held = 0usize;
         let texels = self.base_colour.pixels().iter().zip(self.metallic.pixels()).zip(self.specular_colour.pixels());
         let pixels: Vec<Vec3> = texels
-            .map(|((base, metal), colour)| {
+            .enumerate()
+            .map(|(index, ((base, metal), colour))| {
                 let f0 = colour.max_element() * self.dielectric_f0;
                 let factor = 1.0 / (1.0 - (f0 + (1.0 - f0) * grazing));
-                let raised = *base * (factor * (1.0 - metal) + metal);
+                let of_metal = match perceptual_roughness {
+                    Some(roughness) if *metal > 0.0 => f0_without(*base, roughness.pixels()[index].powi(2)),
+                    _ => *base,
+                };
+                let raised = *base * (factor * (1.0 - metal)) + of_metal * *metal;
                 held += usize::from(raised.max_element() > 1.0);
                 raised.min(Vec3::ONE)
             })
@@ -303,7 +307,13 @@ pub(super) mod tests {
         let mut environment = Environment::constant(16, 8, Vec3::splat(0.2));
         environment.radiance[(2, 3)] = Vec3::new(60.0, 55.0, 50.0);
         let times_seen = Image::filled(16, 16, 1.0);
-        Asset::new("a run", RunResult { maps, environment, mesh, times_seen }, true, has_lobe, None)
+        Asset::new(
+            "a run",
+            RunResult { maps, environment, mesh, times_seen, lobe: LobeModel::BlinnPhong },
+            true,
+            has_lobe,
+            None,
+        )
     }
 
     #[test]

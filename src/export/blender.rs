@@ -18,7 +18,7 @@ const SCRIPT: &str = include_str!("python/import_patina.py");
 pub fn write(asset: &Asset, folder: &Path) -> Result<(f64, Option<MetalSplit>)> {
     let metals = asset.metals();
     let (base_colour, held_share) = match &metals {
-        Some(split) => split.base_colour_under_fresnel(GRAZING_OF_VIEWS),
+        Some(split) => split.base_colour_under_fresnel(GRAZING_OF_VIEWS, None),
         None => asset.diffuse_under_fresnel(GRAZING_OF_VIEWS),
     };
     write_exr_rgb(&folder.join("base_color.exr"), &base_colour)?;

@@ -36,13 +36,17 @@ REFLECTION
   F  Schlick,                 F0 + (1 - F0)(1 - h.o)^5
   G  Smith with Schlick-GGX,  G1(c) = c / (c (1 - k) + k),   k = a / 2
   The diffuse part is not reduced by F.
+  Where settings.toml says lobe = \"ggx\":
+  D  GGX,                     D(h) = a^2 / (pi ((n.h)^2 (a^2 - 1) + 1)^2)
+  G  Smith, height-correlated,  G / (4 i o) = 1 / (2 (i R(o) + o R(i))),  i = n.i,  o = n.o,
+                              R(c)^2 = a^2 + (1 - a^2) c^2
 
 ROUGHNESS IN OTHER PROGRAMS
   width a of Beckmann or GGX                      a = sqrt(r)
   roughness of glTF, Disney, Blender, Unreal      sqrt(a) = r^(1/4)
   Blinn-Phong exponent                            2 / r - 2
   redner                                          r, as it is
-  GGX has longer tails than Blinn-Phong: at equal width a highlight looks a little different.
+  GGX has longer tails than Blinn-Phong: at equal width a highlight looks a little different. `patina export` converts.
 
 REFLECTANCE IN OTHER PROGRAMS
   glTF base colour = diffuse, metallic 0; F0 through KHR_materials_specular (a dielectric's default F0 is 0.04).

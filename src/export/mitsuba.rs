@@ -10,6 +10,7 @@ use super::ply;
 use crate::error::Result;
 use crate::files::write_bytes;
 use crate::image::file::{write_exr_grey, write_exr_rgb};
+use crate::material::LobeModel;
 use glam::Vec3;
 use std::path::Path;
 
@@ -41,22 +42,27 @@ pub fn write(asset: &Asset, folder: &Path) -> Result<Option<MetalSplit>> {
     }
     write_bytes(&folder.join("patina_lobe.py"), PLUGIN.as_bytes())?;
     let built_in = match &split {
-        Some(split) => format!(
+        Some(split) => two_sided(&format!(
             "<bsdf type=\"principled\">\n{}{}{}        <float name=\"specular\" value=\"{}\"/>\n      </bsdf>",
             bitmap("base_color", "base_color.exr"),
             bitmap("metallic", "metallic.exr"),
             bitmap("roughness", "roughness_ggx.exr"),
             split.dielectric_f0 / 0.08,
-        ),
-        None => format!("<bsdf type=\"diffuse\">\n{}      </bsdf>", bitmap("reflectance", "diffuse.exr")),
+        )),
+        None => two_sided(&format!("<bsdf type=\"diffuse\">\n{}      </bsdf>", bitmap("reflectance", "diffuse.exr"))),
     };
     write_bytes(&folder.join("scene.xml"), scene(asset, &built_in).as_bytes())?;
+    // The plugin is two-sided itself: it knows the triangle's normal.
     let exact = match asset.has_lobe {
         true => format!(
-            "<bsdf type=\"patina\">\n{}{}{}      </bsdf>",
+            "<bsdf type=\"patina\">\n{}{}{}        <string name=\"distribution\" value=\"{}\"/>\n      </bsdf>",
             bitmap("diffuse", "diffuse.exr"),
             bitmap("specular", "specular.exr"),
-            bitmap("roughness", "roughness.exr")
+            bitmap("roughness", "roughness.exr"),
+            match asset.lobe {
+                LobeModel::BlinnPhong => "blinn-phong",
+                LobeModel::Ggx => "ggx",
+            }
         ),
         false => built_in,
     };
@@ -69,6 +75,10 @@ fn bitmap(name: &str, file: &str) -> String {
         "        <texture type=\"bitmap\" name=\"{name}\">\n          <string name=\"filename\" value=\"{file}\"/>\n          \
          <boolean name=\"raw\" value=\"true\"/>\n          <string name=\"wrap_mode\" value=\"clamp\"/>\n        </texture>\n"
     )
+}
+
+fn two_sided(bsdf: &str) -> String {
+    format!("<bsdf type=\"twosided\">\n      {bsdf}\n    </bsdf>")
 }
 
 fn scene(asset: &Asset, bsdf: &str) -> String {
@@ -93,8 +103,7 @@ fn scene(asset: &Asset, bsdf: &str) -> String {
          <film type=\"hdrfilm\">\n      <integer name=\"width\" value=\"768\"/>\n      \
          <integer name=\"height\" value=\"576\"/>\n      <rfilter type=\"box\"/>\n    </film>\n  </sensor>\n{light}  \
          <shape type=\"ply\">\n    <string name=\"filename\" value=\"mesh.ply\"/>\n    \
-         <boolean name=\"flip_tex_coords\" value=\"true\"/>\n    <bsdf type=\"twosided\">\n      {bsdf}\n    \
-         </bsdf>\n  </shape>\n</scene>\n",
+         <boolean name=\"flip_tex_coords\" value=\"true\"/>\n    {bsdf}\n  </shape>\n</scene>\n",
         point(eye),
         point(centre),
     )

@@ -5,8 +5,8 @@
 //! beside the maps, so that nobody has to guess what roughness means. [`exchange`]
 //! writes a scene and its truth for other renderers.
 //!
-//! For other programs, [`asset`] makes a result ready: maps filled past their charts and converted ([`lobe_fit`] from
-//! Blinn-Phong to GGX). From it write [`gltf`], [`usd`], [`materialx`], [`mitsuba`], [`blender`], [`texture_set`] and [`web`], a page to send;
+//! For other programs, [`asset`] makes a result ready: maps filled past their charts and converted
+//! ([`nearest`](crate::material::lobe::nearest) from Blinn-Phong to GGX). From it write [`gltf`], [`usd`], [`materialx`], [`mitsuba`], [`blender`], [`texture_set`] and [`web`], a page to send;
 //! [`transfer`] carries a
 //! result over to another mesh first. [`sheet`] says beside each what its numbers mean and what was lost, and [`whole_folder`] sees to it that nothing half
 //! is left behind. `crate::job::export` drives them.
@@ -15,12 +15,12 @@
 //! no folder that holds other things. Every file is written whole or not at all.
 
 pub mod asset;
+pub mod between_facets;
 pub mod blender;
 pub mod convention;
 pub mod environment_file;
 pub mod exchange;
 pub mod gltf;
-pub mod lobe_fit;
 pub mod loss_log;
 pub mod materialx;
 pub mod mitsuba;

@@ -25,7 +25,7 @@ use super::{LossRow, convention, loss_log, obj};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::image::{GreyImage, Image, RgbImage, file};
 use crate::light::Environment;
-use crate::material::MaterialMaps;
+use crate::material::{LobeModel, MaterialMaps};
 use crate::scene::Mesh;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -41,6 +41,8 @@ pub struct RunResult {
     pub mesh: Mesh,
     /// In how many photographs a texel was seen, of the maps' size; 0: never.
     pub times_seen: GreyImage,
+    /// The lobe that specular reflectance and roughness are meant for: `lobe` of the fit's settings.
+    pub lobe: LobeModel,
 }
 
 /// A folder that holds a run.
@@ -190,9 +192,28 @@ impl RunFolder {
             environment: light(self)?,
             mesh: obj::read(&self.file("mesh.obj"))?,
             times_seen: self.read_grey("seen.exr")?,
+            lobe: self.read_lobe()?,
         };
         result.validate(&self.path)?;
         Ok(result)
+    }
+
+    /// The lobe that the settings name; [`LobeModel::BlinnPhong`] where they name none, as those of earlier versions.
+    fn read_lobe(&self) -> Result<LobeModel> {
+        #[derive(Default, serde::Deserialize)]
+        #[serde(default)]
+        struct Settings {
+            fit: Fit,
+        }
+        #[derive(Default, serde::Deserialize)]
+        #[serde(default)]
+        struct Fit {
+            lobe: LobeModel,
+        }
+        match self.file("settings.toml").is_file() {
+            true => Ok(self.read_settings::<Settings>()?.fit.lobe),
+            false => Ok(LobeModel::BlinnPhong),
+        }
     }
 
     /// Writes `loss.csv`.

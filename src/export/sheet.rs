@@ -1,8 +1,9 @@
 //! `convention.txt` of an export: what each number means, and what was lost.
 
 use super::asset::{Asset, MetalSplit};
-use super::lobe_fit::ggx_of_blinn_phong;
 use super::whole_folder::FIRST_LINE;
+use crate::material::LobeModel;
+use crate::material::lobe::nearest::ggx_of_blinn_phong;
 use crate::math::statistics::quantile;
 
 /// What an export lost, in numbers.
@@ -15,7 +16,7 @@ pub struct Losses {
 impl Losses {
     /// What writing GGX in place of the fitted lobe loses, over the widths of the map.
     pub fn of_lobe(asset: &Asset) -> Self {
-        if !asset.has_lobe {
+        if !asset.has_lobe || asset.lobe == LobeModel::Ggx {
             return Losses::default();
         }
         let roughness = asset.maps.roughness.pixels();
@@ -76,16 +77,19 @@ pub fn of_format(title: &str, files: &str, losses: &Losses) -> String {
 
 /// The sheet of the whole export.
 pub fn of_export(asset: &Asset, folders: &[&str]) -> String {
+    let [distribution, shadowing] = asset.lobe.formulas();
     let lobe = match asset.has_lobe {
-        true => {
+        true => format!(
             "\
 The fitted model
   f = diffuse / pi + D F G / (4 (n.i)(n.o)),  diffuse not reduced by F
-  D  normalised Blinn-Phong of microfacet width a,  F  Schlick from F0,  G  Smith with Schlick-GGX, k = a / 2
+  {distribution}
+  F  Schlick,  F0 + (1 - F0)(1 - h.o)^5
+  {shadowing}
 Each folder says which of its numbers stand for these, and what its renderer computes instead.
 "
-        }
-        false => "The surface was fitted without a specular lobe: f = diffuse / pi.\n",
+        ),
+        false => "The surface was fitted without a specular lobe: f = diffuse / pi.\n".into(),
     };
     let sun = match asset.light.as_ref().map(|light| &light.sun) {
         None => "The run has no light: environments are missing from this export.\n".into(),

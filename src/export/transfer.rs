@@ -95,7 +95,11 @@ pub fn transfer(result: &RunResult, onto: Mesh, size: usize) -> Result<Transferr
     };
     let times_seen = grey(&result.times_seen, false);
     let environment = result.environment.clone();
-    Ok(Transferred { result: RunResult { maps, environment, mesh: onto, times_seen }, coverage, findings })
+    Ok(Transferred {
+        result: RunResult { maps, environment, mesh: onto, times_seen, lobe: result.lobe },
+        coverage,
+        findings,
+    })
 }
 
 /// Position and normal of the other mesh at the centre of each texel, or at the nearest point of the triangle that
@@ -250,7 +254,7 @@ mod tests {
             roughness: Image::from_fn(64, 64, |row, _| 0.1 + 0.5 * v(row)),
         };
         let environment = Environment::constant(2, 1, Vec3::ONE);
-        RunResult { maps, environment, mesh, times_seen: Image::filled(64, 64, 3.0) }
+        RunResult { maps, environment, mesh, times_seen: Image::filled(64, 64, 3.0), lobe: Default::default() }
     }
 
     #[test]

@@ -1,10 +1,11 @@
 //! USD: a stage as text (`.usda`) beside its textures, and the same stage with everything inside (`.usdz`).
 //!
-//! The material is `UsdPreviewSurface` in its specular workflow, which takes diffuse reflectance, F0 and roughness as
-//! they are; `inputs:ior` is set too, for importers that know no specular workflow. Texture coordinates point up, as in
+//! The material is a `UsdPreviewSurface` with a variant set `workflow`. `specular` takes diffuse reflectance, F0 and
+//! roughness as they are; but few importers know that workflow, and Blender reads its colour as a factor of F0. So
+//! `metalness` is chosen at first: one F0 for what is no metal, metalness for the rest. Texture coordinates point up, as in
 //! Patina; the dome light's left border looks along -z, as in Patina.
 
-use super::asset::Asset;
+use super::asset::{Asset, DielectricRange, GRAZING_OF_VIEWS, MetalSplit};
 use super::environment_file::smooth;
 use super::texture::{Curve, Texture};
 use crate::error::{Error, ErrorKind, Result};
@@ -14,17 +15,25 @@ use std::fmt::Write as _;
 use std::io::Write;
 use std::path::Path;
 
-/// Writes `NAME.usda`, its textures and `NAME.usdz` into a folder.
+/// Writes `NAME.usda`, its textures and `NAME.usdz` into a folder; gives the share of texels whose base colour would have had
+/// to exceed 1, and what base colour and metalness lost, where there is a lobe.
 ///
 /// # Errors
 /// Files that cannot be written; `TooLarge` for a package beyond four gigabytes.
-pub fn write(asset: &Asset, folder: &Path, sixteen_bits: bool) -> Result<()> {
-    let mut files = vec![
-        ("textures/diffuse.png", Texture::Rgb(&asset.maps.diffuse).png(Curve::Srgb, sixteen_bits)?),
-        ("textures/roughness.png", Texture::Grey(&asset.perceptual_roughness()).png(Curve::Linear, sixteen_bits)?),
-    ];
-    if asset.has_lobe {
-        files.push(("textures/specular.png", Texture::Rgb(&asset.maps.specular).png(Curve::Srgb, sixteen_bits)?));
+pub fn write(asset: &Asset, folder: &Path, sixteen_bits: bool) -> Result<(f64, Option<MetalSplit>)> {
+    let png = |texture: Texture, curve: Curve| texture.png(curve, sixteen_bits);
+    let mut files = vec![("textures/diffuse.png", png(Texture::Rgb(&asset.maps.diffuse), Curve::Srgb)?)];
+    let split =
+        asset.has_lobe.then(|| asset.metal_split(DielectricRange::Always(asset.f0_quantile(0.1).clamp(0.02, 0.16))));
+    let mut held_share = 0.0;
+    if let Some(split) = &split {
+        let (base_colour, held) =
+            split.base_colour_under_fresnel(GRAZING_OF_VIEWS, Some(&asset.perceptual_roughness()));
+        held_share = held;
+        files.push(("textures/base_color.png", png(Texture::Rgb(&base_colour), Curve::Srgb)?));
+        files.push(("textures/metallic.png", png(Texture::Grey(&split.metallic), Curve::Linear)?));
+        files.push(("textures/specular.png", png(Texture::Rgb(&asset.maps.specular), Curve::Srgb)?));
+        files.push(("textures/roughness.png", png(Texture::Grey(&asset.perceptual_roughness()), Curve::Linear)?));
     }
     for (name, bytes) in &files {
         write_bytes(&folder.join(name), bytes)?;
@@ -35,16 +44,17 @@ pub fn write(asset: &Asset, folder: &Path, sixteen_bits: bool) -> Result<()> {
         let path = folder.join(name);
         files.push((name, std::fs::read(&path).map_err(|source| Error::reading(&path, source))?));
     }
-    let stage = stage(asset).into_bytes();
+    let stage = stage(asset, split.as_ref().map(MetalSplit::ior)).into_bytes();
     let name = format!("{}.usda", asset.name);
     write_bytes(&folder.join(&name), &stage)?;
     let mut members: Vec<(&str, &[u8])> = vec![(&name, &stage)];
     members.extend(files.iter().map(|(name, bytes)| (*name, bytes.as_slice())));
-    package(&folder.join(format!("{}.usdz", asset.name)), &members)
+    package(&folder.join(format!("{}.usdz", asset.name)), &members)?;
+    Ok((held_share, split))
 }
 
-/// The stage as text.
-fn stage(asset: &Asset) -> String {
+/// The stage as text; `ior` is the index of refraction of what is no metal, `None` without a lobe.
+fn stage(asset: &Asset, ior: Option<f64>) -> String {
     let name = &asset.name;
     let mesh = &asset.mesh;
     let mut text = format!(
@@ -76,7 +86,7 @@ fn stage(asset: &Asset) -> String {
         "        uniform token subdivisionScheme = \"none\"\n    }\n".into(),
     ];
     text.push_str(&lines.join("\n"));
-    text.push_str(&material(asset));
+    text.push_str(&material(&asset.name, ior));
     if asset.light.is_some() {
         text.push_str(
             "\n    def DomeLight \"environment\"\n    {\n        float inputs:intensity = 1\n        \
@@ -88,38 +98,93 @@ fn stage(asset: &Asset) -> String {
     text
 }
 
-fn material(asset: &Asset) -> String {
-    let path = format!("/{}/material", asset.name);
+fn material(name: &str, ior: Option<f64>) -> String {
+    let path = format!("/{name}/material");
+    let variants = match ior {
+        Some(_) => {
+            "\n        prepend variantSets = \"workflow\"\n        variants = {\n            string workflow = \"metalness\"\n        }\n    "
+        }
+        None => "",
+    };
+    let variants = if variants.is_empty() { String::new() } else { format!(" ({variants})") };
     let mut text = format!(
-        "\n    def Material \"material\"\n    {{\n        token outputs:surface.connect = <{path}/surface.outputs:surface>\n\n        \
-         def Shader \"surface\"\n        {{\n            uniform token info:id = \"UsdPreviewSurface\"\n            \
-         color3f inputs:diffuseColor.connect = <{path}/diffuse.outputs:rgb>\n            float inputs:ior = {}\n            \
-         float inputs:metallic = 0\n            float inputs:roughness.connect = <{path}/roughness.outputs:r>\n",
-        if asset.has_lobe { format!("{:.4}", asset.ior_of_mean()) } else { "1".into() }
+        "\n    def Material \"material\"{variants}\n    {{\n        token outputs:surface.connect = <{path}/surface.outputs:surface>\n\n        \
+         def Shader \"surface\"\n        {{\n            uniform token info:id = \"UsdPreviewSurface\"\n"
     );
-    if asset.has_lobe {
-        let _ = writeln!(text, "            color3f inputs:specularColor.connect = <{path}/specular.outputs:rgb>");
-    } else {
-        text.push_str("            color3f inputs:specularColor = (0, 0, 0)\n");
+    match ior {
+        // What differs between the workflows stands in their variants.
+        Some(_) => {
+            let _ = writeln!(text, "            float inputs:roughness.connect = <{path}/roughness.outputs:r>");
+        }
+        None => {
+            let _ = write!(
+                text,
+                "            color3f inputs:diffuseColor.connect = <{path}/diffuse.outputs:rgb>\n            \
+                 float inputs:ior = 1\n            float inputs:roughness = 1\n            \
+                 color3f inputs:specularColor = (0, 0, 0)\n            int inputs:useSpecularWorkflow = 1\n"
+            );
+        }
     }
     text.push_str(
-        "            int inputs:useSpecularWorkflow = 1\n            token outputs:surface\n        }\n\n        \
+        "            token outputs:surface\n        }\n\n        \
          def Shader \"coordinates\"\n        {\n            uniform token info:id = \"UsdPrimvarReader_float2\"\n            \
          string inputs:varname = \"st\"\n            float2 outputs:result\n        }\n",
     );
-    let maps = [("diffuse", "sRGB", "float3 outputs:rgb"), ("roughness", "raw", "float outputs:r")];
-    let specular = asset.has_lobe.then_some(("specular", "sRGB", "float3 outputs:rgb"));
-    for (map, space, output) in maps.into_iter().chain(specular) {
-        let _ = write!(
-            text,
-            "\n        def Shader \"{map}\"\n        {{\n            uniform token info:id = \"UsdUVTexture\"\n            \
-             asset inputs:file = @textures/{map}.png@\n            token inputs:sourceColorSpace = \"{space}\"\n            \
-             float2 inputs:st.connect = <{path}/coordinates.outputs:result>\n            \
-             token inputs:wrapS = \"clamp\"\n            token inputs:wrapT = \"clamp\"\n            {output}\n        }}\n"
-        );
-    }
-    text.push_str("    }\n");
+    let Some(ior) = ior else {
+        return text + &texture(&path, "diffuse", Kind::Colour, "        ") + "    }\n";
+    };
+    text += &texture(&path, "roughness", Kind::Value, "        ");
+    let deep = "                ";
+    let over = |lines: &[String]| {
+        let lines: String = lines.iter().map(|line| format!("{deep}    {line}\n")).collect();
+        format!("{deep}over \"surface\"\n{deep}{{\n{lines}{deep}}}\n")
+    };
+    let metalness = over(&[
+        format!("color3f inputs:diffuseColor.connect = <{path}/base_color.outputs:rgb>"),
+        format!("float inputs:ior = {ior:.4}"),
+        format!("float inputs:metallic.connect = <{path}/metallic.outputs:r>"),
+        "int inputs:useSpecularWorkflow = 0".into(),
+    ]) + &texture(&path, "base_color", Kind::Colour, deep)
+        + &texture(&path, "metallic", Kind::Value, deep);
+    let specular = over(&[
+        format!("color3f inputs:diffuseColor.connect = <{path}/diffuse.outputs:rgb>"),
+        format!("float inputs:ior = {ior:.4}"),
+        format!("color3f inputs:specularColor.connect = <{path}/specular.outputs:rgb>"),
+        "int inputs:useSpecularWorkflow = 1".into(),
+    ]) + &texture(&path, "diffuse", Kind::Colour, deep)
+        + &texture(&path, "specular", Kind::Colour, deep);
+    let _ = write!(
+        text,
+        "\n        variantSet \"workflow\" = {{\n            \"metalness\" {{\n{metalness}            }}\n            \
+         \"specular\" {{\n{specular}            }}\n        }}\n    }}\n"
+    );
     text
+}
+
+/// What a texture holds.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Colour,
+    Value,
+}
+
+/// A node that reads `textures/MAP.png`.
+fn texture(path: &str, map: &str, kind: Kind, indent: &str) -> String {
+    let (space, output) = match kind {
+        Kind::Colour => ("sRGB", "float3 outputs:rgb"),
+        Kind::Value => ("raw", "float outputs:r"),
+    };
+    let lines = [
+        "uniform token info:id = \"UsdUVTexture\"".to_string(),
+        format!("asset inputs:file = @textures/{map}.png@"),
+        format!("token inputs:sourceColorSpace = \"{space}\""),
+        format!("float2 inputs:st.connect = <{path}/coordinates.outputs:result>"),
+        "token inputs:wrapS = \"clamp\"".into(),
+        "token inputs:wrapT = \"clamp\"".into(),
+        output.into(),
+    ];
+    let lines: String = lines.iter().map(|line| format!("{indent}    {line}\n")).collect();
+    format!("\n{indent}def Shader \"{map}\"\n{indent}{{\n{lines}{indent}}}\n")
 }
 
 /// A zip file without compression whose members begin at multiples of 64 bytes, as USD asks of a package.
@@ -190,16 +255,18 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         for has_lobe in [true, false] {
             let asset = small_asset(has_lobe);
-            let text = stage(&asset);
+            let text = stage(&asset, has_lobe.then_some(1.5));
             assert_eq!(text.matches('{').count(), text.matches('}').count());
             assert_eq!(text.matches('(').count(), text.matches(')').count());
             assert!(text.contains("point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]"));
             assert!(text.contains("primvars:st = [(0.1, 0.1), "));
             assert!(text.contains("int inputs:useSpecularWorkflow = 1"));
             assert_eq!(text.contains("specularColor.connect"), has_lobe);
+            assert_eq!(text.contains("string workflow = \"metalness\""), has_lobe);
+            assert_eq!(text.matches("def Shader \"diffuse\"").count(), 1);
             assert_eq!(text.contains("specularColor = (0, 0, 0)"), !has_lobe);
             let place = folder.path().join(format!("{has_lobe}"));
-            write(&asset, &place, true).unwrap();
+            assert_eq!(write(&asset, &place, true).unwrap().1.is_some(), has_lobe);
             for reference in text.split('@').skip(1).step_by(2) {
                 assert!(place.join(reference).is_file(), "{reference}");
             }
@@ -218,7 +285,7 @@ mod tests {
         let end = bytes.len() - 22;
         assert_eq!(&bytes[end..end + 4], b"PK\x05\x06");
         let (count, mut entry) = (word(end + 10), long(end + 16));
-        assert_eq!((entry + long(end + 12), count), (end, 5));
+        assert_eq!((entry + long(end + 12), count), (end, 7));
         for _ in 0..count {
             assert_eq!(&bytes[entry..entry + 4], b"PK\x01\x02");
             let (size, name_length, local) = (long(entry + 24), word(entry + 28), long(entry + 42));

@@ -1,16 +1,19 @@
 //! One HTML file that shows the result in any browser, with no network and no server.
 //!
 //! It holds the mesh, the maps and a few environments, already blurred by the fitted lobe for eight widths (split sum,
-//! Karis 2013), and a small viewer for WebGL 2. How much of the sky each vertex sees is baked with rays; shadows of
-//! the sun and light between surfaces are not shown, and the page says so.
+//! Karis 2013), and a small viewer for WebGL 2. The sun of an environment is taken out of it: it shines on the lobe itself
+//! and casts shadows. How much of the sky each vertex sees is baked with rays; sharp shadows of other lamps and light between
+//! surfaces are not shown, and the page says so.
 
 mod prefilter;
 
 use super::asset::Asset;
+use super::sun::sun_of;
 use super::texture::{Curve, Texture};
 use crate::error::{Error, ErrorKind, Result};
 use crate::image::Image;
 use crate::light::Environment;
+use crate::material::LobeModel;
 use crate::math::frame::{Frame, sample_cosine_hemisphere};
 use crate::scene::{Camera, Mesh};
 use crate::trace::{Bvh, Ray};
@@ -61,11 +64,11 @@ pub fn page(asset: &Asset, lights: &[(String, Environment)], photos: &[PagePhoto
     ];
     let maps: Vec<String> = maps.iter().map(|png| format!("data:image/png;base64,{}", STANDARD.encode(png))).collect();
     let maps_bytes: usize = maps.iter().map(String::len).sum();
-    let lights: Vec<Value> = lights.iter().map(|(name, light)| light_of(name, light)).collect();
-    let table = prefilter::reflectance_table();
+    let lights: Vec<Value> = lights.iter().map(|(name, light)| light_of(name, light, asset.lobe)).collect();
+    let table = prefilter::reflectance_table(asset.lobe);
     let photos: Vec<Value> = photos.iter().map(photo_of).collect();
     let document = json!({
-        "name": asset.name, "hasLobe": asset.has_lobe, "mesh": mesh, "maps": maps, "lights": lights,
+        "name": asset.name, "hasLobe": asset.has_lobe, "lobe": asset.lobe, "mesh": mesh, "maps": maps, "lights": lights,
         "table": {"size": prefilter::TABLE_SIDE, "values": halves(table.into_iter().flatten())},
         "levels": prefilter::LEVELS, "photos": photos,
     });
@@ -135,17 +138,25 @@ fn openness_of(mesh: &Mesh) -> Result<Vec<f32>> {
         .collect())
 }
 
-fn light_of(name: &str, light: &Environment) -> Value {
-    let levels = prefilter::levels(light);
+/// A light as the viewer reads it; its sun is apart, since that casts shadows.
+fn light_of(name: &str, light: &Environment, lobe: LobeModel) -> Value {
+    let mean = crate::math::luminance(light.mean_radiance());
+    let sun = sun_of(light);
+    let light = sun.as_ref().map_or(light, |sun| &sun.rest);
+    let levels = prefilter::levels(light, lobe);
     let pack = |image: &Image<Vec3>| halves(image.pixels().iter().flat_map(|rgb| [rgb.x, rgb.y, rgb.z, 1.0]));
     let levels: Vec<Value> = levels
         .iter()
         .map(|image| json!({"width": image.width(), "height": image.height(), "values": pack(image)}))
         .collect();
     let irradiance = prefilter::irradiance(light);
-    let mean = crate::math::luminance(light.mean_radiance());
+    let sun = sun.as_ref().map(|sun| {
+        // As a disc: solid angle 2 pi (1 - cos).
+        let cosine = 1.0 - sun.solid_angle / std::f64::consts::TAU;
+        json!({"towards": sun.towards.to_array(), "irradiance": sun.irradiance.to_array(), "cosine": cosine})
+    });
     json!({
-        "name": name, "levels": levels, "mean": mean,
+        "name": name, "levels": levels, "mean": mean, "sun": sun,
         "irradiance": {"width": irradiance.width(), "height": irradiance.height(), "values": pack(&irradiance)},
     })
 }

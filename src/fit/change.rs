@@ -47,6 +47,7 @@ reaches! {
     bounces: NextSteps,
     levels: Fit,
     pixel_filter: StageWork,
+    lobe: Fit,
     consistency: StageWork,
     background: NextSteps,
     exposure: NextSteps,

@@ -162,6 +162,7 @@ mod tests {
         let expected = [
             "environment-height",
             "levels",
+            "lobe",
             "map-size",
             "method",
             "seed",

@@ -21,8 +21,9 @@ use super::targets::{Target, held_out_targets, targets};
 use super::views::{ViewUse, training_views, unknown_names, uses_of};
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::light::Environment;
-use crate::material::MaterialMaps;
+use crate::material::lobe::nearest;
 use crate::material::texels::{PyramidWeights, TexelPyramid, maps_from_texels};
+use crate::material::{LobeModel, MaterialMaps};
 use crate::render::{Parameters, Surface};
 use crate::scene::Scene;
 use std::sync::Arc;
@@ -246,6 +247,14 @@ impl Fitter {
         self.state.plan.get(self.state.stage)
     }
 
+    /// The lobe that reflectance and width mean now: the solver's are of Blinn-Phong until refinement takes them over.
+    pub fn lobe(&self) -> LobeModel {
+        match self.stage() {
+            Some(stage) if stage.kind.is_of_solver() => LobeModel::BlinnPhong,
+            _ => self.settings.lobe,
+        }
+    }
+
     /// What fixes the scale between reflectance and light.
     pub fn gauge(&self) -> GaugeRule {
         GaugeRule::of(self.scene.background, self.settings.background, self.settings.fixed_light, self.settings.method)
@@ -266,7 +275,8 @@ impl Fitter {
     /// Maps and light, for rendering.
     pub fn parameters(&self) -> Parameters<f32> {
         let weights = PyramidWeights::flat(self.state.map_size, self.state.map_size);
-        Parameters::new(TexelPyramid::from_base(self.state.texels.clone(), &weights), &self.environment())
+        let texels = TexelPyramid::from_base(self.state.texels.clone(), &weights).with_model(self.lobe());
+        Parameters::new(texels, &self.environment())
     }
 
     /// What happened that the user should know, as findings.
@@ -286,6 +296,9 @@ impl Fitter {
     /// That lobes have tails which the model's do not have, where maps that the solver made since the fit was started or
     /// taken up show them.
     pub fn tail_finding(&self) -> Option<Finding> {
+        if self.settings.lobe == LobeModel::Ggx {
+            return None;
+        }
         let tails = self.tails.filter(LobeTails::are_there)?;
         let message = format!(
             "highlights reach further than the model's lobes: as if {:.0} ± {:.0} % of each were three times as wide",
@@ -293,7 +306,7 @@ impl Fitter {
             100.0 * tails.error
         );
         Some(Finding::new(Severity::Warning, "lobes-with-tails", message).remedy(
-            "specular and roughness maps are the nearest that Blinn-Phong lobes come to, and their intervals do not know of it; measured surfaces and GGX have such tails",
+            "specular and roughness maps are the nearest that Blinn-Phong lobes come to, and their intervals do not know of it; measured surfaces and GGX have such tails: --lobe ggx fits them",
         ))
     }
 
@@ -326,9 +339,13 @@ impl Fitter {
             return Ok(StepOutcome::Interrupted);
         }
         while self.stage().is_some_and(|stage| self.state.step_in_stage >= stage.steps) {
+            let lobe = self.lobe();
             self.state.stage += 1;
             self.state.step_in_stage = 0;
             self.work = None;
+            if (lobe, self.lobe()) == (LobeModel::BlinnPhong, LobeModel::Ggx) {
+                nearest::to_ggx(&mut self.state.texels);
+            }
         }
         let Some(&stage) = self.stage() else { return Ok(StepOutcome::Finished) };
         if stage.kind.is_of_solver() {

@@ -3,6 +3,7 @@
 use super::settings::{Consistency, FitSettings, Method};
 use super::solver::light_shape::LightShape;
 use crate::error::{Error, ErrorKind, Place, Result};
+use crate::material::LobeModel;
 use crate::render::path::MAX_BOUNCES;
 
 /// The solver's equations of the light are square and dense, some fifteen of them at once: with so many unknowns they take
@@ -31,6 +32,14 @@ impl FitSettings {
             return wrong("environment-height", "must be 2 to 1024");
         }
         if self.method == Method::Solver {
+            if self.lobe == LobeModel::Ggx && self.solver_polish == 0 {
+                return Err(Error::new(
+                    ErrorKind::InvalidSetting,
+                    "the solver leaves GGX to refinement steps after it",
+                )
+                .at(Place::Setting("solver-polish".into()))
+                .remedy("give some steps, or fit by Adam: --method adam"));
+            }
             self.validate_sizes_of_solver()?;
         }
         if self.samples == 0 || self.samples > 4096 {
@@ -135,5 +144,11 @@ mod tests {
         assert!(of(1024, 256, true, solver).unwrap_err().contains("GiB"));
         assert!(of(64, 4096, false, solver).unwrap_err().contains("--solver-grid"));
         assert!(of(1024, 4096, false, Method::Adam).is_ok());
+        let ggx = |method, solver_polish| {
+            FitSettings { lobe: LobeModel::Ggx, method, solver_polish, ..Default::default() }.validate()
+        };
+        assert!(ggx(Method::Adam, 0).is_ok() && ggx(solver, 40).is_ok());
+        let error = ggx(solver, 0).unwrap_err();
+        assert!(error.place() == &Place::Setting("solver-polish".into()), "{error}");
     }
 }

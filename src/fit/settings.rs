@@ -2,6 +2,7 @@
 
 pub use super::method::Method;
 use crate::error::{Error, ErrorKind, Result};
+use crate::material::LobeModel;
 use crate::render::first_hits::PixelFilter;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -121,6 +122,10 @@ pub struct FitSettings {
     /// How samples are spread over a pixel.
     #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
     pub pixel_filter: PixelFilter,
+    /// The microfacets of the specular lobe. GGX is what other renderers shade with, so that maps lose nothing on the way to
+    /// them; after the solver, whose lobes are of Blinn-Phong, refinement steps turn them into it.
+    #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
+    pub lobe: LobeModel,
     /// Multi-view gradient consistency, in the last of Adam's steps.
     #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
     pub consistency: Consistency,
@@ -215,6 +220,7 @@ impl Default for FitSettings {
             bounces: 2,
             levels: 3,
             pixel_filter: PixelFilter::Box,
+            lobe: LobeModel::BlinnPhong,
             consistency: Consistency::None,
             background: BackgroundEvidence::Use,
             exposure: false,

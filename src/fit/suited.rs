@@ -2,6 +2,7 @@
 
 use super::method::Method;
 use super::settings::FitSettings;
+use crate::material::LobeModel;
 use crate::scene::doctor::{self, Report, exposure};
 use crate::scene::{Scene, View};
 
@@ -21,6 +22,8 @@ pub struct Suited {
     pub map_size: Option<usize>,
 }
 
+/// Steps of polishing that let lobes of another kind than the solver's settle.
+const POLISH_OF_LOBES: usize = 60;
 /// So much coarser is the solver's grid where whole pixels or polishing follow: the finest detail of their maps is the photos'.
 const COARSER_GRID: usize = 2;
 /// Share of an atlas that charts cover, at the least, as a rule.
@@ -76,6 +79,10 @@ impl Suited {
         }
         if is_free("solver-refine") {
             settings.solver_refine = self.solver_refine;
+        }
+        // The solver's lobes are of Blinn-Phong: others are made of them by refinement.
+        if is_free("solver-polish") && settings.lobe == LobeModel::Ggx {
+            settings.solver_polish = POLISH_OF_LOBES.saturating_mul(settings.steps_all) / FitSettings::default().steps_all;
         }
         // What follows leaves the solver the sizes below the full one, and it does with one more of them.
         let is_refined = settings.is_refined();
@@ -174,6 +181,10 @@ mod tests {
         scene.views[1].photo = Photo::Srgb8(Image::filled(8, 6, [200; 3]));
         assert_eq!(suits(&scene, &[]), (Method::Solver, 1));
         assert_eq!(suits(&scene, &["samples"]).0, Method::Adam);
+        let ggx = FitSettings { lobe: LobeModel::Ggx, ..FitSettings::default() };
+        let resolved = applied(&Suited::to(&scene, &Report::default()), ggx, &["lobe"]);
+        assert_eq!((resolved.method, resolved.solver_polish), (Method::Solver, POLISH_OF_LOBES));
+        resolved.validate().unwrap();
         scene.views.clear();
         assert_eq!(suits(&scene, &[]).0, Method::Adam);
     }

@@ -102,7 +102,7 @@ impl Fitter {
             }
         }
         let dual = Parameters {
-            texels: TexelPyramid::from_base(base, weights),
+            texels: TexelPyramid::from_base(base, weights).with_model(parameters.texels.model),
             light: parameters.light.iter().map(|radiance| radiance.map(lift)).collect(),
             environment_size: parameters.environment_size,
         };

@@ -3,26 +3,30 @@
 //! [`forecast`] tells before anything is read how much memory and disk an export takes and what its formats cannot hold:
 //! a window shows it in its dialog. [`export`] writes; nothing is seen at the place of the export until it is whole.
 
+mod page;
+mod sheets;
+
+pub(super) use page::page_of_report;
+
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::export::asset::{Asset, MetalSplit};
 use crate::export::environment_file::{with_x_in_the_centre, write_both};
 use crate::export::sheet::{self, Losses};
 use crate::export::texture::TextureFormat;
 use crate::export::transfer::transfer;
-use crate::export::web::PagePhoto;
 use crate::export::whole_folder::WholeFolder;
-use crate::export::{RunFolder, blender, exchange, gltf, materialx, mitsuba, texture_set, usd, web};
+use crate::export::{RunFolder, blender, exchange, gltf, materialx, mitsuba, texture_set, usd};
 use crate::files::write_bytes;
 use crate::image::file;
-use crate::image::resize::shrink;
+use crate::material::LobeModel;
 use crate::scene::{Scene, demo};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::pictures::{light_of, matched};
 use super::prepare::RunSettings;
-use super::shown::exposure_of;
+use page::write_page;
+use sheets::{BLENDER_FILES, GLB_FILES, MATERIALX_FILES, MITSUBA_FILES, TEXTURE_FILES, USD_FILES};
 
 /// What an export is made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -64,20 +68,21 @@ impl Format {
         }
     }
 
-    /// What the format cannot hold of a surface with a lobe, one sentence each, without a full stop.
+    /// What the format cannot hold of a surface with this lobe, one sentence each, without a full stop.
+    pub fn loses(self, lobe: LobeModel) -> impl Iterator<Item = &'static str> {
+        self.cannot_hold().iter().copied().filter(move |&sentence| lobe == LobeModel::BlinnPhong || sentence != GGX)
+    }
+
+    /// What the format cannot hold of a surface with a lobe of Blinn-Phong, one sentence each, without a full stop.
     pub fn cannot_hold(self) -> &'static [&'static str] {
-        const GGX: &str = "the Blinn-Phong lobe becomes the nearest GGX lobe";
         const LAYER: &str =
             "its renderers weigh the diffuse part by what the lobe leaves; the base colour is raised to make up for it";
         match self {
             Format::Glb => &[GGX, LAYER, "the environment lies beside the file, not in it"],
-            Format::Usd => {
-                &[GGX, "importers without a specular workflow take one index of refraction for the whole surface"]
+            Format::Usd => &[GGX, OF_METALNESS],
+            Format::Mitsuba => {
+                &[GGX, "one F0 and metalness stand for the specular map; scene_exact.xml with its plugin loses nothing"]
             }
-            Format::Mitsuba => &[
-                "scene.xml: the lobe becomes the nearest GGX lobe, and one F0 and metalness stand for the specular map; \
-                 scene_exact.xml with its plugin loses nothing",
-            ],
             Format::Blender => &[GGX, LAYER],
             Format::Materialx => &[GGX, LAYER],
             Format::Textures => &[
@@ -90,8 +95,11 @@ impl Format {
     }
 }
 
-const WEB_SHOWS: &str =
-    "the page shows the fitted lobe by maps blurred beforehand: no shadows of single lamps, no light between surfaces";
+const GGX: &str = "the Blinn-Phong lobe becomes the nearest GGX lobe";
+const OF_METALNESS: &str = "base colour and metalness stand for the specular map in the variant that is chosen at first; the variant \
+    `specular` holds the maps as fitted, for importers that know that workflow";
+const WEB_SHOWS: &str = "the page shows the fitted lobe by maps blurred beforehand: no sharp shadows but those of the sun, no light between \
+     surfaces";
 
 /// What to export, and how.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -168,7 +176,7 @@ pub struct Forecast {
 pub fn forecast(options: &ExportOptions) -> Result<Forecast> {
     options.validate()?;
     let folder = RunFolder::open(&options.run)?;
-    let has_lobe = has_lobe(&folder)?;
+    let (has_lobe, lobe) = lobe_of(&folder)?;
     let header = file::read_header(&folder.file("diffuse.exr")).map_err(|error| {
         Error::new(error.kind(), error.message())
             .at(error.place().clone())
@@ -199,7 +207,7 @@ pub fn forecast(options: &ExportOptions) -> Result<Forecast> {
         findings.push(without_light());
     }
     let losses = match has_lobe {
-        true => options.formats.iter().flat_map(|&f| f.cannot_hold().iter().map(move |s| (f, s.to_string()))).collect(),
+        true => options.formats.iter().flat_map(|&f| f.loses(lobe).map(move |s| (f, s.to_string()))).collect(),
         false => Vec::new(),
     };
     let largest_disk_bytes = options.formats.iter().map(disk_of).sum();
@@ -235,13 +243,13 @@ pub struct Exported {
     pub findings: Vec<Finding>,
 }
 
-/// Whether the surface of a run was fitted with a specular lobe. A folder without settings is taken by its maps.
-fn has_lobe(folder: &RunFolder) -> Result<bool> {
+/// Whether the surface of a run was fitted with a specular lobe, and which. A folder without settings is taken by its maps.
+fn lobe_of(folder: &RunFolder) -> Result<(bool, LobeModel)> {
     if !folder.file("settings.toml").is_file() {
-        return Ok(true);
+        return Ok((true, LobeModel::BlinnPhong));
     }
     let settings: RunSettings = folder.read_settings()?;
-    Ok(settings.fit.has_lobe())
+    Ok((settings.fit.has_lobe(), settings.fit.lobe))
 }
 
 /// Writes an export. `tell` hears of it; `stop` ends it between files, and then nothing is left behind.
@@ -280,7 +288,7 @@ pub fn export(options: &ExportOptions, stop: &AtomicBool, tell: &dyn Fn(ExportEv
         }
     };
     go_on()?;
-    let asset = Asset::new(&name, result, has_light, has_lobe(&folder)?, options.size);
+    let asset = Asset::new(&name, result, has_light, lobe_of(&folder)?.0, options.size);
     if asset.light.is_none() && has_light {
         findings.push(without_light());
     }
@@ -316,57 +324,11 @@ pub fn export(options: &ExportOptions, stop: &AtomicBool, tell: &dyn Fn(ExportEv
     Ok(Exported { folder: options.output.clone(), losses, findings })
 }
 
-/// Writes the page: the run's light and built-in skies of its brightness, and some photos when the scene is at hand.
-fn write_page(
-    asset: &Asset,
-    scene: Option<&Scene>,
-    folder: &Path,
-    findings: &mut Vec<Finding>,
-    tell: &dyn Fn(ExportEvent),
-) -> Result<Losses> {
-    let own = asset.light.as_ref().map(|light| &light.whole);
-    let mut lights: Vec<_> =
-        own.map(|light| ("Estimated environment".to_string(), light.clone())).into_iter().collect();
-    for name in ["noon", "evening", "overcast"] {
-        let sky = light_of(name, 64)?.environment;
-        lights.push((format!("Built-in sky: {name}"), own.map_or_else(|| sky.clone(), |own| matched(&sky, own).0)));
-    }
-    let photos = scene.map(page_photos).transpose()?.unwrap_or_default();
-    let page = web::page(asset, &lights, &photos)?;
-    if page.beyond_maps > web::LARGEST_BEYOND_MAPS {
-        let message = format!("the page holds {:.1} MB beyond its maps", page.beyond_maps as f64 / 1e6);
-        let finding = Finding::new(Severity::Warning, "export-page-large", message)
-            .remedy("simplify the mesh and carry the maps over with --onto");
-        tell(ExportEvent::Finding(finding.clone()));
-        findings.push(finding);
-    }
-    write_bytes(&folder.join("index.html"), page.html.as_bytes())?;
-    let losses = Losses::default().and(WEB_SHOWS);
-    write_bytes(&folder.join("convention.txt"), sheet::of_format("Page", WEB_FILES, &losses).as_bytes())?;
-    Ok(losses)
-}
-
-/// Photos of a page, spread over the views; those of a scene that was built anew are black and left out.
-fn page_photos(scene: &Scene) -> Result<Vec<PagePhoto>> {
-    const MOST: usize = 4;
-    const MOST_PIXELS: usize = 400_000;
-    const QUALITY: u8 = 85;
-    let exposure = exposure_of(scene);
-    let mut photos = Vec::new();
-    for view in scene.views.iter().step_by(scene.views.len().div_ceil(MOST).max(1)) {
-        let factor = 1 << view.camera.level_within(MOST_PIXELS);
-        let picture = shrink(&view.photo.to_linear(), factor);
-        if picture.pixels().iter().all(|rgb| rgb.max_element() <= 0.0) {
-            continue;
-        }
-        let jpeg = file::encode_jpeg(&file::srgb8_from_linear(&picture, exposure), QUALITY)?;
-        photos.push(PagePhoto { name: view.name.clone(), camera: view.camera.shrunk(factor), jpeg });
-    }
-    Ok(photos)
-}
-
 /// The scene of a run, in the world of its mesh; the demo is built anew.
-fn scene_of(folder: &RunFolder) -> Result<Scene> {
+///
+/// # Errors
+/// Settings that cannot be read; a scene that is no longer where the fit read it.
+pub fn scene_of(folder: &RunFolder) -> Result<Scene> {
     let settings: RunSettings = folder.read_settings()?;
     if settings.scene.as_os_str().is_empty() {
         let seed = settings.fit.seed;
@@ -402,8 +364,12 @@ fn write_format(format: Format, asset: &Asset, folder: &Path, textures: TextureF
             ("glTF 2.0", GLB_FILES, with_metals(lobe, glb.held_share, glb.metals.as_ref()))
         }
         Format::Usd => {
-            usd::write(asset, folder, sixteen_bits)?;
-            ("USD", USD_FILES, lobe)
+            let (held_share, split) = usd::write(asset, folder, sixteen_bits)?;
+            let losses = match &split {
+                Some(split) => lobe.and_held(held_share).and_split(split).and(OF_METALNESS),
+                None => lobe,
+            };
+            ("USD", USD_FILES, losses)
         }
         Format::Mitsuba => {
             let split = mitsuba::write(asset, folder)?;
@@ -432,57 +398,6 @@ fn write_format(format: Format, asset: &Asset, folder: &Path, textures: TextureF
     write_bytes(&folder.join("convention.txt"), sheet::of_format(title, files, &losses).as_bytes())?;
     Ok(losses)
 }
-
-const GLB_FILES: &str = "\
-*.glb            mesh (+y up), material, textures, the sun as a directional light where the environment has one
-  base colour    sRGB; diffuse reflectance over 1 - mean F, since glTF weighs diffuse light by 1 - max F
-  metalness      blue of the second texture, no curve; used where the surface has metals (F0 above 0.16), else 0:
-                 base colour is then F0 of what is metal
-  roughness      square root of the GGX width; green of the second texture, no curve
-  F0             ((ior - 1) / (ior + 1))^2 times the specular colour (sRGB): KHR_materials_ior, KHR_materials_specular
-  sun            colour times intensity = irradiance facing it, in the environment's radiance times steradian; Blender:
-                 import with the lighting mode Unitless
-environment.*    the whole light, linear; +x in the centre, as three.js and Blender look for it. Either this or the
-                 sun with environment_without_sun.*: both together light the scene twice";
-const USD_FILES: &str = "\
-*.usda, *.usdz   mesh, UsdPreviewSurface in its specular workflow, dome light; the package holds the same
-diffuse.png      sRGB, diffuse reflectance as fitted
-specular.png     sRGB, F0 as fitted
-roughness.png    square root of the GGX width, no curve
-environment.exr  the whole light, linear; left border -z, +z in the centre (OpenEXR's latitude-longitude)";
-const MITSUBA_FILES: &str = "\
-scene.xml        principled BSDF: base_color.exr, metallic.exr, roughness_ggx.exr (square root of the GGX width)
-scene_exact.xml  the fitted model, BSDF `patina` of patina_lobe.py: diffuse.exr, specular.exr (F0), roughness.exr (a^2)
-                 import mitsuba as mi; mi.set_variant(\"llvm_ad_rgb\"); import patina_lobe; mi.load_file(...)
-environment_nodes.exr  the light on nodes, poles included: interpolated there it is the fitted one exactly
-All maps are linear and read raw.";
-const BLENDER_FILES: &str = "\
-import_patina.py builds mesh, Principled BSDF and world: blender --python import_patina.py
-base_color.exr   linear; diffuse reflectance over 1 - mean F, since Cycles takes from it what the lobe reflects
-specular_tint.exr  linear; F0 over that of the index of refraction in material.json, specular level 0.5
-roughness.exr    square root of the GGX width
-metallic.exr     where the surface has metals (F0 above 0.16); base colour is F0 of what is metal
-environment.exr  linear; +x in the centre";
-const MATERIALX_FILES: &str = "\
-*.mtlx           open_pbr_surface over the maps, all linear
-base_color.exr   diffuse reflectance over 1 - mean F, since the layers of OpenPBR take from it what the lobe reflects
-specular_color.exr  F0 over that of specular_ior
-specular_roughness.exr  square root of the GGX width
-base_metalness.exr  where the surface has metals (F0 above 0.16); base colour is F0 of what is metal
-environment.exr  linear; left border -z, +z in the centre; mesh.obj with texture coordinates, v up";
-const TEXTURE_FILES: &str = "\
-BaseColor, Metallic, Specular, Roughness   metalness workflow: F0 = (1 - metallic) 0.08 specular + metallic base colour,
-                 diffuse = (1 - metallic) base colour
-Diffuse, SpecularF0, Roughness             specular workflow, reflectances as fitted
-Colours carry the sRGB curve in PNG and TIFF and are linear in EXR; Metallic, Specular, Roughness carry no curve.
-Roughness is the square root of the GGX width. Texture coordinates of the OBJ point up: row 0 is v = 1.
-environment.*    linear; left border -z, +z in the centre";
-
-const WEB_FILES: &str = "\
-index.html       opens in any browser with WebGL 2, without a network; holds mesh, maps and environments
-                 diffuse and F0 with the sRGB curve, microfacet width a = sqrt(r), eight bits each
-                 drag turns, wheel zooms, Ctrl and drag moves, Shift and drag turns the light
-                 index.html#light=1&rotation=90&exposure=0.5&backdrop=0&view=0&wipe=1 opens it so";
 
 #[cfg(test)]
 mod tests;

@@ -166,6 +166,6 @@ pub fn move_run(run: &Path, by: &Move, output: &Path) -> Result<MovedRun> {
     let new = RunFolder::create(output)?;
     new.write_settings(&settings)?;
     let (maps, environment) = (moved.maps, moved.environment);
-    new.write_result(&RunResult { maps, environment, mesh: result.mesh, times_seen: result.times_seen })?;
+    new.write_result(&RunResult { maps, environment, ..result })?;
     Ok(MovedRun { factor, bounded_share: moved.bounded_share, findings })
 }

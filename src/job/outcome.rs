@@ -2,8 +2,9 @@
 
 use super::against_truth::truth_errors;
 use super::explained;
+use super::export::page_of_report;
 use super::facts::{describe, loss_rows};
-use super::pictures::parameters;
+use super::pictures::parameters_of;
 use super::prepare::{Prepared, RunSettings, covered, timed};
 use super::shown::{ScoredView, exposure_of, go_on, relit_strips, score_views};
 use super::solver_told::SolverTold;
@@ -50,14 +51,15 @@ pub fn write(
     let covered = covered(surface, settings.fit.map_size);
     let maps = fill_outside(&fitter.maps(), &times_seen, &covered);
     let environment = fitter.environment();
-    let result = RunResult { maps, environment, mesh: surface.mesh().clone(), times_seen };
+    let (mesh, lobe) = (surface.mesh().clone(), fitter.lobe());
+    let result = RunResult { maps, environment, mesh, times_seen, lobe };
     timed(&mut timings, "write maps", || folder.write_result(&result))?;
     let told = SolverTold::of(fitter);
     told.write(folder)?;
     folder.write_loss(&loss_rows(fitter.state()))?;
 
     finishing(FinishingStage::Views);
-    let own = parameters(&result.maps, &result.environment);
+    let own = parameters_of(&result);
     let views = timed(&mut timings, "score views", || score_views(fitter, surface, &own, settings, stop))?;
     if let Some(finding) = explained::finding(&views) {
         tell(Event::Finding(finding.clone()));
@@ -116,6 +118,7 @@ pub fn write(
     data.peak_memory_bytes = memory::peak_bytes();
 
     finishing(FinishingStage::Report);
+    let viewer = page_of_report(&result, scene, settings.fit.has_lobe(), &data.title)?;
     let truth = scene.truth.as_ref();
     let images = ReportImages {
         // What was left out is no evidence of how good the fit is: its scores are listed, its pictures are not shown.
@@ -128,6 +131,7 @@ pub fn write(
         truth_environment: truth.map(|truth| &truth.environment),
         relit,
         choices: told.choice_map.as_deref(),
+        viewer,
     };
     write_report(folder, &data, &images)?;
     Ok(data)

@@ -4,24 +4,35 @@ use crate::error::{Finding, Result};
 use crate::export::RunResult;
 use crate::light::Environment;
 use crate::light::sky::{BuiltInSky, sun_and_sky};
-use crate::material::MaterialMaps;
 use crate::material::texels::{PyramidWeights, TexelPyramid, texels_from_maps};
+use crate::material::{LobeModel, MaterialMaps};
 use crate::render::picture::{Picture, PictureSettings, render};
 use crate::render::{Parameters, Surface};
 use crate::scene::Camera;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// Maps and light as the tracer reads them.
+/// Maps and light as the tracer reads them, with lobes of Blinn-Phong.
 pub fn parameters(maps: &MaterialMaps, environment: &Environment) -> Parameters<f32> {
+    parameters_with(maps, environment, LobeModel::BlinnPhong)
+}
+
+/// Maps and light as the tracer reads them, with these lobes.
+pub fn parameters_with(maps: &MaterialMaps, environment: &Environment, lobe: LobeModel) -> Parameters<f32> {
     let weights = PyramidWeights::flat(maps.diffuse.width(), maps.diffuse.height());
-    Parameters::new(TexelPyramid::from_base(texels_from_maps(maps), &weights), environment)
+    let texels = TexelPyramid::from_base(texels_from_maps(maps), &weights).with_model(lobe);
+    Parameters::new(texels, environment)
+}
+
+/// Maps, light and lobe of a result as the tracer reads them.
+pub fn parameters_of(result: &RunResult) -> Parameters<f32> {
+    parameters_with(&result.maps, &result.environment, result.lobe)
 }
 
 /// The surface and the parameters of a run folder.
 pub fn surface_of(result: &RunResult) -> Result<(Surface, Parameters<f32>)> {
     let surface = Surface::new(result.mesh.clone())?;
-    Ok((surface, parameters(&result.maps, &result.environment)))
+    Ok((surface, parameters_of(result)))
 }
 
 /// A light that was read or made.

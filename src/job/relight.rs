@@ -26,7 +26,8 @@ pub fn relight(
     let surface = Surface::new(result.mesh)?;
     let maps = result.maps;
     let weights = PyramidWeights::flat(maps.diffuse.width(), maps.diffuse.height());
-    let parameters = Parameters::new(TexelPyramid::from_base(texels_from_maps(&maps), &weights), environment);
+    let texels = TexelPyramid::from_base(texels_from_maps(&maps), &weights).with_model(result.lobe);
+    let parameters = Parameters::new(texels, environment);
     let settings = PictureSettings { samples, two_sided: true, ..PictureSettings::default() };
     let picture = render(&surface, camera, &parameters, 0, &settings, stop).radiance;
     match stop.load(Ordering::Relaxed) {

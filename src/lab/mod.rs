@@ -11,6 +11,7 @@
 //! | [`audit`] | derivatives against central differences |
 //! | [`fuzz`] | damaged files of every kind that is read |
 //! | [`nightly`] | what takes too long to be asked on every change |
+//! | [`proof`] | exports, opened and rendered by other programs |
 //! | [`consistency`], [`object_study`] | the figures of the two papers |
 //! | [`rivals`], [`neural`] | reflectance models on measured tables; training of the neural one |
 //! | [`scenes`] | scenes made in code with their truth |
@@ -28,6 +29,7 @@ pub mod hard;
 pub mod neural;
 pub mod nightly;
 pub mod object_study;
+pub mod proof;
 pub mod rivals;
 pub mod scale;
 pub mod scenes;

@@ -1,17 +1,18 @@
-//! The modified Cook-Torrance lobe: Lambert plus Blinn-Phong microfacets.
+//! The modified Cook-Torrance lobe: Lambert plus microfacets.
 //!
 //! `f = rho_d / pi + D F G / (4 (n.i)(n.o))` with
-//! * `D(h) = (e+2)/(2 pi) (n.h)^e`, the normalised Blinn-Phong distribution (Blinn 1977; normalisation as in Walter,
-//!   Marschner, Li and Torrance 2007), `e = 2/a^2 - 2` for the microfacet width `a`;
 //! * `F = F0 + (1 - F0)(1 - h.o)^5` (Schlick 1994, eq. 15);
-//! * `G = G1(n.i) G1(n.o)`, `G1(c) = c / (c (1-k) + k)`, `k = a/2` (Smith shadowing with Schlick's G1 fitted to GGX,
-//!   Schlick 1994 eq. 19, `k` after Karis 2013 without the remapping of roughness).
-//!
-//! The cosines of the denominator cancel against those of `G`, so nothing is divided by a grazing cosine:
-//! `G / (4 (n.i)(n.o)) = 1 / (4 q(n.i) q(n.o))`, `q(c) = c (1-k) + k`.
+//! * `D` and `G` of [`blinn_phong`], which the paper has, or of [`ggx`], which other renderers have: [`LobeModel`].
 //!
 //! `F0 = 0` still leaves a grazing lobe; a surface without one is drawn with a [`Material`] evaluated at
 //! `lobe_strength` 0.
+
+pub mod blinn_phong;
+pub mod ggx;
+mod model;
+pub mod nearest;
+
+pub use model::LobeModel;
 
 use crate::math::frame::{Frame, sample_cosine_hemisphere};
 use crate::math::luminance;
@@ -80,23 +81,6 @@ impl LobeGeometry {
         let squared = base * base;
         squared * squared * base
     }
-
-    /// `D G / (4 (n.i)(n.o)) (n.i)` without the Fresnel factor.
-    #[inline(always)]
-    fn specular_base<R: Real>(&self, log_width: R) -> R {
-        let one = R::from_f32(1.0);
-        let two = R::from_f32(2.0);
-        let width = log_width.exp();
-        let inverse_width_squared = one / (width * width);
-        // D = (e+2)/(2 pi) (n.h)^e with e + 2 = 2/a^2.
-        let distribution = inverse_width_squared
-            * R::from_f32(1.0 / PI)
-            * ((two * inverse_width_squared - two) * R::from_f32(self.ln_cos_half)).exp();
-        let k = width * R::from_f32(0.5);
-        let q_in = R::from_f32(self.cos_in) * (one - k) + k;
-        let q_out = R::from_f32(self.cos_out) * (one - k) + k;
-        distribution * R::from_f32(0.25 * self.cos_in) / (q_in * q_out)
-    }
 }
 
 impl<R: Real> Material<R> {
@@ -139,14 +123,20 @@ impl<R: Real> Material<R> {
         self.log_width += other.log_width * factor;
     }
 
-    /// `f(i, o) (n.i)` in 1/sr per channel. `lobe_strength` in [0, 1] scales the specular lobe as a whole.
+    /// [`Material::reflect_by`] with the lobe of [`LobeModel::BlinnPhong`].
     #[inline(always)]
     pub fn reflect(&self, geometry: &LobeGeometry, lobe_strength: f32) -> [R; 3] {
+        self.reflect_by(LobeModel::BlinnPhong, geometry, lobe_strength)
+    }
+
+    /// `f(i, o) (n.i)` in 1/sr per channel. `lobe_strength` in [0, 1] scales the specular lobe as a whole.
+    #[inline(always)]
+    pub fn reflect_by(&self, model: LobeModel, geometry: &LobeGeometry, lobe_strength: f32) -> [R; 3] {
         let diffuse = R::from_f32(geometry.cos_in * (1.0 / PI));
         if lobe_strength == 0.0 {
             return self.diffuse.map(|value| value * diffuse);
         }
-        let base = geometry.specular_base(self.log_width) * R::from_f32(lobe_strength);
+        let base = model.value(geometry, self.log_width) * R::from_f32(lobe_strength);
         let schlick = geometry.schlick();
         let (rest, schlick) = (R::from_f32(1.0 - schlick), R::from_f32(schlick));
         std::array::from_fn(|channel| {
@@ -156,15 +146,27 @@ impl<R: Real> Material<R> {
         })
     }
 
-    /// The derivative of the loss by this material, from that by the value of [`Material::reflect`].
+    /// [`Material::reflect_backward_by`] with the lobe of [`LobeModel::BlinnPhong`].
     #[inline(always)]
     pub fn reflect_backward(&self, geometry: &LobeGeometry, lobe_strength: f32, d_value: [R; 3]) -> Material<R> {
+        self.reflect_backward_by(LobeModel::BlinnPhong, geometry, lobe_strength, d_value)
+    }
+
+    /// The derivative of the loss by this material, from that by the value of [`Material::reflect_by`].
+    #[inline(always)]
+    pub fn reflect_backward_by(
+        &self,
+        model: LobeModel,
+        geometry: &LobeGeometry,
+        lobe_strength: f32,
+        d_value: [R; 3],
+    ) -> Material<R> {
         let diffuse = R::from_f32(geometry.cos_in * (1.0 / PI));
         let mut d_material = Material { diffuse: d_value.map(|d| d * diffuse), ..Default::default() };
         if lobe_strength == 0.0 {
             return d_material;
         }
-        let base = geometry.specular_base(self.log_width) * R::from_f32(lobe_strength);
+        let base = model.value(geometry, self.log_width) * R::from_f32(lobe_strength);
         let schlick = geometry.schlick();
         let (rest, schlick) = (R::from_f32(1.0 - schlick), R::from_f32(schlick));
         let mut d_base = R::zero();
@@ -173,13 +175,7 @@ impl<R: Real> Material<R> {
             d_material.specular[channel] = d_value[channel] * rest * base;
             d_base += d_value[channel] * fresnel;
         }
-        // d ln D / d ln a = -2 - 4 ln(n.h) / a^2;  d ln q(c) / d ln a = k (1 - c) / q(c).
-        let one = R::from_f32(1.0);
-        let width = self.log_width.exp();
-        let k = width * R::from_f32(0.5);
-        let (cos_in, cos_out) = (R::from_f32(geometry.cos_in), R::from_f32(geometry.cos_out));
-        let shadowing = (one - cos_in) / (cos_in * (one - k) + k) + (one - cos_out) / (cos_out * (one - k) + k);
-        let slope = R::from_f32(-2.0) - R::from_f32(4.0 * geometry.ln_cos_half) / (width * width) - k * shadowing;
+        let slope = model.slope(geometry, self.log_width);
         d_material.log_width = d_base * base * slope;
         d_material
     }
@@ -197,9 +193,9 @@ impl Material<f32> {
 
     /// What sampling towards one viewer shares, whose direction has the cosine `cos_out` to the normal.
     #[inline]
-    pub fn sampler(&self, cos_out: f32, lobe_strength: f32) -> LobeSampler {
+    pub fn sampler(&self, model: LobeModel, cos_out: f32, lobe_strength: f32) -> LobeSampler {
         if lobe_strength == 0.0 {
-            return LobeSampler { specular_share: 0.0, inverse_width_squared: 0.0 };
+            return LobeSampler { specular_share: 0.0, inverse_width_squared: 0.0, model };
         }
         // By the luminance of both parts, kept off 0 and 1.
         let grazing = (1.0 - cos_out).clamp(0.0, 1.0).powi(5);
@@ -209,6 +205,7 @@ impl Material<f32> {
         LobeSampler {
             specular_share: (specular / (specular + diffuse).max(1e-6)).clamp(0.1, 0.9),
             inverse_width_squared: (-2.0 * self.log_width).exp(),
+            model,
         }
     }
 }
@@ -223,6 +220,8 @@ pub struct LobeSampler {
     specular_share: f32,
     /// `1 / a^2`.
     inverse_width_squared: f32,
+    /// The microfacets that are drawn.
+    pub model: LobeModel,
 }
 
 impl LobeSampler {
@@ -234,9 +233,8 @@ impl LobeSampler {
     pub fn sample(&self, frame: &Frame, towards_viewer: Vec3, u: [f32; 2]) -> Option<Vec3> {
         let share = self.specular_share;
         let light = if u[0] < share {
-            // Half vectors with density (e+2)/(2 pi) cos^(e+1): ln cos = a^2/2 ln(1 - u).
             let u = [(u[0] / share).min(BELOW_ONE), u[1]];
-            let sin_squared = -((-u[0]).ln_1p() / self.inverse_width_squared).exp_m1();
+            let sin_squared = self.model.sine_squared_of_sample(u[0], self.inverse_width_squared);
             let sin = sin_squared.sqrt();
             let (sin_phi, cos_phi) = (std::f32::consts::TAU * u[1]).sin_cos();
             let half = Vec3::new(sin * cos_phi, sin * sin_phi, (1.0 - sin_squared).sqrt());
@@ -256,8 +254,7 @@ impl LobeSampler {
             return diffuse;
         }
         // p(h) = D(h) (n.h), p(i) = p(h) / (4 h.o).
-        let exponent = 2.0 * self.inverse_width_squared - 1.0;
-        let half = self.inverse_width_squared * (1.0 / PI) * (exponent * geometry.ln_cos_half).exp();
+        let half = self.model.density_of_half(geometry.ln_cos_half, self.inverse_width_squared);
         self.specular_share * half / (4.0 * geometry.half_dot_out) + (1.0 - self.specular_share) * diffuse
     }
 }

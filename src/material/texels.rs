@@ -4,7 +4,7 @@
 //! footprint. The weights are fixed, hence each level is a linear function of the base, and a gradient gathered on any
 //! level is pulled down to the base exactly.
 
-use super::lobe::{MIN_WIDTH, Material};
+use super::lobe::{LobeModel, MIN_WIDTH, Material};
 use super::maps::MaterialMaps;
 use crate::image::Image;
 use crate::math::elementary;
@@ -28,6 +28,8 @@ pub struct Level<T> {
 pub struct TexelPyramid<R> {
     /// Levels from fine to coarse.
     pub levels: Vec<Level<Material<R>>>,
+    /// The lobe that specular reflectance and width are meant for.
+    pub model: LobeModel,
 }
 
 /// The fixed weights of the chain: which share of a parent each child has.
@@ -169,12 +171,17 @@ impl<T: Clone + Default> Level<T> {
 }
 
 impl<R: Real> TexelPyramid<R> {
-    /// A chain over base texels of the size of `weights`.
+    /// A chain over base texels of the size of `weights`, for [`LobeModel::BlinnPhong`].
     pub fn from_base(texels: Vec<Material<R>>, weights: &PyramidWeights) -> Self {
-        let mut pyramid = TexelPyramid { levels: Level::chain(weights) };
+        let mut pyramid = TexelPyramid { levels: Level::chain(weights), model: LobeModel::BlinnPhong };
         pyramid.levels[0].texels = texels;
         pyramid.rebuild(weights);
         pyramid
+    }
+
+    /// The same numbers, meant for another lobe.
+    pub fn with_model(self, model: LobeModel) -> Self {
+        TexelPyramid { model, ..self }
     }
 
     /// Recomputes every coarse level from the base.
@@ -223,7 +230,7 @@ impl<R: Real> TexelPyramid<R> {
             height: level.height,
             texels: level.texels.iter().map(|texel| texel.map(&convert)).collect(),
         };
-        TexelPyramid { levels: self.levels.iter().map(level).collect() }
+        TexelPyramid { levels: self.levels.iter().map(level).collect(), model: self.model }
     }
 }
 

@@ -49,7 +49,7 @@ impl Vertex<'_> {
         let geometry = LobeGeometry::new(self.point.shading_normal, direction, self.towards_viewer)?;
         Some(match &self.reflector {
             Reflector::Maps(material, sampler) => {
-                (Vec3::from(material.reflect(&geometry, self.strength)), sampler.density(&geometry))
+                (Vec3::from(material.reflect_by(sampler.model, &geometry, self.strength)), sampler.density(&geometry))
             }
             Reflector::Measured(material) => (
                 Vec3::from(material.reflect(&self.frame, direction, self.towards_viewer)),
@@ -100,7 +100,7 @@ impl RegionTracer<'_> {
                 let texels = &self.parameters.texels;
                 let material = texels.fetch(&texels.tap(point.uv, 0));
                 let cos_out = point.shading_normal.dot(towards_viewer);
-                Reflector::Maps(material, material.sampler(cos_out, self.settings.lobe_strength))
+                Reflector::Maps(material, material.sampler(texels.model, cos_out, self.settings.lobe_strength))
             }
         };
         let frame = Frame::around(point.shading_normal);

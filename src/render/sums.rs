@@ -127,11 +127,11 @@ pub fn radiance<R: Real>(parameters: &Parameters<R>, arena: &PathArena, path: &P
         let mut sum = [R::zero(); 3];
         if let Some(bounce) = &vertex.bounce {
             let arriving = arriving_at(parameters, bounce, onwards);
-            let reflected = material.reflect(&bounce.geometry, lobe_strength);
+            let reflected = material.reflect_by(parameters.texels.model, &bounce.geometry, lobe_strength);
             sum = scale(multiply(reflected, arriving), bounce.inverse_density);
         }
         if let Some(connection) = &vertex.connection {
-            let reflected = material.reflect(&connection.geometry, lobe_strength);
+            let reflected = material.reflect_by(parameters.texels.model, &connection.geometry, lobe_strength);
             sum = add(sum, scale(multiply(reflected, parameters.light_at(&connection.light)), connection.weight));
         }
         onwards = sum;
@@ -173,13 +173,16 @@ pub fn radiance_backward<R: Real>(
             let material = parameters.texels.fetch(&vertex.texture);
             if let Some(bounce) = &vertex.bounce {
                 arriving[k] = arriving_at(parameters, bounce, onwards);
-                reflected[k] = scale(material.reflect(&bounce.geometry, lobe_strength), bounce.inverse_density);
+                reflected[k] = scale(
+                    material.reflect_by(parameters.texels.model, &bounce.geometry, lobe_strength),
+                    bounce.inverse_density,
+                );
                 sum = multiply(reflected[k], arriving[k]);
             }
             if k > 0
                 && let Some(connection) = &vertex.connection
             {
-                let value = material.reflect(&connection.geometry, lobe_strength);
+                let value = material.reflect_by(parameters.texels.model, &connection.geometry, lobe_strength);
                 sum = add(sum, scale(multiply(value, parameters.light_at(&connection.light)), connection.weight));
             }
         }
@@ -194,17 +197,18 @@ pub fn radiance_backward<R: Real>(
         if let Some(connection) = &vertex.connection {
             let d_weighted = scale(d_leaving, connection.weight);
             let light = parameters.light_at(&connection.light);
-            let value = material.reflect(&connection.geometry, lobe_strength);
+            let value = material.reflect_by(parameters.texels.model, &connection.geometry, lobe_strength);
             sink.add_light(&connection.light, multiply(d_weighted, value));
             let d_value = multiply(d_weighted, light);
-            d_material = material.reflect_backward(&connection.geometry, lobe_strength, d_value);
+            d_material =
+                material.reflect_backward_by(parameters.texels.model, &connection.geometry, lobe_strength, d_value);
         }
         let Some(bounce) = &vertex.bounce else {
             sink.add_material(&vertex.texture, &d_material);
             return;
         };
         let d_value = scale(multiply(d_leaving, arriving[k]), bounce.inverse_density);
-        let d_bounce = material.reflect_backward(&bounce.geometry, lobe_strength, d_value);
+        let d_bounce = material.reflect_backward_by(parameters.texels.model, &bounce.geometry, lobe_strength, d_value);
         d_material.add(&d_bounce);
         sink.add_material(&vertex.texture, &d_material);
         d_leaving = multiply(d_leaving, reflected[k]);

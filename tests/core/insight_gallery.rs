@@ -266,6 +266,7 @@ fn run_of_demo(path: &Path) -> RunResult {
         maps: truth.maps,
         environment: truth.environment,
         mesh: truth_of.mesh,
+        lobe: Default::default(),
     };
     let folder = RunFolder::create(path).unwrap();
     folder.write_settings(&RunSettings::default()).unwrap();

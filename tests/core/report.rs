@@ -32,7 +32,7 @@ fn small_result() -> RunResult {
     };
     let radiance = Image::from_fn(4, 2, |r, c| Vec3::splat(if r == 0 && c == 1 { 1e5 } else { 0.3 }));
     let times_seen = Image::from_fn(8, 4, |r, c| (r * c) as f32);
-    RunResult { maps, environment: Environment { radiance }, mesh, times_seen }
+    RunResult { maps, environment: Environment { radiance }, mesh, times_seen, lobe: Default::default() }
 }
 
 #[test]
@@ -330,6 +330,7 @@ fn write_example(folder: &RunFolder, views: usize) -> ReportData {
         truth_environment: Some(&true_light),
         relit: relit.into(),
         choices: None,
+        viewer: Some("<p>all \"sides\"</p>".into()),
     };
     result.write(folder).unwrap();
     write_report(folder, &data, &images).unwrap();
@@ -372,6 +373,7 @@ fn a_full_report_holds_every_section_in_one_file() {
     ] {
         assert!(html.contains(text), "{text}");
     }
+    assert!(html.contains("srcdoc=\"&lt;p&gt;all &quot;sides&quot;"), "the 3D view is a page inside the page");
     assert_eq!(html.matches("<figure class=triple>").count(), 10);
     // Where the system tells no memory one line says so; nothing else is empty.
     let empty = html.matches("class=empty").count();

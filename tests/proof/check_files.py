@@ -37,9 +37,11 @@ def materialx(folder):
     document.setDataLibrary(library)
     valid, message = document.validate()
     material = document.getMaterialNodes()[0]
-    context = generator.GenContext(glsl.GlslShaderGenerator.create())
+    # Kept by a name: the context does not keep it.
+    shader_generator = glsl.GlslShaderGenerator.create()
+    context = generator.GenContext(shader_generator)
     context.registerSourceCodeSearchPath(search)
-    shader = context.getShaderGenerator().generate("surface", material, context)
+    shader = shader_generator.generate("surface", material, context)
     return {"valid": valid, "message": message, "glsl_lines": shader.getSourceCode("pixel").count("\n")}
 
 

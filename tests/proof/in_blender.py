@@ -8,6 +8,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from pictures import write_pictures
+
 # Blender's world is z up: its importers turn +y there.
 Z_UP = Matrix(((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1)))
 
@@ -47,11 +49,13 @@ def import_script(folder):
 
 
 def import_usd(folder):
+    # The importer turns a dome light into the world of a scene that has one, as a new file of Blender does.
+    bpy.context.scene.world = bpy.data.worlds.new("world")
     name = next(name for name in os.listdir(folder) if name.endswith(".usda"))
     bpy.ops.wm.usd_import(filepath=os.path.join(folder, name), import_lights=True, create_world_material=True)
 
 
-IMPORTERS = {"glb": import_glb, "glb_sun": import_glb_with_sun, "blender": import_script, "usd": import_usd}
+IMPORTERS = {"glb": import_glb, "glb_sun": import_glb_with_sun, "script": import_script, "usd": import_usd}
 
 
 def camera_of(view):
@@ -115,8 +119,12 @@ def main():
         cycles(task["samples"], job["depth"])
         for view in job["views"]:
             camera_of(view)
-            picture = rendered(f'{task["out"]}_{view["name"]}.exr')
-            np.save(f'{task["out"]}_{view["name"]}.npy', picture[None])
+            pictures = []
+            for seed in range(task["repeats"]):
+                bpy.context.scene.cycles.seed = seed
+                pictures.append(rendered(f'{task["out"]}_{view["name"]}.exr'))
+            os.remove(f'{task["out"]}_{view["name"]}.exr')
+            write_pictures(task["out"], view["name"], pictures)
 
 
 main()

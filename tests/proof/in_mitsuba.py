@@ -1,10 +1,12 @@
-"""Renders an exported Mitsuba scene from the run's cameras: in_mitsuba.py JOB.json"""
+"""Renders exported Mitsuba scenes from the run's cameras: in_mitsuba.py JOB.json"""
 import json
 import os
 import sys
 
 import mitsuba as mi
 import numpy as np
+
+from pictures import write_pictures
 
 mi.set_variant("llvm_ad_rgb")
 
@@ -40,7 +42,7 @@ def main():
             sensor = sensor_of(view, task["samples"])
             pictures = [np.array(mi.render(scene, sensor=sensor, integrator=integrator, spp=task["samples"], seed=seed))
                         for seed in range(task["repeats"])]
-            np.save(f'{task["out"]}_{view["name"]}.npy', np.stack(pictures))
+            write_pictures(task["out"], view["name"], pictures)
 
 
 main()

@@ -2,7 +2,7 @@
 
 use crate::image::Image;
 use crate::light::Environment;
-use crate::material::lobe::{LobeGeometry, MIN_WIDTH, Material};
+use crate::material::lobe::{LobeGeometry, LobeModel, MIN_WIDTH, Material};
 use crate::math::sphere::{direction_of_texel, solid_angle_of_texel};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -21,7 +21,7 @@ fn width_of(level: usize) -> f32 {
 }
 
 /// The environment for each width, in mirror directions: the first level is the light itself at twice the size.
-pub fn levels(light: &Environment) -> Vec<Image<Vec3>> {
+pub fn levels(light: &Environment, model: LobeModel) -> Vec<Image<Vec3>> {
     let sharp = light.resampled(2 * WIDTH, 2 * HEIGHT);
     let source = sources(&light.resampled(WIDTH, HEIGHT));
     let mut levels = vec![sharp.radiance];
@@ -31,7 +31,8 @@ pub fn levels(light: &Environment) -> Vec<Image<Vec3>> {
         let material = Material { diffuse: [0.0; 3], specular: [1.0; 3], log_width: width.ln() };
         blurred(&source, move |cosine| {
             let light = Vec3::new((1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine);
-            LobeGeometry::new(Vec3::Z, light, Vec3::Z).map_or(0.0, |geometry| material.reflect(&geometry, 1.0)[0])
+            LobeGeometry::new(Vec3::Z, light, Vec3::Z)
+                .map_or(0.0, |geometry| material.reflect_by(model, &geometry, 1.0)[0])
         })
     }));
     levels
@@ -86,7 +87,7 @@ fn image(width: usize, height: usize, value: impl Fn(Vec3) -> Vec3 + Sync) -> Im
 
 /// Reflectance of the lobe under even light as `F0 A + B`: pairs (A, B), rows by the width `(row + 1/2) / side`, columns by
 /// the cosine to the viewer.
-pub fn reflectance_table() -> Vec<[f32; 2]> {
+pub fn reflectance_table(model: LobeModel) -> Vec<[f32; 2]> {
     const HALVES: usize = 48;
     const AZIMUTHS: usize = 24;
     (0..TABLE_SIDE * TABLE_SIDE)
@@ -96,25 +97,25 @@ pub fn reflectance_table() -> Vec<[f32; 2]> {
             let (width, cos_out) = (place(index / TABLE_SIDE).max(MIN_WIDTH), place(index % TABLE_SIDE));
             let viewer = Vec3::new((1.0 - cos_out * cos_out).sqrt(), 0.0, cos_out);
             let at = |f0: f32| Material { diffuse: [0.0; 3], specular: [f0; 3], log_width: width.ln() };
+            let inverse_width_squared = 1.0 / (width * width);
             let (full, grazing) = (at(1.0), at(0.0));
             let mut sums = [0.0f32; 2];
             for half_index in 0..HALVES {
-                // Half vectors as the lobe has them: ln cos = a^2 / 2 ln(1 - u).
+                // Half vectors as the lobe has them.
                 let u = (half_index as f32 + 0.5) / HALVES as f32;
-                let cos_half = (0.5 * width * width * (1.0 - u).ln()).exp();
-                let sin_half = (1.0 - cos_half * cos_half).max(0.0).sqrt();
+                let sin_squared = model.sine_squared_of_sample(u, inverse_width_squared);
+                let (sin_half, cos_half) = (sin_squared.sqrt(), (1.0 - sin_squared).max(0.0).sqrt());
                 for azimuth in 0..AZIMUTHS {
                     let (sin, cos) = (TAU * (azimuth as f32 + 0.5) / AZIMUTHS as f32).sin_cos();
                     let half = Vec3::new(sin_half * cos, sin_half * sin, cos_half);
                     let light = half * (2.0 * viewer.dot(half)) - viewer;
                     let Some(geometry) = LobeGeometry::new(Vec3::Z, light, viewer) else { continue };
-                    // p(i) = D (n.h) / (4 h.o), D = (n.h)^e / (pi a^2).
-                    let e = 2.0 / (width * width) - 2.0;
-                    let d = ((e + 1.0) * cos_half.max(1e-30).ln()).exp() / (PI * width * width);
-                    let density = d / (4.0 * geometry.half_dot_out);
+                    // p(i) = D (n.h) / (4 h.o).
+                    let half_density = model.density_of_half(geometry.ln_cos_half, inverse_width_squared);
+                    let density = half_density / (4.0 * geometry.half_dot_out);
                     if density > 0.0 {
-                        let rise = grazing.reflect(&geometry, 1.0)[0] / density;
-                        sums[0] += full.reflect(&geometry, 1.0)[0] / density - rise;
+                        let rise = grazing.reflect_by(model, &geometry, 1.0)[0] / density;
+                        sums[0] += full.reflect_by(model, &geometry, 1.0)[0] / density - rise;
                         sums[1] += rise;
                     }
                 }
@@ -131,7 +132,7 @@ mod tests {
     #[test]
     fn even_light_stays_even_and_a_lamp_stays_where_it_is() {
         let even = Environment::constant(64, 32, Vec3::new(0.5, 1.0, 2.0));
-        for level in levels(&even) {
+        for level in LobeModel::ALL.into_iter().flat_map(|model| levels(&even, model)) {
             assert!(level.pixels().iter().all(|rgb| (*rgb - Vec3::new(0.5, 1.0, 2.0)).length() < 2e-3));
         }
         let spread = irradiance(&even);
@@ -139,7 +140,7 @@ mod tests {
         let mut lamp = Environment::constant(64, 32, Vec3::ZERO);
         lamp.radiance[(10, 20)] = Vec3::splat(100.0);
         let towards = direction_of_texel(10, 20, 64, 32);
-        for level in levels(&lamp) {
+        for level in levels(&lamp, LobeModel::BlinnPhong) {
             let brightest =
                 (0..level.pixels().len()).max_by(|&a, &b| level.pixels()[a].x.total_cmp(&level.pixels()[b].x));
             let index = brightest.unwrap();
@@ -150,10 +151,12 @@ mod tests {
 
     #[test]
     fn the_table_never_reflects_more_than_arrives() {
-        let table = reflectance_table();
-        assert!(table.iter().all(|[a, b]| *a >= -1e-4 && *b >= 0.0 && a + b < 1.1), "{table:?}");
-        // A narrow lobe seen from above reflects F0 and little else.
-        let [a, b] = table[TABLE_SIDE * 2 + TABLE_SIDE - 1];
-        assert!(a > 0.9 && b < 0.01, "{a} {b}");
+        for model in LobeModel::ALL {
+            let table = reflectance_table(model);
+            assert!(table.iter().all(|[a, b]| *a >= -1e-4 && *b >= 0.0 && a + b < 1.1), "{table:?}");
+            // A narrow lobe seen from above reflects F0 and little else.
+            let [a, b] = table[TABLE_SIDE * 2 + TABLE_SIDE - 1];
+            assert!(a > 0.9 && b < 0.01, "{a} {b}");
+        }
     }
 }

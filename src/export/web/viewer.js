@@ -1,5 +1,6 @@
 "use strict";
-// A viewer of one fitted surface. Light is read from maps that were blurred by the lobe beforehand; see convention.txt.
+// A viewer of one fitted surface. Light is read from maps that were blurred by the lobe beforehand, but for the sun of an
+// environment, which casts shadows; see convention.txt.
 (() => {
   const data = JSON.parse(document.getElementById("document").textContent);
   const element = (name) => document.getElementById(name);
@@ -32,7 +33,10 @@
       c = clamp(c, 0.0, 1.0);
       return mix(1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, 12.92 * c, vec3(lessThanEqual(c, vec3(0.0031308))));
     }
-    uniform sampler2D level0;`;
+    uniform sampler2D level0;
+    // The sun: towards it in the world, irradiance of what faces it, cosine of its radius (above 1: there is none).
+    uniform vec3 sun_towards, sun_irradiance;
+    uniform float sun_cosine;`;
   const surface_vertex = `#version 300 es
     precision highp float;
     in vec3 position; in vec4 normal; in vec2 uv;
@@ -46,8 +50,13 @@
       gl_Position = clip_from_world * vec4(world, 1.0);
     }`;
   const surface_fragment = `${common}
+    precision highp sampler2DShadow;
     in vec3 world, direction; in vec2 coordinate; in float openness;
     uniform vec3 eye;
+    uniform mat4 shadow_from_world;
+    uniform sampler2DShadow shadow_map;
+    uniform float shadow_lift;
+    uniform bool is_ggx;
     uniform sampler2D diffuse_map, specular_map, width_map, table, irradiance_map;
     uniform sampler2D levels;
     uniform float level_count; uniform bool has_lobe;
@@ -58,6 +67,26 @@
       float rows = float(textureSize(levels, 0).y) / (level_count - 1.0);
       float y = clamp(at.y * rows, 0.5, rows - 0.5) + (index - 1.0) * rows;
       return texture(levels, vec2(at.x, y / float(textureSize(levels, 0).y))).rgb;
+    }
+    // Share of the sun that a place sees: nine places of the map, each between four.
+    float sunlit(vec3 n) {
+      vec3 at = (shadow_from_world * vec4(world + shadow_lift * n, 1.0)).xyz * 0.5 + 0.5;
+      float texel = 1.0 / float(textureSize(shadow_map, 0).x), sum = 0.0;
+      for (int i = -1; i <= 1; i++)
+        for (int j = -1; j <= 1; j++) sum += texture(shadow_map, at + vec3(1.5 * texel * vec2(i, j), 0.0));
+      return sum / 9.0;
+    }
+    // D G / (4 (n.i)(n.o)) of the fitted lobe.
+    float lobe(float width, float i, float o, float h) {
+      float squared = width * width;
+      if (is_ggx) {
+        float spread = 1.0 + (1.0 / squared - 1.0) * (1.0 - h * h);
+        float shadowing = i * sqrt(squared + (1.0 - squared) * o * o) + o * sqrt(squared + (1.0 - squared) * i * i);
+        return 0.5 / (PI * squared * spread * spread * max(shadowing, 1e-6));
+      }
+      float k = 0.5 * width;
+      return exp((2.0 / squared - 2.0) * log(max(h, 1e-6))) / (PI * squared) * 0.25
+        / ((i * (1.0 - k) + k) * (o * (1.0 - k) + k));
     }
     void main() {
       vec3 n = normalize(direction), o = normalize(eye - world);
@@ -77,6 +106,19 @@
         float open = clamp(pow(cosine + openness, exp2(-16.0 * width - 1.0)) - 1.0 + openness, 0.0, 1.0);
         light += (f0 * ab.x + ab.y) * mix(near, far, fract(index)) * open;
       }
+      float i = dot(n, sun_towards);
+      if (sun_cosine <= 1.0 && i > 0.0) {
+        vec3 reflected = texture(diffuse_map, at).rgb / PI;
+        if (has_lobe) {
+          vec3 h = normalize(sun_towards + o), f0 = texture(specular_map, at).rgb;
+          // Wider by the sun's own width, of which a half vector sees half.
+          float width = max(texture(width_map, at).r, 0.005);
+          width = min(sqrt(width * width + 0.25 * (1.0 - sun_cosine * sun_cosine)), 1.0);
+          vec3 fresnel = f0 + (1.0 - f0) * pow(clamp(1.0 - dot(h, o), 0.0, 1.0), 5.0);
+          reflected += fresnel * lobe(width, i, max(cosine, 1e-3), clamp(dot(n, h), 0.0, 1.0));
+        }
+        light += reflected * sun_irradiance * i * sunlit(n);
+      }
       colour = vec4(shown(light), 1.0);
     }`;
   const backdrop_vertex = `#version 300 es
@@ -90,10 +132,22 @@
     void main() {
       vec4 near = world_from_clip * vec4(corner, -1.0, 1.0), far = world_from_clip * vec4(corner, 1.0, 1.0);
       vec3 d = normalize(far.xyz / far.w - near.xyz / near.w);
-      colour = vec4(visible ? shown(texture(level0, place(d)).rgb) : vec3(0.09), 1.0);
+      vec3 radiance = texture(level0, place(d)).rgb;
+      if (dot(d, sun_towards) > sun_cosine) radiance += sun_irradiance / (2.0 * PI * (1.0 - sun_cosine));
+      colour = vec4(visible ? shown(radiance) : vec3(0.09), 1.0);
     }`;
+  const shadow_vertex = `#version 300 es
+    precision highp float;
+    in vec3 position;
+    uniform vec3 low, extent; uniform mat4 shadow_from_world;
+    void main() { gl_Position = shadow_from_world * vec4(low + extent * position, 1.0); }`;
+  const shadow_fragment = `#version 300 es
+    precision mediump float;
+    void main() {}`;
   function program_of(vertex, fragment) {
     const program = gl.createProgram();
+    // Both programs that draw the surface read its places by one array.
+    gl.bindAttribLocation(program, 0, "position");
     for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
       const shader = gl.createShader(kind);
       gl.shaderSource(shader, source);
@@ -112,6 +166,7 @@
   }
   const surface = program_of(surface_vertex, surface_fragment);
   const backdrop = program_of(backdrop_vertex, backdrop_fragment);
+  const shadow = program_of(shadow_vertex, shadow_fragment);
 
   // ---- Mesh
   const array = gl.createVertexArray();
@@ -158,10 +213,23 @@
     }
     const rows = blurred.reduce((sum, part) => sum + part.height, 0);
     return {
-      name: light.name, mean: light.mean, sharp: rgba(light.levels[0]), irradiance: rgba(light.irradiance),
+      name: light.name, mean: light.mean, sun: light.sun, sharp: rgba(light.levels[0]), irradiance: rgba(light.irradiance),
       levels: floats(blurred[0].width, rows, stacked, gl.RGBA16F, gl.RGBA, gl.REPEAT),
     };
   });
+  const shadow_size = Math.min(2048, gl.getParameter(gl.MAX_TEXTURE_SIZE));
+  const shadow_map = gl.createTexture(), shadow_frame = gl.createFramebuffer();
+  gl.bindTexture(gl.TEXTURE_2D, shadow_map);
+  gl.texStorage2D(gl.TEXTURE_2D, 1, gl.DEPTH_COMPONENT24, shadow_size, shadow_size);
+  for (const [name, value] of [
+    [gl.TEXTURE_COMPARE_MODE, gl.COMPARE_REF_TO_TEXTURE], [gl.TEXTURE_COMPARE_FUNC, gl.LEQUAL],
+    [gl.TEXTURE_MIN_FILTER, gl.LINEAR], [gl.TEXTURE_MAG_FILTER, gl.LINEAR],
+    [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE], [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE],
+  ]) gl.texParameteri(gl.TEXTURE_2D, name, value);
+  gl.bindFramebuffer(gl.FRAMEBUFFER, shadow_frame);
+  gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, shadow_map, 0);
+  gl.drawBuffers([gl.NONE]);
+  gl.bindFramebuffer(gl.FRAMEBUFFER, null);
   const finer = gl.getExtension("EXT_texture_filter_anisotropic");
   const map = async (source, is_colour) => {
     const picture = new Image();
@@ -229,13 +297,25 @@
     return { eye, clip: product(projection, view) };
   }
 
+  // The sun under a turned light, and a view from it that holds the whole surface.
+  function sun_of(light, turn) {
+    if (!light.sun) return { towards: [0, 1, 0], irradiance: [0, 0, 0], cosine: 2, matrix: new Array(16).fill(0) };
+    const [x, y, z] = light.sun.towards, phi = Math.atan2(x, -z) - turn, level = Math.hypot(x, z);
+    const towards = [level * Math.sin(phi), y, -level * Math.cos(phi)];
+    const right = unit(cross(Math.abs(y) > 0.99 ? [1, 0, 0] : [0, 1, 0], towards)), up = cross(towards, right);
+    const axes = [right, up, towards.map((value) => -value)].map((axis) => axis.map((value) => value / (1.01 * radius)));
+    const matrix = [0, 1, 2].flatMap((column) => [axes[0][column], axes[1][column], axes[2][column], 0]);
+    matrix.push(...axes.map((axis) => -dot(axis, centre)), 1);
+    return { towards, irradiance: light.sun.irradiance, cosine: light.sun.cosine, matrix };
+  }
+
   // ---- Controls
   const chosen = { light: 0, view: -1 };
   const option = (select, text, value) => select.add(new Option(text, value));
   lights.forEach((light, i) => option(element("light"), light.name, i));
   option(element("view"), "none", -1);
   data.photos.forEach((photo, i) => option(element("view"), photo.name, i));
-  const remarks = ["Raster preview: shadows of single lamps and light between surfaces are not shown."];
+  const remarks = ["Raster preview: only the sun casts sharp shadows; light between surfaces is not shown."];
   if (!data.hasLobe) remarks.push("The surface was fitted without a specular lobe.");
   if (!lights.length) remarks.push("The run has no environment.");
   note.textContent = `${data.name} · ${remarks.join(" ")}`;
@@ -316,15 +396,36 @@
     const light = lights[chosen.light];
     if (!maps || !light) return;
     const camera = photo ? photo_camera(photo) : orbit_camera(canvas.width / canvas.height);
+    const sun = sun_of(light, (+element("rotation").value * Math.PI) / 180);
+    gl.bindVertexArray(array);
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.LEQUAL);
+    if (light.sun) {
+      gl.bindFramebuffer(gl.FRAMEBUFFER, shadow_frame);
+      gl.viewport(0, 0, shadow_size, shadow_size);
+      gl.clear(gl.DEPTH_BUFFER_BIT);
+      gl.useProgram(shadow.program);
+      gl.uniform3fv(shadow.uniforms.low, data.mesh.low);
+      gl.uniform3fv(shadow.uniforms.extent, data.mesh.extent);
+      gl.uniformMatrix4fv(shadow.uniforms.shadow_from_world, false, sun.matrix);
+      gl.enable(gl.POLYGON_OFFSET_FILL);
+      gl.polygonOffset(2, 4);
+      gl.drawElements(gl.TRIANGLES, indices.length, gl.UNSIGNED_INT, 0);
+      gl.disable(gl.POLYGON_OFFSET_FILL);
+      gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+      gl.viewport(0, 0, canvas.width, canvas.height);
+    }
     const set = (target) => {
       gl.useProgram(target.program);
       gl.uniform1f(target.uniforms.rotation, (+element("rotation").value * Math.PI) / 180);
       gl.uniform1f(target.uniforms.exposure, 2 ** +element("exposure").value);
       gl.uniform1i(target.uniforms.curve, +element("curve").value);
+      gl.uniform3fv(target.uniforms.sun_towards, sun.towards);
+      gl.uniform3fv(target.uniforms.sun_irradiance, sun.irradiance);
+      gl.uniform1f(target.uniforms.sun_cosine, sun.cosine);
       bind(0, "level0", light.sharp, target);
     };
     set(surface);
-    gl.enable(gl.DEPTH_TEST);
     gl.uniform3fv(surface.uniforms.low, data.mesh.low);
     gl.uniform3fv(surface.uniforms.extent, data.mesh.extent);
     gl.uniform3fv(surface.uniforms.eye, camera.eye);
@@ -335,10 +436,12 @@
     bind(2, "irradiance_map", light.irradiance, surface);
     bind(3, "table", table, surface);
     ["diffuse_map", "specular_map", "width_map"].forEach((name, i) => bind(4 + i, name, maps[i], surface));
-    gl.bindVertexArray(array);
+    bind(7, "shadow_map", shadow_map, surface);
+    gl.uniformMatrix4fv(surface.uniforms.shadow_from_world, false, sun.matrix);
+    gl.uniform1f(surface.uniforms.shadow_lift, (3 * radius) / shadow_size);
+    gl.uniform1i(surface.uniforms.is_ggx, data.lobe === "ggx" ? 1 : 0);
     gl.drawElements(gl.TRIANGLES, indices.length, gl.UNSIGNED_INT, 0);
     set(backdrop);
-    gl.depthFunc(gl.LEQUAL);
     gl.uniformMatrix4fv(backdrop.uniforms.world_from_clip, false, inverse(camera.clip));
     gl.uniform1i(backdrop.uniforms.visible, element("backdrop").checked ? 1 : 0);
     gl.bindVertexArray(null);

@@ -25,6 +25,8 @@ pub struct ReportImages<'a> {
     pub relit: Vec<RelitStrip>,
     /// What judging views chose for each texel, see [`super::choices`].
     pub choices: Option<&'a GreyImage>,
+    /// A page that shows the surface from any side, see [`crate::export::web`].
+    pub viewer: Option<String>,
 }
 
 /// A photograph and its fit.

@@ -3,8 +3,8 @@
 //! Read [`data`] for what is shown, [`images`] for the pictures that come with it, `page` for the order of the
 //! sections, `gallery`, `curves`, [`choices`] and `tables` fill them. [`picture`] makes bytes on a screen of linear pixels, [`number`] makes text of numbers.
 //!
-//! The page is one file that works offline: pictures are embedded, there is no script, and it follows the reader's
-//! choice of light or dark. It stays below about 15 MB whatever the number of views. Every section that is empty says
+//! The page is one file that works offline: pictures are embedded, there is no script but in the 3D view, which lies in a
+//! frame of its own, and it follows the reader's choice of light or dark. It stays below about 15 MB whatever the number of views. Every section that is empty says
 //! why. What it refuses to do: it computes no score (that is [`super::scores`]) and hides no number that is not finite.
 
 pub mod choice_table;

@@ -16,6 +16,7 @@ pub fn html(data: &ReportData, images: &ReportImages) -> String {
         ("views", "Photographs and fit", gallery::views(data, images)),
         ("scores", "Scores", scores(data)),
         ("capture", "Capture", tables::capture(data)),
+        ("viewer", "From any side", viewer(images)),
         ("relit", "Under other lights", gallery::relit(images)),
         ("maps", "Maps", gallery::maps(images)),
         ("light", "Light", gallery::light(images)),
@@ -42,6 +43,17 @@ pub fn html(data: &ReportData, images: &ReportImages) -> String {
         html += &format!("<section id={id}><h2>{name}</h2>{body}</section>");
     }
     html + "</main></body></html>\n"
+}
+
+/// A page inside the page, which can do nothing but draw.
+fn viewer(images: &ReportImages) -> String {
+    match &images.viewer {
+        None => tables::empty("No 3D view is in this report: patina export RUN -o DIR --to web makes a page of one."),
+        Some(page) => format!(
+            "<iframe class=viewer sandbox=allow-scripts title='3D view' loading=lazy srcdoc=\"{}\"></iframe>",
+            escaped(page)
+        ),
+    }
 }
 
 fn key_figures(data: &ReportData) -> String {

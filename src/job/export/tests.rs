@@ -24,7 +24,7 @@ fn run(parent: &Path, with_light: bool, with_lobe: bool) -> PathBuf {
     };
     let environment = Environment::constant(16, 8, Vec3::ONE);
     let times_seen = Image::filled(32, 32, 2.0);
-    folder.write_result(&RunResult { maps, environment, mesh, times_seen }).unwrap();
+    folder.write_result(&RunResult { maps, environment, mesh, times_seen, lobe: Default::default() }).unwrap();
     let mut settings = RunSettings::default();
     if !with_lobe {
         settings.fit.method = crate::fit::Method::Adam;
@@ -78,6 +78,31 @@ fn runs_without_light_or_lobe_are_exported_and_told() {
 }
 
 #[test]
+fn a_lobe_that_travels_loses_nothing_on_the_way() {
+    let parent = tempfile::tempdir().unwrap();
+    let path = run(parent.path(), true, true);
+    let folder = RunFolder::open(&path).unwrap();
+    let mut settings: RunSettings = folder.read_settings().unwrap();
+    settings.fit.lobe = LobeModel::Ggx;
+    folder.write_settings(&settings).unwrap();
+    assert_eq!(folder.read_result().unwrap().lobe, LobeModel::Ggx);
+    let output = parent.path().join("out");
+    let options =
+        ExportOptions { formats: vec![Format::Mitsuba, Format::Blender], ..ExportOptions::new(&path, &output) };
+    assert!(forecast(&options).unwrap().losses.iter().all(|(_, text)| !text.contains("nearest GGX")));
+    silent(&options).unwrap();
+    assert!(std::fs::read_to_string(output.join("mitsuba/scene_exact.xml")).unwrap().contains("value=\"ggx\""));
+    // Roughness r = a^2 is written as sqrt(a).
+    let roughness = file::read_grey(&output.join("blender/roughness.exr")).unwrap();
+    assert!((roughness[(9, 9)] - 0.3f32.powf(0.25)).abs() < 1e-6);
+    let sheet = std::fs::read_to_string(output.join("convention.txt")).unwrap();
+    assert!(sheet.contains("D  GGX") && !sheet.contains("Blinn-Phong"), "{sheet}");
+    // A name that no version knows is told, not guessed.
+    write_bytes(&folder.file("settings.toml"), b"[fit]\nlobe = \"cook\"\n").unwrap();
+    assert!(matches!(folder.read_result().unwrap_err().place(), Place::Line(_, 2)));
+}
+
+#[test]
 fn memory_is_told_before_maps_of_4096_are_made() {
     let parent = tempfile::tempdir().unwrap();
     let path = run(parent.path(), true, true);
@@ -112,6 +137,11 @@ fn what_cannot_be_written_is_an_error_with_place_and_remedy_and_leaves_nothing()
     let mut names: Vec<_> = std::fs::read_dir(parent.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
     names.sort();
     assert_eq!(names, ["file", "square"]);
+    // Killed on the way: what is left lies beside, and the next export clears it.
+    let left = parent.path().join(".out.unfinished");
+    write_bytes(&left.join("glb/half.glb"), b"half").unwrap();
+    silent(&ExportOptions { formats: vec![Format::Textures], ..ExportOptions::new(&path, &output) }).unwrap();
+    assert!(!left.exists() && output.join("textures/convention.txt").is_file() && !output.join("glb").exists());
     // Settings.
     let options = ExportOptions::new(&path, &output);
     for (wrong, setting) in [

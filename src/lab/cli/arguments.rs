@@ -33,6 +33,8 @@ pub enum Task {
     /// Open damaged files of every kind that is read; fails where one ends in a panic, in too much memory or in too long a
     /// wait.
     Fuzz(FuzzOptions),
+    /// Have other programs open and render the exports of a run, and compare; fails where a bar is missed.
+    Proof(crate::lab::proof::ProofOptions),
     /// Ask what takes too long to be asked on every change; fails where something falls short.
     Nightly(NightlyOptions),
     /// Write the demo and the study scenes as exchange folders for the Mitsuba scripts.

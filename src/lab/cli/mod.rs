@@ -1,7 +1,7 @@
 //! The command line of the lab, `patina-lab`; it holds no algorithm.
 //!
 //! [`arguments`] is what can be typed, [`measure`] audits and times, [`contest`] holds methods against each other,
-//! [`study`] and [`object_study`] run studies, [`measured`] and [`neural`] are for measured reflectance.
+//! [`study`] and [`object_study`] run studies, [`proof`] holds exports against other programs, [`measured`] and [`neural`] are for measured reflectance.
 
 pub mod arguments;
 pub mod contest;
@@ -9,6 +9,7 @@ pub mod measure;
 pub mod measured;
 pub mod neural;
 pub mod object_study;
+pub mod proof;
 pub mod study;
 
 use crate::cli::{exit_code, use_threads};
@@ -44,6 +45,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Task::Study(StudyTask::Ibrdf(options)) => object_study::study(&options, json),
         Task::Study(StudyTask::Mvcl(options)) => study::mvcl(&options, json),
         Task::Fuzz(options) => measure::fuzz(&options, json),
+        Task::Proof(options) => proof::prove(&options, json),
         Task::Nightly(options) => measure::nightly(&options, json),
         Task::References(options) => {
             crate::lab::scenes::write_references(&options.output, &contest::teller("references", json))

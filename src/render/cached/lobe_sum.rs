@@ -119,7 +119,8 @@ mod tests {
                 let direction = direction_of_texel(row, column, fine_width, fine_height);
                 let Some(geometry) = LobeGeometry::new(normal, direction, viewer) else { continue };
                 let lobe = |specular: f32| {
-                    let material = Material { diffuse: [0.0; 3], specular: [specular; 3], log_width: width.ln() };
+                    let (diffuse, log_width) = ([0.0; 3], width.ln());
+                    let material = Material { diffuse, specular: [specular; 3], log_width };
                     f64::from(material.reflect(&geometry, 1.0)[0])
                 };
                 let (grazing_lobe, whole) = (lobe(0.0), lobe(1.0));

@@ -8,6 +8,7 @@
 use super::lanes::Lanes;
 use super::light_cells::LightCells;
 use crate::light::EnvironmentSampler;
+use crate::material::LobeModel;
 use crate::math::random::{SampleStream, next_pairs};
 use crate::math::vector::elementary::{angle, ln_one_minus, one_minus_exp, sine_and_cosine_of_turns};
 use crate::math::vector::{Vector, WIDEST, dot, versions};
@@ -33,6 +34,8 @@ pub(super) struct Arrivals {
     pub diffuse: Lanes,
     /// Natural logarithm of the microfacet width.
     pub log_width: Lanes,
+    /// The lobe that all of them meet.
+    pub model: LobeModel,
 }
 
 /// A direction for each path, and the lobe about it.
@@ -137,6 +140,7 @@ struct Surface<V> {
     /// See [`crate::material::LobeSampler`].
     specular_share: V,
     inverse_width_squared: V,
+    model: LobeModel,
 }
 
 #[inline(always)]
@@ -168,6 +172,7 @@ impl<V: Vector> Surface<V> {
             cos_out,
             specular_share: if lobe_strength == 0.0 { zero } else { share },
             inverse_width_squared: V::load(&arrivals.log_width[at..]).mul(V::splat(-2.0 * LOG2_E)).exp2(),
+            model: arrivals.model,
         }
     }
 
@@ -179,7 +184,10 @@ impl<V: Vector> Surface<V> {
         let is_specular = share.sub(u[0]);
         // Of either lobe: the number that is left, the squared sine and the cosine about the normal.
         let of_specular = u[0].div(share.max(V::splat(1e-6))).min(almost);
-        let specular_sine = one_minus_exp(ln_one_minus(of_specular).div(self.inverse_width_squared));
+        let specular_sine = match self.model {
+            LobeModel::BlinnPhong => one_minus_exp(ln_one_minus(of_specular).div(self.inverse_width_squared)),
+            LobeModel::Ggx => of_specular.div(one.sub(of_specular).mul_add(self.inverse_width_squared, of_specular)),
+        };
         let diffuse_sine = u[0].sub(share).div(one.sub(share)).max(zero).min(almost);
         let sine_squared = is_specular.where_positive(specular_sine, diffuse_sine);
         let sine = sine_squared.sqrt();
@@ -231,8 +239,16 @@ impl<V: Vector> Surface<V> {
         let above = cos_in.min(dot(self.geometric_normal, direction)).min(length_squared.sub(least));
 
         // p(h) = D(h) (n.h), p(i) = p(h) / (4 h.o).
-        let exponent = self.inverse_width_squared.mul_add(V::splat(2.0), V::splat(-1.0));
-        let falloff = exponent.mul(ln_cos_half).mul(V::splat(LOG2_E)).exp2();
+        let falloff = match self.model {
+            LobeModel::BlinnPhong => {
+                let exponent = self.inverse_width_squared.mul_add(V::splat(2.0), V::splat(-1.0));
+                exponent.mul(ln_cos_half).mul(V::splat(LOG2_E)).exp2()
+            }
+            LobeModel::Ggx => {
+                let spread = self.inverse_width_squared.sub(one).mul_add(sine_squared, one);
+                one.sub(sine_squared).sqrt().div(spread.mul(spread))
+            }
+        };
         let of_half = self.inverse_width_squared.mul(V::splat(0.25 / PI)).mul(falloff);
         let specular = self.specular_share.mul(of_half).div(half_dot_out.max(V::splat(1e-6)));
         let diffuse = one.sub(self.specular_share).mul(cos_in).mul(V::splat(1.0 / PI));

@@ -140,6 +140,7 @@ impl PathTracer<'_> {
             arrivals.log_width[lane] = material.log_width;
         }
         arrivals.count = places.len();
+        arrivals.model = self.proposal.model;
     }
 
     /// Keeps those directions towards the light that nothing is in the way of.

@@ -1,7 +1,7 @@
 use super::kernel::{Arrivals, Proposals, propose, propose_in};
 use super::*;
 use crate::light::{Environment, EnvironmentSampler};
-use crate::material::Material;
+use crate::material::{LobeModel, Material};
 use crate::math::frame::Frame;
 use crate::math::random::{SequentialRandom, StreamKey};
 use crate::math::sphere::{BilinearTap, tap_of_direction};
@@ -58,7 +58,7 @@ fn assert_described(
     directions: &Directions,
     lane: usize,
     [normal, geometric_normal, to_viewer]: [Vec3; 3],
-    material: &Material<f32>,
+    (model, material): (LobeModel, &Material<f32>),
     strength: f32,
     environment: &Environment,
 ) {
@@ -75,7 +75,7 @@ fn assert_described(
         assert!((found.cos_in - exact.cos_in).abs() < 1e-6 && (found.half_dot_out - exact.half_dot_out).abs() < 1e-6);
         let off = (found.ln_cos_half - exact.ln_cos_half).abs();
         assert!(off < 1e-4 * exact.ln_cos_half.abs() + 1e-8, "{found:?} {exact:?}");
-        let density = material.sampler(exact.cos_out, strength).density(&exact);
+        let density = material.sampler(model, exact.cos_out, strength).density(&exact);
         let found = directions.lobe_density[lane];
         assert!((found - density).abs() < 3e-3 * density + 1e-6, "{found} {density}, {material:?}");
     }
@@ -109,6 +109,7 @@ fn a_packet_is_offered_what_each_path_would_be() {
     for case in 0..400 {
         let strength = if case % 5 == 0 { 0.0 } else { 1.0 };
         let (mut before, materials) = arrivals(&mut random, 1 + case % PACKET);
+        before.model = LobeModel::ALL[case / 5 % 2];
         for lane in before.count..PACKET {
             before.normal[lane % 3][lane] = f32::NAN;
             before.log_width[lane] = f32::NAN;
@@ -125,7 +126,7 @@ fn a_packet_is_offered_what_each_path_would_be() {
                 let direction = proposals.of_light.direction(lane);
                 assert!((direction - drawn.direction).length() < 2e-5, "{direction} {}", drawn.direction);
                 assert!((proposals.light_density[lane] / drawn.density - 1.0).abs() < 1e-3);
-                let sampler = material.sampler(normal.dot(to_viewer), strength);
+                let sampler = material.sampler(before.model, normal.dot(to_viewer), strength);
                 let exact = sampler.sample(&Frame::around(normal), to_viewer, stream.next_pair());
                 let found = proposals.of_lobe.direction(lane);
                 match exact {
@@ -134,7 +135,7 @@ fn a_packet_is_offered_what_each_path_would_be() {
                 }
                 for directions in [&proposals.of_light, &proposals.of_lobe] {
                     let frame = [normal, geometric_normal, to_viewer];
-                    assert_described(directions, lane, frame, material, strength, &environment);
+                    assert_described(directions, lane, frame, (before.model, material), strength, &environment);
                 }
                 assert_eq!(arrivals.streams[lane].next_pair(), stream.next_pair(), "both pairs are used up");
             }

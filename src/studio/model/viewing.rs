@@ -7,7 +7,7 @@ use crate::error::Place;
 use crate::insight::surface_layers::{LayerSettings, SurfaceLayers, surface_layers};
 use crate::job::entanglement::{EntanglementSettings, entanglement};
 use crate::job::gallery::{self, NamedLight, Turning, TurntableSettings};
-use crate::job::pictures::parameters;
+use crate::job::pictures::parameters_with;
 use crate::light::Environment;
 use crate::material::MaterialMaps;
 use crate::render::Parameters;
@@ -144,13 +144,13 @@ impl Model {
     /// Maps and light as the tracer reads them; `None` while there are no maps.
     pub fn traced_parameters(&self, light: &LightName) -> Option<Parameters<f32>> {
         let maps = self.project.as_ref()?.maps.as_ref()?;
-        Some(parameters(maps, &self.traced_light(light)?))
+        Some(parameters_with(maps, &self.traced_light(light)?, self.edits.fit.lobe))
     }
 
     /// Maps and light of the run as it was fitted, whatever lights the stage.
     pub fn run_parameters(&self) -> Option<Parameters<f32>> {
         let project = self.project.as_ref()?;
-        Some(parameters(project.maps.as_ref()?, project.environment.as_ref()?))
+        Some(parameters_with(project.maps.as_ref()?, project.environment.as_ref()?, self.edits.fit.lobe))
     }
 
     /// Renders every photo again and spreads its error over the surface.
@@ -175,8 +175,9 @@ impl Model {
             excluded,
             ..LayerSettings::default()
         };
+        let lobe = self.edits.fit.lobe;
         self.tasks.spawn(TaskKind::Residuals, move |context| {
-            let own = parameters(&maps, &environment);
+            let own = parameters_with(&maps, &environment, lobe);
             let layers = surface_layers(&scene, &surface, &own, &settings, &context.stop, &|share| {
                 context.tell("rendering", share);
             })?;

@@ -7,7 +7,7 @@
 
 use crate::image::{Image, RgbImage};
 use crate::light::Environment;
-use crate::material::lobe::{LobeGeometry, Material};
+use crate::material::lobe::{LobeGeometry, LobeModel, Material};
 use crate::math::frame::Frame;
 use crate::math::sphere;
 use glam::Vec3;
@@ -122,7 +122,7 @@ fn reflectance(cos_out: f32, width: f32) -> Vec3 {
     let frame = Frame::around(Vec3::Z);
     // Channel 0 reflects nothing at normal incidence, channel 1 everything: their difference is the part by F0.
     let material = Material { diffuse: [0.0; 3], specular: [0.0, 1.0, 1.0], log_width: width.ln() };
-    let sampler = material.sampler(cos_out, 1.0);
+    let sampler = material.sampler(LobeModel::BlinnPhong, cos_out, 1.0);
     let mut sum = Vec3::ZERO;
     for sample in 0..SAMPLES {
         let even = (sample as f32 + 0.5) / SAMPLES as f32;

@@ -4,6 +4,8 @@
 //! is written is the one whose lobe has the least squared difference over all pairs of directions, each pair weighed by
 //! both cosines as in a picture of a surface under even light.
 
+use super::Material;
+use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::LazyLock;
 
@@ -19,7 +21,7 @@ pub struct GgxLobe {
 /// Widths the table is made at, evenly spaced in their logarithm.
 const TABLE_LENGTH: usize = 25;
 /// The narrowest width of the table.
-const NARROWEST: f64 = crate::material::lobe::MIN_WIDTH as f64;
+const NARROWEST: f64 = super::MIN_WIDTH as f64;
 
 static TABLE: LazyLock<Vec<GgxLobe>> = LazyLock::new(|| (0..TABLE_LENGTH).map(|i| nearest(width_at(i))).collect());
 
@@ -28,7 +30,7 @@ fn width_at(index: usize) -> f64 {
 }
 
 /// The GGX lobe nearest to the Blinn-Phong lobe of microfacet width `a`, which is clamped to
-/// [[`MIN_WIDTH`](crate::material::lobe::MIN_WIDTH), 1]. Read from a table, linear in the logarithms.
+/// [[`MIN_WIDTH`](super::MIN_WIDTH), 1]. Read from a table, linear in the logarithms.
 pub fn ggx_of_blinn_phong(width: f64) -> GgxLobe {
     let place = 1.0 - width.clamp(NARROWEST, 1.0).ln() / NARROWEST.ln();
     let place = place.clamp(0.0, 1.0) * (TABLE_LENGTH - 1) as f64;
@@ -43,6 +45,13 @@ pub fn ggx_of_blinn_phong(width: f64) -> GgxLobe {
 /// Roughness of glTF, Disney and Blender, `sqrt(alpha)`, for the roughness `r = a^2` of a map.
 pub fn perceptual_roughness(roughness: f32) -> f32 {
     ggx_of_blinn_phong(f64::from(roughness.max(0.0)).sqrt()).width.sqrt() as f32
+}
+
+/// Turns the widths of texels of Blinn-Phong into those of the nearest GGX lobes.
+pub fn to_ggx(texels: &mut [Material<f32>]) {
+    texels.par_iter_mut().with_min_len(1 << 12).for_each(|texel| {
+        texel.log_width = ggx_of_blinn_phong(f64::from(texel.log_width).exp()).width.ln() as f32;
+    });
 }
 
 /// Searches the width by golden section on the logarithm of its ratio to the Blinn-Phong width.
@@ -118,7 +127,7 @@ fn squared_difference(pairs: &[Pair], width: f64) -> f64 {
     pairs.iter().map(|pair| pair.weight * difference(pair).powi(2)).sum()
 }
 
-/// `D G / (4 (n.i)(n.o))` of [`crate::material::lobe`].
+/// `D G / (4 (n.i)(n.o))` of [`super::blinn_phong`].
 fn blinn_phong(width: f64, cos_in: f64, cos_out: f64, cos_half: f64) -> f64 {
     let k = 0.5 * width;
     let inverse = 1.0 / (width * width);

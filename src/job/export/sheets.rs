@@ -1,0 +1,57 @@
+//! What the files of each format are and what their numbers mean, as their sheets say it.
+
+pub(super) const GLB_FILES: &str = "\
+*.glb            mesh (+y up), material, textures, the sun as a directional light where the environment has one
+  base colour    sRGB; diffuse reflectance over 1 - mean F, since glTF weighs diffuse light by 1 - max F
+  metalness      blue of the second texture, no curve; used where the surface has metals (F0 above 0.16), else 0:
+                 base colour is then F0 of what is metal, less what renderers add by light between microfacets
+  roughness      square root of the GGX width; green of the second texture, no curve
+  F0             ((ior - 1) / (ior + 1))^2 times the specular colour (sRGB): KHR_materials_ior, KHR_materials_specular
+  sun            colour times intensity = irradiance facing it, in the environment's radiance times steradian; Blender:
+                 import with the lighting mode Unitless
+environment.*    the whole light, linear; +x in the centre, as three.js and Blender look for it. Either this or the
+                 sun with environment_without_sun.*: both together light the scene twice";
+pub(super) const USD_FILES: &str = "\
+*.usda, *.usdz   mesh, UsdPreviewSurface, dome light; the package holds the same
+  workflow       variant set of the material: `metalness`, chosen at first, which every importer knows, or `specular`
+base_color.png   sRGB, metalness: diffuse reflectance over 1 - mean F, or F0 of what is metal, less what renderers
+                 add by light between microfacets
+metallic.png     no curve, metalness
+diffuse.png      sRGB, specular: diffuse reflectance as fitted
+specular.png     sRGB, specular: F0 as fitted
+roughness.png    square root of the GGX width, no curve
+environment.exr  the whole light, linear; left border -z, +z in the centre (OpenEXR's latitude-longitude)";
+pub(super) const MITSUBA_FILES: &str = "\
+scene.xml        principled BSDF: base_color.exr, metallic.exr, roughness_ggx.exr (square root of the GGX width)
+scene_exact.xml  the fitted model, BSDF `patina` of patina_lobe.py: diffuse.exr, specular.exr (F0), roughness.exr (a^2)
+                 import mitsuba as mi; mi.set_variant(\"llvm_ad_rgb\"); import patina_lobe; mi.load_file(...)
+environment_nodes.exr  the light on nodes, poles included: interpolated there it is the fitted one exactly
+All maps are linear and read raw.";
+pub(super) const BLENDER_FILES: &str = "\
+import_patina.py builds mesh, Principled BSDF and world: blender --python import_patina.py
+base_color.exr   linear; diffuse reflectance over 1 - mean F, since Cycles takes from it what the lobe reflects
+specular_tint.exr  linear; F0 over that of the index of refraction in material.json, specular level 0.5
+roughness.exr    square root of the GGX width
+metallic.exr     where the surface has metals (F0 above 0.16); base colour is F0 of what is metal
+environment.exr  linear; +x in the centre";
+pub(super) const MATERIALX_FILES: &str = "\
+*.mtlx           open_pbr_surface over the maps, all linear
+base_color.exr   diffuse reflectance over 1 - mean F, since the layers of OpenPBR take from it what the lobe reflects
+specular_color.exr  F0 over that of specular_ior
+specular_roughness.exr  square root of the GGX width
+base_metalness.exr  where the surface has metals (F0 above 0.16); base colour is F0 of what is metal, less what
+                 renderers add by light between microfacets
+environment.exr  linear; left border -z, +z in the centre; mesh.obj with texture coordinates, v up";
+pub(super) const TEXTURE_FILES: &str = "\
+BaseColor, Metallic, Specular, Roughness   metalness workflow: F0 = (1 - metallic) 0.08 specular + metallic base colour,
+                 diffuse = (1 - metallic) base colour
+Diffuse, SpecularF0, Roughness             specular workflow, reflectances as fitted
+Colours carry the sRGB curve in PNG and TIFF and are linear in EXR; Metallic, Specular, Roughness carry no curve.
+Roughness is the square root of the GGX width. Texture coordinates of the OBJ point up: row 0 is v = 1.
+environment.*    linear; left border -z, +z in the centre";
+
+pub(super) const WEB_FILES: &str = "\
+index.html       opens in any browser with WebGL 2, without a network; holds mesh, maps and environments
+                 diffuse and F0 with the sRGB curve, microfacet width a = sqrt(r), eight bits each
+                 drag turns, wheel zooms, Ctrl and drag moves, Shift and drag turns the light
+                 index.html#light=1&rotation=90&exposure=0.5&backdrop=0&view=0&wipe=1 opens it so";
