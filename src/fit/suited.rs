@@ -82,7 +82,8 @@ impl Suited {
         }
         // The solver's lobes are of Blinn-Phong: others are made of them by refinement.
         if is_free("solver-polish") && settings.lobe == LobeModel::Ggx {
-            settings.solver_polish = POLISH_OF_LOBES.saturating_mul(settings.steps_all) / FitSettings::default().steps_all;
+            settings.solver_polish =
+                POLISH_OF_LOBES.saturating_mul(settings.steps_all) / FitSettings::default().steps_all;
         }
         // What follows leaves the solver the sizes below the full one, and it does with one more of them.
         let is_refined = settings.is_refined();
@@ -178,13 +179,13 @@ mod tests {
         let own = FitSettings { method: Method::Adam, ..FitSettings::default() };
         let kept = applied(&Suited::to(&scene, &Report::default()), own.clone(), &["bounces"]);
         assert_eq!(kept, own, "a method that was chosen stays, and Adam is not given what is the solver's");
-        scene.views[1].photo = Photo::Srgb8(Image::filled(8, 6, [200; 3]));
-        assert_eq!(suits(&scene, &[]), (Method::Solver, 1));
-        assert_eq!(suits(&scene, &["samples"]).0, Method::Adam);
         let ggx = FitSettings { lobe: LobeModel::Ggx, ..FitSettings::default() };
         let resolved = applied(&Suited::to(&scene, &Report::default()), ggx, &["lobe"]);
         assert_eq!((resolved.method, resolved.solver_polish), (Method::Solver, POLISH_OF_LOBES));
         resolved.validate().unwrap();
+        scene.views[1].photo = Photo::Srgb8(Image::filled(8, 6, [200; 3]));
+        assert_eq!(suits(&scene, &[]), (Method::Solver, 1));
+        assert_eq!(suits(&scene, &["samples"]).0, Method::Adam);
         scene.views.clear();
         assert_eq!(suits(&scene, &[]).0, Method::Adam);
     }

@@ -29,6 +29,7 @@ mod stored;
 mod tiff;
 
 pub use format::Format;
+pub(crate) use guard::guarded;
 pub use guard::keep_decoders_quiet;
 pub use photo::{Encoding, PhotoFile, PhotoOptions, PhotoPixels, swaps_sides, turned};
 pub use source::read_header;

@@ -6,6 +6,7 @@
 
 use super::source_mesh::{SourceMesh, is_a_place, vertex_index};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::image::file::guarded;
 use base64::Engine;
 use glam::{DMat4, DVec3, Vec2, Vec3};
 use gltf::accessor::{DataType, Dimensions};
@@ -23,7 +24,10 @@ const DEEPEST: usize = 256;
 /// `Malformed`, `Unsupported` or `NonFinite`; `Missing` for a buffer that is not there.
 pub fn read(path: &Path) -> Result<SourceMesh> {
     let bytes = std::fs::read(path).map_err(|source| Error::reading(path, source))?;
-    let Gltf { document, mut blob } = Gltf::from_slice(&bytes).map_err(|error| {
+    // The crate panics on names of attributes that it does not know.
+    let decoded = guarded(path, || Ok(Gltf::from_slice(&bytes)))
+        .map_err(|_| malformed(path, "the glTF file is damaged in a way its decoder did not expect".into()))?;
+    let Gltf { document, mut blob } = decoded.map_err(|error| {
         malformed(path, format!("the glTF file cannot be read: {error}"))
             .remedy("the file is damaged, or packed by Draco or meshopt: export it again, without compression")
     })?;
