@@ -92,8 +92,11 @@ fn the_truth_of_an_object_with_lighting_scores_high_and_another_light_does_not()
     write(test.join("gt_camera_0000.txt"), text);
     let truth = made.drawing(256, 5).picture(&camera, Some(&light()), 0);
     // Seen by the eye of the data set: its own power, an exposure of half a stop less.
-    let bytes = truth
-        .map(|rgb| rgb.to_array().map(|own| (255.0 * (own * 0.7071).powf(1.0 / 2.2)).clamp(0.0, 255.0).round() as u8));
+    let bytes = truth.map(|rgb| {
+        rgb.to_array().map(|own| {
+            (255.0 * (own * std::f32::consts::FRAC_1_SQRT_2).powf(1.0 / 2.2)).clamp(0.0, 255.0).round() as u8
+        })
+    });
     for path in [test.join("inputs/image_0000.png"), test.join("gt_image_0000.png")] {
         file::write_png_srgb8(&path, &bytes).unwrap();
     }

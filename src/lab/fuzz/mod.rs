@@ -192,7 +192,7 @@ fn run_kind(kind: &Kind, settings: &Settings) -> Result<Outcome> {
 /// Opens an input; what went wrong, if anything did.
 fn open_and_measure(kind: &Kind, root: &Path, path: &Path, number: u64, outcome: &mut Outcome) -> Option<String> {
     outcome.inputs += 1;
-    let whole = number % WHOLE_EVERY == 0;
+    let whole = number.is_multiple_of(WHOLE_EVERY);
     let before = memory::restart();
     let start = Instant::now();
     let result = catch_unwind(AssertUnwindSafe(|| open(kind.opening, root, path, whole)));

@@ -23,7 +23,7 @@ pub struct ProofLight {
 /// The lights of the proof, on the grid of the run's own.
 pub fn of(own: &Environment) -> Vec<ProofLight> {
     let (width, height) = (own.width(), own.height());
-    let lamp = |d: Vec3, towards: Vec3, spread: f32| ((d.dot(towards.normalize()) - 1.0) / spread).exp();
+    let lamp = |d: Vec3, towards: Vec3, spread: f32| ((d.dot(towards.normalize_or(Vec3::Y)) - 1.0) / spread).exp();
     let sky = Environment {
         radiance: crate::image::Image::from_fn(width, height, |row, column| {
             let d = direction_of_texel(row, column, width, height);

@@ -70,7 +70,7 @@ fn models_of(folder: &Path) -> Vec<(PathBuf, usize)> {
         if numbered.len() > 1 {
             let mut counted: Vec<(PathBuf, usize)> =
                 numbered.into_iter().map(|model| (model.clone(), images_of(&model))).collect();
-            counted.sort_by(|a, b| b.1.cmp(&a.1));
+            counted.sort_by_key(|(_, images)| std::cmp::Reverse(*images));
             return counted;
         }
         if let Some(only) = numbered.pop().or_else(|| holds_model(&base).then_some(base)) {

@@ -151,10 +151,8 @@ fn of_several_models_the_largest_is_read_and_told() {
     let root = folder.path();
     std::fs::create_dir_all(root.join("sparse/1")).unwrap();
     let (cameras, images) = binary();
-    for (name, cameras_text, images_text) in [("0", CAMERAS, "1 1 0 0 0 0 0 4 2 right/b.png\n\n")] {
-        std::fs::write(root.join("sparse").join(name).join("cameras.txt"), cameras_text).unwrap();
-        std::fs::write(root.join("sparse").join(name).join("images.txt"), images_text).unwrap();
-    }
+    std::fs::write(root.join("sparse/0/cameras.txt"), CAMERAS).unwrap();
+    std::fs::write(root.join("sparse/0/images.txt"), "1 1 0 0 0 0 0 4 2 right/b.png\n\n").unwrap();
     std::fs::write(root.join("sparse/1/cameras.bin"), cameras).unwrap();
     std::fs::write(root.join("sparse/1/images.bin"), images).unwrap();
     assert_eq!(model_folder(root), Some(root.join("sparse/1")));

@@ -24,7 +24,7 @@ const DEEPEST: usize = 256;
 /// `Malformed`, `Unsupported` or `NonFinite`; `Missing` for a buffer that is not there.
 pub fn read(path: &Path) -> Result<SourceMesh> {
     let bytes = std::fs::read(path).map_err(|source| Error::reading(path, source))?;
-    // The crate panics on names of attributes that it does not know.
+    // The crate panics where a mesh names an accessor that is not there.
     let decoded = guarded(path, || Ok(Gltf::from_slice(&bytes)))
         .map_err(|_| malformed(path, "the glTF file is damaged in a way its decoder did not expect".into()))?;
     let Gltf { document, mut blob } = decoded.map_err(|error| {
