@@ -8,7 +8,7 @@
 //! [`capture`] tells after a fit what is wrong with photos, cameras, masks or mesh.
 //! [`coverage`] counts which texels photographs see. [`cursor`] leads
 //! between photo, surface and map; [`record`] says what each photo and the model say of one point,
-//! [`surface_layers`] what all photos together say of each texel. [`material_pictures`] shows measured reflectance.
+//! [`surface_layers`] what all photos together say of each texel, [`projected_photos`] lays them on it before any fit. [`material_pictures`] shows measured reflectance.
 //!
 //! What this folder refuses to do: it changes no map, and scores only pictures that are handed to it.
 
@@ -21,6 +21,7 @@ pub mod material_pictures;
 pub mod memory;
 pub mod nearest_photo;
 pub mod plot;
+pub mod projected_photos;
 pub mod protocols;
 pub mod record;
 pub mod report;

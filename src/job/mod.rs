@@ -7,8 +7,9 @@
 //!
 //! [`open`] opens scenes and runs, begins fits and takes them up; [`prepare`] turns a scene into a surface with an atlas,
 //! [`worker`] is the thread and [`handle`] what a watcher holds of it, `save` keeps the run folder whole while it runs,
-//! [`outcome`] renders, scores and writes the run folder, [`demo`] makes the built-in scene. [`preview`] draws for a window
-//! beside a fit. After a fit, [`gallery`] makes what a user shows, [`gauge`] moves its scale, [`entanglement`] tells how
+//! [`outcome`] renders, scores and writes the run folder, [`demo`] makes the built-in scene,
+//! [`capture_folder`] finds the parts of a scene in a folder and names them. [`preview`] draws for a window
+//! beside a fit, [`relit`] does so from cached transport, at once. After a fit, [`gallery`] makes what a user shows, [`gauge`] moves its scale, [`entanglement`] tells how
 //! much light is baked into the maps, [`regions`] reads measured materials for parts of a surface,
 //! [`relight`](mod@relight) makes one picture, [`export`] writes a run for other programs.
 //!
@@ -21,6 +22,7 @@ pub mod against_truth;
 pub mod ask;
 pub mod background;
 pub mod benchmark;
+pub mod capture_folder;
 pub mod demo;
 pub mod entanglement;
 mod explained;
@@ -39,6 +41,7 @@ pub mod prepare;
 pub mod preview;
 pub mod regions;
 pub mod relight;
+pub mod relit;
 mod save;
 pub mod shown;
 pub mod slot;

@@ -9,7 +9,8 @@
 //!    it. Both run in any [`Real`](crate::math::real::Real): `f32` to fit, `f64` to audit, dual numbers for
 //!    Hessian-vector products.
 //! 4. [`accumulate`]: pixels in parallel, gradients reduced in a fixed order.
-//! 5. [`cached`]: the same light without rays, for scenes whose geometry is known and stays.
+//! 5. [`cached`]: the same light without rays, for scenes whose geometry is known and stays. [`relight`]: a view of it
+//!    under any light, at once.
 //! 6. [`picture`]: pictures and layers. [`first_hits`]: primary rays traced once.
 //!    [`progressive`]: a picture that refines. [`regions`] and [`measured_regions`]: pictures in which parts of the
 //!    surface have measured reflectance in place of the maps'; nothing is fitted there, so no record is kept.
@@ -29,6 +30,7 @@ pub mod picture;
 pub mod picture_settings;
 pub mod progressive;
 pub mod regions;
+pub mod relight;
 pub mod sums;
 pub mod surface;
 mod taps;

@@ -1,0 +1,368 @@
+//! Views relit from cached transport on a thread of its own, for a window: the newest request wins.
+//!
+//! [`transport_of`] traces the cache of a surface once. [`Relighter`] then keeps what the eye sees: a request that differs
+//! from the last only in its light costs no ray. A view is traced with one ray a pixel first and shown, and once nothing
+//! else is asked for with as many as the fit takes. Work is done on a pool of its own, which gives way.
+
+use super::{Slot, Wake, background};
+use crate::error::{Error, ErrorKind, Result, text_of_panic};
+use crate::image::RgbImage;
+use crate::light::Environment;
+use crate::material::Material;
+use crate::material::MaterialMaps;
+use crate::material::texels::texels_from_maps;
+use crate::render::Surface;
+use crate::render::cached::{CachedSettings, CachedTransport, FootprintSettings};
+use crate::render::relight::RelitView;
+use crate::scene::Camera;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Instant;
+
+/// Width and height of the lights that the cache of a window is made for.
+const LIGHT_SIZE: (usize, usize) = (64, 32);
+/// Texels a side of its grid.
+const GRID: usize = 192;
+
+/// Traces the cache by which a window relights a surface; `None` when `stop` was raised.
+pub fn transport_of(
+    surface: &Surface,
+    max_bounces: usize,
+    lobe_strength: f32,
+    stop: &AtomicBool,
+) -> Option<CachedTransport> {
+    CachedTransport::build(surface, settings_of(max_bounces, lobe_strength), LIGHT_SIZE, stop)
+}
+
+/// How fine that cache is.
+pub fn settings_of(max_bounces: usize, lobe_strength: f32) -> CachedSettings {
+    CachedSettings { grid: GRID, max_bounces, lobe_strength, ..CachedSettings::default() }
+}
+
+/// A light of a request.
+#[derive(Clone)]
+pub struct RelitLight {
+    /// Radiance from every direction.
+    pub environment: Arc<Environment>,
+    /// Turned about +y by this angle in radians.
+    pub turn_radians: f32,
+    /// Times this factor.
+    pub strength: f32,
+}
+
+impl RelitLight {
+    fn environment(&self) -> Environment {
+        let turned = match self.turn_radians {
+            0.0 => (*self.environment).clone(),
+            turn => self.environment.rotated_about_up(turn),
+        };
+        match self.strength {
+            1.0 => turned,
+            factor => Environment { radiance: turned.radiance.map(|radiance| *radiance * factor) },
+        }
+    }
+}
+
+/// What is to be drawn.
+#[derive(Clone)]
+pub struct RelitRequest {
+    /// The surface.
+    pub surface: Arc<Surface>,
+    /// Its cache.
+    pub transport: Arc<CachedTransport>,
+    /// The maps.
+    pub maps: Arc<MaterialMaps>,
+    /// The camera, of the size of the picture.
+    pub camera: Camera,
+    /// One or more lights: each gives a picture.
+    pub lights: Vec<RelitLight>,
+    /// Whether the lights show behind the surface; it is black otherwise.
+    pub background_visible: bool,
+    /// Chosen by who asks; comes back with the pictures.
+    pub key: u64,
+    /// The same, equal for requests that differ in their lights alone.
+    pub view: u64,
+}
+
+/// Pictures that were asked for.
+#[derive(Clone, Debug)]
+pub struct RelitPictures {
+    /// That of the request.
+    pub key: u64,
+    /// That of the request.
+    pub view: u64,
+    /// Linear radiance, one picture a light.
+    pub pictures: Vec<Arc<RgbImage>>,
+    /// Whether edges are smooth: a picture of one ray a pixel comes before.
+    pub is_fine: bool,
+    /// Whether rays were traced for it.
+    pub is_of_new_view: bool,
+    /// Seconds that the lights took.
+    pub light_seconds: f64,
+}
+
+/// The thread that draws.
+pub struct Relighter {
+    /// The newest pictures.
+    pub pictures: Arc<Slot<RelitPictures>>,
+    /// The newest failure, with the key of its request.
+    pub failures: Arc<Slot<(u64, Error)>>,
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+#[derive(Default)]
+struct Shared {
+    inbox: Mutex<Inbox>,
+    arrived: Condvar,
+    /// Ends what is in progress.
+    stop: AtomicBool,
+    /// A view is drawn finer meanwhile: whatever is asked for comes first.
+    is_refining: AtomicBool,
+}
+
+#[derive(Default)]
+struct Inbox {
+    request: Option<RelitRequest>,
+    is_closed: bool,
+}
+
+impl Shared {
+    fn inbox(&self) -> MutexGuard<'_, Inbox> {
+        // Nothing panics while the inbox is held, and its parts are whole at any time.
+        self.inbox.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Relighter {
+    /// Starts the thread. `wake` is called after each picture and failure.
+    ///
+    /// # Errors
+    /// `Internal` when the system gives no thread.
+    pub fn start(wake: Option<Wake>) -> Result<Self> {
+        let shared = Arc::new(Shared::default());
+        let (pictures, failures) = (Arc::new(Slot::default()), Arc::new(Slot::default()));
+        let worker = Worker {
+            shared: Arc::clone(&shared),
+            pool: background::pool("patina-relit"),
+            pictures: Arc::clone(&pictures),
+            failures: Arc::clone(&failures),
+            wake,
+            seen: None,
+        };
+        let thread = std::thread::Builder::new().name("patina-relit".into()).spawn(move || worker.run());
+        let thread =
+            thread.map_err(|source| Error::new(ErrorKind::Internal, format!("cannot start a thread: {source}")))?;
+        Ok(Relighter { pictures, failures, shared, thread: Some(thread) })
+    }
+
+    /// Draws this next. A request for the same view waits for the one in progress, so that a light that turns is seen to
+    /// turn; another view ends it.
+    pub fn request(&self, request: RelitRequest, is_other_view: bool) {
+        let mut inbox = self.shared.inbox();
+        inbox.request = Some(request);
+        let comes_first = is_other_view || self.shared.is_refining.load(Ordering::Relaxed);
+        self.shared.stop.fetch_or(comes_first, Ordering::Relaxed);
+        self.shared.arrived.notify_one();
+    }
+
+    /// Drops what is waiting or in progress.
+    pub fn cancel(&self) {
+        let mut inbox = self.shared.inbox();
+        inbox.request = None;
+        self.shared.stop.store(true, Ordering::Relaxed);
+    }
+}
+
+impl Drop for Relighter {
+    fn drop(&mut self) {
+        self.shared.inbox().is_closed = true;
+        self.shared.stop.store(true, Ordering::Relaxed);
+        self.shared.arrived.notify_one();
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// A view that is kept, and what it is of.
+struct Seen {
+    request: RelitRequest,
+    view: RelitView,
+    reflectance: Vec<[f32; 3]>,
+    is_fine: bool,
+}
+
+impl Seen {
+    fn is_same_place(&self, request: &RelitRequest) -> bool {
+        Arc::ptr_eq(&self.request.surface, &request.surface)
+            && Arc::ptr_eq(&self.request.transport, &request.transport)
+            && self.request.camera == request.camera
+            && self.request.maps.diffuse.width() == request.maps.diffuse.width()
+    }
+}
+
+struct Worker {
+    shared: Arc<Shared>,
+    pool: Option<rayon::ThreadPool>,
+    pictures: Arc<Slot<RelitPictures>>,
+    failures: Arc<Slot<(u64, Error)>>,
+    wake: Option<Wake>,
+    seen: Option<Seen>,
+}
+
+impl Worker {
+    fn run(mut self) {
+        // What could be drawn finer once nothing else is asked for.
+        let mut to_refine: Option<RelitRequest> = None;
+        loop {
+            let (request, is_fine) = {
+                let mut inbox = self.shared.inbox();
+                loop {
+                    if inbox.is_closed {
+                        return;
+                    }
+                    self.shared.stop.store(false, Ordering::Relaxed);
+                    let next = inbox.request.take().map(|request| (request, false));
+                    if let Some((request, refines)) = next.or_else(|| to_refine.take().map(|request| (request, true))) {
+                        self.shared.is_refining.store(refines, Ordering::Relaxed);
+                        break (request, refines);
+                    }
+                    inbox = self.shared.arrived.wait(inbox).unwrap_or_else(PoisonError::into_inner);
+                }
+            };
+            let key = request.key;
+            let pool = self.pool.take();
+            let drawn = catch_unwind(AssertUnwindSafe(|| match &pool {
+                Some(pool) => pool.install(|| self.draw(request.clone(), is_fine)),
+                None => self.draw(request.clone(), is_fine),
+            }));
+            self.pool = pool;
+            match drawn {
+                Ok(Some(pictures)) => {
+                    to_refine = (!pictures.is_fine).then_some(request);
+                    self.pictures.put(pictures);
+                }
+                // Something else is wanted.
+                Ok(None) => to_refine = None,
+                Err(panic) => {
+                    self.seen = None;
+                    let message = format!("the view could not be relit: {}", text_of_panic(&*panic));
+                    let error = Error::new(ErrorKind::Internal, message);
+                    self.failures.put((key, error.remedy("internal error (please report); path tracing still works")));
+                }
+            }
+            if let Some(wake) = &self.wake {
+                wake();
+            }
+        }
+    }
+
+    /// Draws a request; `None` when it was stopped.
+    fn draw(&mut self, request: RelitRequest, wants_fine: bool) -> Option<RelitPictures> {
+        let shared = Arc::clone(&self.shared);
+        let stop = &shared.stop;
+        let map_size = request.maps.diffuse.width();
+        let texels = || -> Vec<Material<f32>> { texels_from_maps(&request.maps) };
+        let is_kept =
+            self.seen.as_ref().is_some_and(|seen| seen.is_same_place(&request) && (seen.is_fine || !wants_fine));
+        let kept = if is_kept { self.seen.take() } else { None };
+        let seen = match kept {
+            Some(seen) if Arc::ptr_eq(&seen.request.maps, &request.maps) => Seen { request: request.clone(), ..seen },
+            Some(seen) => {
+                let texels = texels();
+                let reflectance = request.transport.reflectance_of_points(&texels, map_size);
+                let view = seen.view.with_texels(&request.transport, &texels);
+                Seen { request: request.clone(), view, reflectance, is_fine: seen.is_fine }
+            }
+            None => {
+                let texels = texels();
+                let settings = match wants_fine {
+                    true => FootprintSettings { map_size, ..FootprintSettings::default() },
+                    false => FootprintSettings { map_size, ..FootprintSettings::COARSE },
+                };
+                let (surface, transport) = (&request.surface, &request.transport);
+                let view = RelitView::new(surface, transport, &request.camera, &texels, &settings, stop)?;
+                let reflectance = transport.reflectance_of_points(&texels, map_size);
+                Seen { request: request.clone(), view, reflectance, is_fine: wants_fine }
+            }
+        };
+        let began = Instant::now();
+        let mut pictures = Vec::with_capacity(request.lights.len());
+        for light in &request.lights {
+            let (environment, behind) = (light.environment(), request.background_visible);
+            let lit = seen.view.lit(&request.transport, &environment, &seen.reflectance, behind, stop);
+            let Some(lit) = lit else { break };
+            pictures.push(Arc::new(lit.radiance));
+        }
+        let is_fine = seen.is_fine;
+        self.seen = Some(seen);
+        let light_seconds = began.elapsed().as_secs_f64();
+        let (key, view) = (request.key, request.view);
+        let is_whole = pictures.len() == request.lights.len();
+        is_whole.then_some(RelitPictures { key, view, pictures, is_fine, is_of_new_view: !is_kept, light_seconds })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::demo::{DemoSettings, build};
+    use glam::Vec3;
+
+    fn waited(relighter: &Relighter, key: u64, is_fine: bool) -> Arc<RelitPictures> {
+        loop {
+            if let Some((_, made)) = relighter.pictures.newest()
+                && made.key == key
+                && made.is_fine == is_fine
+            {
+                return made;
+            }
+            assert!(relighter.failures.newest().is_none());
+            std::thread::yield_now();
+        }
+    }
+
+    #[test]
+    fn a_light_that_turns_costs_no_ray_and_a_view_ends_smooth() {
+        let settings = DemoSettings { views: 1, held_out: 0, width: 96, height: 72, map_size: 64, seed: 1 };
+        let scene = build(&settings).unwrap().scene;
+        let surface = Arc::new(Surface::new(scene.mesh.clone()).unwrap());
+        let truth = scene.truth.as_ref().unwrap();
+        let cached = CachedSettings { grid: 32, bounce_rays: 8, max_bounces: 2, ..settings_of(2, 1.0) };
+        let transport = CachedTransport::build(&surface, cached, (16, 8), &AtomicBool::new(false)).unwrap();
+        let environment = Arc::new(truth.environment.clone());
+        let light =
+            |turn_radians, strength| RelitLight { environment: Arc::clone(&environment), turn_radians, strength };
+        let first = RelitRequest {
+            surface,
+            transport: Arc::new(transport),
+            maps: Arc::new(truth.maps.clone()),
+            camera: scene.views[0].camera,
+            lights: vec![light(0.0, 1.0), light(0.0, 2.0)],
+            background_visible: false,
+            key: 1,
+            view: 7,
+        };
+        let relighter = Relighter::start(None).unwrap();
+        relighter.request(first.clone(), true);
+        let smooth = waited(&relighter, 1, true);
+        assert_eq!((smooth.pictures.len(), smooth.view), (2, 7));
+        // Twice the strength is twice the radiance.
+        let sum = |picture: &RgbImage| picture.pixels().iter().copied().sum::<Vec3>();
+        let [one, two] = [0, 1].map(|light| sum(&smooth.pictures[light]));
+        assert!(one.min_element() > 0.0 && (two / one - 2.0).abs().max_element() < 1e-4, "{one} {two}");
+        // The same view under a turned light is smooth from the start.
+        let lights = vec![light(1.5, 1.0)];
+        relighter.request(RelitRequest { lights, key: 2, ..first.clone() }, false);
+        let turned = waited(&relighter, 2, true);
+        assert!(turned.pictures[0] != smooth.pictures[0] && smooth.is_of_new_view && !turned.is_of_new_view);
+        // Another eye begins with one ray a pixel.
+        let camera = crate::scene::Camera { focal_pixels: first.camera.focal_pixels * 1.3, ..first.camera };
+        relighter.request(RelitRequest { camera, key: 3, view: 8, ..first }, true);
+        let nearer = waited(&relighter, 3, true);
+        assert!(nearer.pictures[0] != smooth.pictures[0]);
+    }
+}

@@ -1,0 +1,201 @@
+//! A view relit at once: rays are traced when the eye moves, never when the light does.
+//!
+//! [`RelitView`] holds what a camera sees of the surface (footprints of [`super::cached`]) with its materials. A light is
+//! then a sum: diffuse light comes from the points of the grid, as in the fit; the lobe, which costs most, is integrated at
+//! some shading points alone and interpolated between them ([`lobe_plan`]), before F0 of each pixel is multiplied in.
+//!
+//! Its picture is that of [`CachedTransport::picture`](super::cached::CachedTransport::picture) but for that interpolation,
+//! and for lights finer than the hats of the cache, which are averaged. `patina-lab bench studio --parts relight` prints the
+//! error of both against the path tracer. Nothing is random; nothing depends on the number of threads.
+
+pub mod lobe_plan;
+
+use super::cached::{CachedTransport, FootprintSettings, SeenLight, ViewFootprints};
+use super::surface::Surface;
+use crate::image::{Image, RgbImage};
+use crate::light::Environment;
+use crate::material::Material;
+use crate::scene::Camera;
+use glam::{Vec2, Vec3};
+use lobe_plan::LobePlan;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What a camera sees, ready for any light.
+pub struct RelitView {
+    camera: Camera,
+    footprints: ViewFootprints,
+    /// Where the shading points of each row of pixels begin, and the end of the last.
+    row_starts: Vec<usize>,
+    /// Diffuse and specular reflectance and log width of each shading point.
+    materials: Vec<[f32; 7]>,
+    lobes: LobePlan,
+}
+
+/// A picture and what made it.
+pub struct RelitPicture {
+    /// Linear radiance.
+    pub radiance: RgbImage,
+    /// Shading points at which lobes were integrated.
+    pub lobe_points: usize,
+}
+
+impl RelitView {
+    /// Traces what a camera sees of a surface whose maps have these texels, row-major and square; `None` when `stop` was
+    /// raised.
+    pub fn new(
+        surface: &Surface,
+        transport: &CachedTransport,
+        camera: &Camera,
+        texels: &[Material<f32>],
+        settings: &FootprintSettings,
+        stop: &AtomicBool,
+    ) -> Option<Self> {
+        let goes_on = |_: u32, _: Vec2| !stop.load(Ordering::Relaxed);
+        let footprints = ViewFootprints::trace_where(surface, &transport.grid, camera, settings, Some(&goes_on));
+        if stop.load(Ordering::Relaxed) {
+            return None;
+        }
+        let row_starts = (0..=camera.height)
+            .map(|row| footprints.points.partition_point(|point| (point.pixel as usize) < row * camera.width))
+            .collect();
+        let view =
+            RelitView { camera: *camera, footprints, row_starts, materials: Vec::new(), lobes: LobePlan::empty() };
+        Some(view.with_texels(transport, texels))
+    }
+
+    /// The same view of other maps of the same size.
+    pub fn with_texels(mut self, transport: &CachedTransport, texels: &[Material<f32>]) -> Self {
+        let material = |point| CachedTransport::material_of(&self.footprints, point, texels);
+        self.materials = self.footprints.points.par_iter().with_min_len(1024).map(material).collect();
+        self.lobes = match transport.settings.lobe_strength > 0.0 {
+            true => LobePlan::of(&self.footprints, &self.materials, &transport.grid, &self.camera),
+            false => LobePlan::empty(),
+        };
+        self
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// The view under a light. `reflectance` is that of [`CachedTransport::reflectance_of_points`] for the same maps. The
+    /// background is black unless `background_visible`; `None` when `stop` was raised.
+    pub fn lit(
+        &self,
+        transport: &CachedTransport,
+        environment: &Environment,
+        reflectance: &[[f32; 3]],
+        background_visible: bool,
+        stop: &AtomicBool,
+    ) -> Option<RelitPicture> {
+        let basis = &transport.basis;
+        let is_of_basis = (environment.width(), environment.height()) == (basis.width, basis.height);
+        let averaged = (!is_of_basis).then(|| environment.resampled(basis.width, basis.height));
+        let hats = averaged.as_ref().unwrap_or(environment).radiance.pixels();
+        let light = basis.planes(&hats.iter().map(|radiance| radiance.to_array()).collect::<Vec<_>>());
+        let at = transport.point_light(&light, reflectance);
+        if stop.load(Ordering::Relaxed) {
+            return None;
+        }
+        let footprints = &self.footprints;
+        let sums: Vec<[f32; 6]> = self
+            .lobes
+            .points
+            .par_iter()
+            .with_min_len(64)
+            .map_init(SeenLight::default, |seen, &index| {
+                let point = &footprints.points[index as usize];
+                let place = transport.lobe_place(point, &light, &at, seen);
+                let width = self.materials[index as usize][6].exp();
+                let mut sums = [Default::default()];
+                super::cached::lobe_sum::lobe_sums(basis, &place, &[width], &mut sums);
+                let [base, grazing] = [sums[0].base, sums[0].grazing];
+                [base[0], base[1], base[2], grazing[0], grazing[1], grazing[2]]
+            })
+            .collect();
+        if stop.load(Ordering::Relaxed) {
+            return None;
+        }
+        let (width, height) = (self.camera.width, self.camera.height);
+        let strength = transport.settings.lobe_strength;
+        let mut pixels = vec![Vec3::ZERO; width * height];
+        pixels.par_chunks_mut(width).enumerate().for_each(|(row, pixels)| {
+            for index in self.row_starts[row]..self.row_starts[row + 1] {
+                let (point, material) = (&footprints.points[index], &self.materials[index]);
+                let arriving = CachedTransport::interpolate(&at.arriving, footprints, point);
+                let lobe = self.lobes.at(index, &sums);
+                let radiance = [0, 1, 2].map(|c| {
+                    let reflected = material[3 + c] * lobe[c] + lobe[3 + c];
+                    material[c] * arriving[c] + strength * reflected
+                });
+                pixels[point.pixel as usize - row * width] += Vec3::from_array(radiance) * point.share;
+            }
+            if background_visible {
+                for (column, pixel) in pixels.iter_mut().enumerate() {
+                    let escaped = footprints.escaped[row * width + column];
+                    if escaped > 0.0 {
+                        let ray = self.camera.ray_through(Vec2::new(column as f32 + 0.5, row as f32 + 0.5));
+                        *pixel += environment.radiance_towards(ray.direction) * escaped;
+                    }
+                }
+            }
+        });
+        Some(RelitPicture { radiance: Image::from_pixels(width, height, pixels), lobe_points: self.lobes.points.len() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::texels::texels_from_maps;
+    use crate::render::cached::CachedSettings;
+    use crate::scene::demo::{DemoSettings, build};
+
+    fn relative_error(own: &RgbImage, truth: &RgbImage) -> f64 {
+        let squared = |value: Vec3| f64::from(value.length_squared());
+        let difference: f64 = own.pixels().iter().zip(truth.pixels()).map(|(a, b)| squared(*a - *b)).sum();
+        let whole: f64 = truth.pixels().iter().map(|pixel| squared(*pixel)).sum();
+        (difference / whole).sqrt()
+    }
+
+    #[test]
+    fn a_view_relit_is_the_picture_of_the_cache_and_is_linear_in_the_light() {
+        let settings = DemoSettings { views: 2, held_out: 0, width: 160, height: 120, map_size: 128, seed: 1 };
+        let scene = build(&settings).unwrap().scene;
+        let surface = Surface::new(scene.mesh.clone()).unwrap();
+        let truth = scene.truth.as_ref().unwrap();
+        let map_size = truth.maps.diffuse.width();
+        let texels = texels_from_maps(&truth.maps);
+        let stop = AtomicBool::new(false);
+        let cached = CachedSettings { grid: 64, bounce_rays: 16, max_bounces: 2, ..CachedSettings::default() };
+        let size = (truth.environment.width(), truth.environment.height());
+        let transport = CachedTransport::build(&surface, cached, size, &stop).unwrap();
+        let reflectance = transport.reflectance_of_points(&texels, map_size);
+        let camera = &scene.views[0].camera;
+        let footprints = FootprintSettings { map_size, ..FootprintSettings::default() };
+        let view = RelitView::new(&surface, &transport, camera, &texels, &footprints, &stop).unwrap();
+        let own = view.lit(&transport, &truth.environment, &reflectance, false, &stop).unwrap();
+        let light: Vec<[f32; 3]> = truth.environment.radiance.pixels().iter().map(|rgb| rgb.to_array()).collect();
+        let light = transport.basis.planes(&light);
+        let at = transport.point_light(&light, &reflectance);
+        let traced = ViewFootprints::trace(&surface, &transport.grid, camera, &footprints);
+        let whole = transport.picture(&traced, &texels, &light, &at);
+        let whole = Image::from_pixels(camera.width, camera.height, whole.into_iter().map(Vec3::from_array).collect());
+        let error = relative_error(&own.radiance, &whole);
+        println!("{error:.4} off with lobes at {} of {} points", own.lobe_points, traced.points.len());
+        assert!(error < 0.015 && own.lobe_points < traced.points.len() * 3 / 4, "{error} {}", own.lobe_points);
+        // Twice the light is twice the picture.
+        let twice = Environment { radiance: truth.environment.radiance.map(|radiance| *radiance * 2.0) };
+        let twice = view.lit(&transport, &twice, &reflectance, true, &stop).unwrap().radiance;
+        let once = view.lit(&transport, &truth.environment, &reflectance, true, &stop).unwrap().radiance;
+        let doubled = once.map(|pixel| *pixel * 2.0);
+        assert!(relative_error(&twice, &doubled) < 1e-5);
+        // The environment is seen behind, as the path tracer shows it.
+        assert!(
+            once.pixels().iter().zip(own.radiance.pixels()).any(|(with, without)| with.length() > without.length())
+        );
+        assert!(view.lit(&transport, &truth.environment, &reflectance, true, &AtomicBool::new(true)).is_none());
+    }
+}
