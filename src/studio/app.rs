@@ -173,6 +173,7 @@ impl Studio {
             panel::status::show(ui, &mut self.model);
             egui::CentralPanel::no_frame().show(ui, |ui| self.layout.show(ui, &mut self.model, &mut self.memory));
         }
+        panel::card::show(ui.ctx(), &mut self.model);
         panel::banner::show(ui.ctx(), &mut self.model);
         panel::dialog::show(ui.ctx(), &mut self.model);
         panel::guide::show(ui.ctx(), &mut self.model, &mut self.memory.guide);

@@ -6,6 +6,7 @@ use super::layout::{Layout, Panel};
 use super::model::edits::PhotoLook;
 use super::model::lights::LightName;
 use super::model::log::Log;
+use super::model::tasks::TaskKind;
 use super::model::{Dialog, Model, PickFor, SaveWhat, Workspace};
 use super::stage::Layer;
 use crate::error::{Error, ErrorKind, Place};
@@ -26,9 +27,11 @@ pub fn perform(act: Act, model: &mut Model, layout: &mut Layout, context: &Conte
     let ask = |purpose| Dialog::Path { purpose, text: String::new() };
     match act {
         Act::OpenFolder => model.dialog = ask(PickFor::Open),
+        Act::Import => model.ask_to_import(None),
         Act::AddLight => model.dialog = ask(PickFor::Light),
         Act::OpenDemo => model.open_demo(),
         Act::CloseProject => model.close(),
+        Act::Export => model.ask_to_export(),
         Act::SavePicture => model.ask_to_save(SaveWhat::Picture),
         Act::SaveTurntable => model.ask_to_save(SaveWhat::Turntable),
         Act::SaveLightStrip => model.ask_to_save(SaveWhat::Strip),
@@ -58,8 +61,9 @@ pub fn perform(act: Act, model: &mut Model, layout: &mut Layout, context: &Conte
         Act::PreviousView => choose_next(model, -1),
         Act::LeaveOut => toggle_excluded(model),
         Act::ShowPhoto => {
-            let is_off = model.edits.photo == PhotoLook::Off;
-            show_photo(model, if is_off { PhotoLook::Over(1.0) } else { PhotoLook::Off });
+            // Beside a line it is seen in part: now the whole of it is wanted.
+            let is_shown = matches!(model.edits.photo, PhotoLook::Over(_));
+            show_photo(model, if is_shown { PhotoLook::Off } else { PhotoLook::Over(1.0) });
         }
         Act::WipePhoto => {
             let is_wiped = matches!(model.edits.photo, PhotoLook::Wipe(_));
@@ -70,6 +74,7 @@ pub fn perform(act: Act, model: &mut Model, layout: &mut Layout, context: &Conte
         Act::LayerCoverage => show_computed(model, Layer::Coverage),
         Act::LayerDisagreement => show_computed(model, Layer::Disagreement),
         Act::LayerTimesSeen => show_computed(model, Layer::TimesSeen),
+        Act::LayerPhotos => model.edits.layer = Layer::Photos,
         Act::LayerLit => model.edits.layer = Layer::Lit,
         Act::LayerDiffuse => model.edits.layer = Layer::Diffuse,
         Act::LayerSpecular => model.edits.layer = Layer::Specular,
@@ -81,7 +86,14 @@ pub fn perform(act: Act, model: &mut Model, layout: &mut Layout, context: &Conte
         Act::LayerLobeSharing => model.edits.layer = Layer::LobeSharing,
         Act::LayerChoice => model.edits.layer = Layer::Choice,
         Act::SurfaceLayers => model.measure_layers(),
-        Act::Traced => model.switches.traced = !model.switches.traced,
+        Act::Traced => {
+            model.switches.traced = !model.switches.traced;
+            match model.switches.traced {
+                true => model.cache_transport(),
+                // The raster preview needs none.
+                false => model.tasks.stop(&TaskKind::CachingTransport),
+            }
+        }
         Act::Frustums => model.switches.frustums = !model.switches.frustums,
         Act::Thumbnails => model.switches.thumbnails = !model.switches.thumbnails,
         Act::ChartBorders => model.switches.chart_borders = !model.switches.chart_borders,

@@ -5,6 +5,7 @@
 mod acts;
 pub mod adapter;
 mod faults;
+mod film;
 mod fit;
 mod hand;
 mod known;
@@ -20,4 +21,5 @@ mod saving;
 mod stage;
 mod states;
 mod support;
+mod ways_in_and_out;
 mod welcome;

@@ -16,6 +16,7 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
     }
     match act {
         Act::OpenFolder
+        | Act::Import
         | Act::OpenDemo
         | Act::Quit
         | Act::Palette
@@ -92,6 +93,11 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
             let there = model.fit.folder.as_ref().is_some_and(|folder| folder.path().is_dir());
             need(there, "no run yet: start a fit")
         }
+        Act::Export => {
+            let has_result = model.fit.folder.as_ref().is_some_and(|folder| folder.has_result());
+            need(has_result && !status.is_live(), "available when a fit is finished")?;
+            need(!model.tasks.is_running(&TaskKind::Exporting), "an export is being written")
+        }
         Act::SavePicture | Act::SaveTurntable | Act::SaveLightStrip | Act::LightStrip => {
             need(has_maps && project.is_some_and(|project| project.surface.is_some()), "no maps yet: start a fit")
         }
@@ -103,6 +109,7 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
         | Act::ExposureAuto
         | Act::Frustums
         | Act::Thumbnails
+        | Act::LayerPhotos
         | Act::LeaveOut => need(has_views, "no photos"),
         Act::ErrorOverlay | Act::LayerPhotoError | Act::LayerCoverage | Act::LayerDisagreement | Act::SurfaceLayers => {
             need(has_views, "no photos")?;
@@ -155,7 +162,8 @@ fn is_of_scenes(act: Act) -> bool {
         Group::Light => act != Act::AddLight,
         Group::File | Group::Window => matches!(
             act,
-            Act::SavePicture
+            Act::Export
+                | Act::SavePicture
                 | Act::SaveTurntable
                 | Act::SaveLightStrip
                 | Act::OpenReport

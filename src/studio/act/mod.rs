@@ -15,8 +15,10 @@ use egui::{Key, KeyboardShortcut, Modifiers};
 #[allow(missing_docs)] // Each act's name and help stand in the list below.
 pub enum Act {
     OpenFolder,
+    Import,
     OpenDemo,
     CloseProject,
+    Export,
     SavePicture,
     SaveTurntable,
     SaveLightStrip,
@@ -42,6 +44,7 @@ pub enum Act {
     Frustums,
     Thumbnails,
     ChartBorders,
+    LayerPhotos,
     LayerLit,
     LayerDiffuse,
     LayerSpecular,
@@ -192,8 +195,10 @@ const fn info(
 #[rustfmt::skip]
 pub const LIST: &[ActInfo] = &[
     info(Act::OpenFolder, Group::File, "Open…", "Open a scene folder or a run folder.", with(CTRL, Key::O)),
+    info(Act::Import, Group::File, "Import capture…", "Turn a folder of photos, mesh and cameras into a scene; what is missing is told.", with(CTRL, Key::I)),
     info(Act::OpenDemo, Group::File, "Open the built-in demo", "Render photos of a small built-in scene with known materials, and open it.", with(CTRL, Key::D)),
     info(Act::CloseProject, Group::File, "Close project", "Return to the start page. A running fit is stopped with a checkpoint.", with(CTRL, Key::W)),
+    info(Act::Export, Group::File, "Export…", "Write maps, mesh and environment for other programs: GLB, USD, Mitsuba, Blender, MaterialX, textures, a web page.", with(CTRL_SHIFT, Key::X)),
     info(Act::SavePicture, Group::File, "Render image…", "Path-trace the viewport under the chosen environment and save it as PNG or EXR.", with(CTRL, Key::S)),
     info(Act::SaveTurntable, Group::File, "Render turntable…", "Render images around the scene under the chosen environment.", None),
     info(Act::SaveLightStrip, Group::File, "Export contact sheet…", "Render the viewport under every environment of the library.", None),
@@ -222,6 +227,7 @@ pub const LIST: &[ActInfo] = &[
     info(Act::Frustums, Group::View, "Show cameras", "Show where the photos were taken.", key(Key::V)),
     info(Act::Thumbnails, Group::View, "Show camera thumbnails", "Show small photos on the cameras.", with(SHIFT, Key::V)),
     info(Act::ChartBorders, Group::View, "Show UV islands", "Draw the UV seams on the maps.", key(Key::B)),
+    info(Act::LayerPhotos, Group::View, "Projected photos", "Show the photos projected onto the surface: the mean of those that see it.", key(Key::Num0)),
     info(Act::LayerLit, Group::View, "Shaded", "Show the surface under the chosen environment.", key(Key::Num1)),
     info(Act::LayerDiffuse, Group::View, "Diffuse", "Show the diffuse reflectance.", key(Key::Num2)),
     info(Act::LayerSpecular, Group::View, "Specular", "Show the specular reflectance F0.", key(Key::Num3)),

@@ -1,5 +1,7 @@
 //! Windows over the window: which there are, and what becomes of a path that is typed or picked in one.
 
+use super::exporting::ExportRequest;
+use super::importing::ImportRequest;
 use super::tasks::TaskKind;
 use super::{Done, Model, lights};
 use std::path::PathBuf;
@@ -15,6 +17,18 @@ pub enum PickFor {
     RunsFolder,
     /// To save a picture.
     Save,
+    /// To export into.
+    ExportFolder,
+    /// A folder that holds a capture.
+    ImportFolder,
+    /// Its photos.
+    ImportPhotos,
+    /// Its mesh.
+    ImportMesh,
+    /// Its cameras.
+    ImportCameras,
+    /// Its masks.
+    ImportMasks,
     /// A photo of an object.
     ObjectPhoto,
     /// A mask of such a photo.
@@ -53,6 +67,10 @@ pub enum Dialog {
     },
     /// Asks how and where to save.
     Save(SaveRequest),
+    /// Asks what to export, and tells what will be lost.
+    Export(Box<ExportRequest>),
+    /// Asks for the parts of a capture.
+    Import(Box<ImportRequest>),
 }
 
 /// What is saved, and how.
@@ -97,6 +115,20 @@ impl Model {
             PickFor::ObjectLight => self.edits.object.light = path.display().to_string(),
             PickFor::ObjectResult => self.save_object(path),
             PickFor::Material => self.open_material(path),
+            PickFor::ImportFolder
+            | PickFor::ImportPhotos
+            | PickFor::ImportMesh
+            | PickFor::ImportCameras
+            | PickFor::ImportMasks => {
+                if let Dialog::Import(request) = &mut self.dialog {
+                    request.take(purpose, path);
+                }
+            }
+            PickFor::ExportFolder => {
+                if let Dialog::Export(request) = &mut self.dialog {
+                    request.output = path.display().to_string();
+                }
+            }
             PickFor::Save => {
                 if let Dialog::Save(request) = &mut self.dialog {
                     request.path = path.display().to_string();
@@ -129,6 +161,12 @@ impl Model {
             let path = match purpose {
                 PickFor::Open => dialog.set_title("Open a scene or run folder").pick_folder(),
                 PickFor::RunsFolder => dialog.set_title("Output folder for new runs").pick_folder(),
+                PickFor::ImportFolder => dialog.set_title("Folder of the capture").pick_folder(),
+                PickFor::ImportPhotos => dialog.set_title("Folder of photos").pick_folder(),
+                PickFor::ImportMasks => dialog.set_title("Folder of masks").pick_folder(),
+                PickFor::ImportCameras => dialog.set_title("Folder of cameras").pick_folder(),
+                PickFor::ImportMesh => dialog.set_title("Mesh").add_filter("Meshes", &["obj", "ply"]).pick_file(),
+                PickFor::ExportFolder => dialog.set_title("Export folder").pick_folder(),
                 PickFor::Light => dialog
                     .set_title("Import an HDRI")
                     .add_filter("HDRIs", &["hdr", "exr", "pfm", "png", "jpg"])

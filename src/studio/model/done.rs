@@ -1,7 +1,7 @@
 //! What tasks beside the window bring back to it.
 
 use super::lights::ShelfLight;
-use super::{LightName, PickFor, materials, object, opening, starting};
+use super::{LightName, PickFor, laid, materials, object, opening, rescaling, starting};
 use crate::error::Finding;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -14,6 +14,10 @@ pub enum Done {
     SceneChecked(Box<opening::SceneChecked>),
     /// The atlas and the tracer of a scene are made.
     Prepared(Box<opening::PreparedScene>),
+    /// The photos of a scene were laid on its mesh.
+    PhotosLaid(Box<laid::LaidPhotos>),
+    /// The transport of a surface was cached.
+    TransportCached(Box<laid::CachedOf>),
     /// A run folder was read.
     RunOpened(Box<opening::RunRead>),
     /// A job was started.
@@ -24,6 +28,10 @@ pub enum Done {
     Picked(PickFor, Option<PathBuf>),
     /// Files were saved, and the seconds that each of their paths took.
     Saved(Vec<PathBuf>, f64),
+    /// The run was written anew at another scale.
+    Rescaled(Box<rescaling::Rescaled>),
+    /// The run was written for other programs.
+    Exported(Box<crate::job::export::Exported>),
     /// The error of the photos was spread over the surface, for these maps.
     Layers(Arc<crate::material::MaterialMaps>, Box<crate::insight::surface_layers::SurfaceLayers>),
     /// The stage's view under every light of the shelf.

@@ -1,10 +1,12 @@
 //! What the window knows, without any widget.
 //!
 //! [`Model`] joins the parts: [`project`] is what is open, [`fit`] the job and [`advance`] how far it is, [`phase`] the one
-//! state that labels follow, [`known`] what the solver is sure of,
+//! state that labels follow, [`known`] what the solver is sure of, [`laid`] photos on the mesh and the cache that relights,
 //! [`edits`] what undo covers, [`lights`] the shelf, [`tasks`] work beside the window and [`done`] what it brings, [`log`]
 //! what was noticed, [`store`] what is remembered. [`opening`] and [`starting`] are how a folder becomes a project and a
-//! project a fit, [`viewing`] where the eye stands, [`dialogs`] what is asked in windows over the window. In object mode
+//! project a fit, [`viewing`] where the eye stands, [`dialogs`] what is asked in windows over the window, [`exporting`] a run on its way to
+//! other programs, [`importing`] a folder on its way to a scene, [`rescaling`] sets
+//! the scale by a known patch. In object mode
 //! [`object_form`] is what is asked for, [`object`] the estimation, [`estimating`] how one becomes the other, [`materials`]
 //! the library. Panels read the model and queue acts; they change nothing but [`Edits`] directly.
 
@@ -13,9 +15,12 @@ pub mod dialogs;
 pub mod done;
 pub mod edits;
 pub mod estimating;
+pub mod exporting;
 pub mod fit;
 pub mod framing;
+pub mod importing;
 pub mod known;
+pub mod laid;
 pub mod lights;
 pub mod log;
 pub mod materials;
@@ -24,6 +29,7 @@ pub mod object_form;
 pub mod opening;
 pub mod phase;
 pub mod project;
+pub mod rescaling;
 pub mod starting;
 pub mod store;
 pub mod tasks;
@@ -125,6 +131,10 @@ pub struct Model {
     pub tasks: Tasks<Done>,
     /// What was noticed.
     pub log: Log,
+    /// Where the run was exported to last.
+    pub exported: Option<PathBuf>,
+    /// Whether the card of a finished fit is shown.
+    pub card: bool,
     /// Whether the fit starts by itself once the scene is prepared.
     pub start_is_queued: bool,
     /// What is remembered.
@@ -197,6 +207,8 @@ impl Model {
             history,
             tasks: Tasks::new(Arc::clone(&wake)),
             log,
+            exported: None,
+            card: false,
             start_is_queued: false,
             preferences,
             store,
@@ -262,7 +274,9 @@ impl Model {
                 }
             }
         }
+        let was_live = self.fit.status.is_live();
         changed |= self.fit.poll(&mut self.log);
+        self.card |= was_live && self.fit.status == FitStatus::Finished;
         if let Some(ratio) = self.fit.advance.learned_ratio() {
             self.preferences.finishing_ratio = 0.5 * (self.preferences.finishing_ratio + ratio);
         }
@@ -277,6 +291,10 @@ impl Model {
             Done::SceneRead(read) => self.scene_was_read(*read),
             Done::SceneChecked(checked) => self.scene_was_checked(*checked),
             Done::Prepared(prepared) => self.scene_was_prepared(*prepared),
+            Done::Rescaled(rescaled) => self.run_was_rescaled(*rescaled),
+            Done::Exported(exported) => self.run_was_exported(*exported),
+            Done::PhotosLaid(laid) => self.photos_were_laid(*laid),
+            Done::TransportCached(cached) => self.transport_was_cached(*cached),
             Done::RunOpened(run) => self.run_was_opened(*run),
             Done::FitStarted(started) => self.fit_was_started(*started),
             Done::LightRead(light, noticed) => {
@@ -322,6 +340,10 @@ impl Model {
     /// The newest snapshot becomes what the panels show; whether it is another than before.
     pub fn take_snapshot(&mut self) -> bool {
         let (Some(project), Some(snapshot)) = (&mut self.project, &self.fit.snapshot) else { return false };
+        if snapshot.step == 0 && project.maps.is_none() {
+            // Start values are nothing that was found: the photos stay until there is something.
+            return false;
+        }
         let newer = project.environment.as_ref().is_none_or(|own| !Arc::ptr_eq(own, &snapshot.environment));
         if newer {
             project.maps = Some(Arc::clone(&snapshot.maps));

@@ -151,6 +151,7 @@ impl Model {
     pub fn close(&mut self) {
         self.tasks.stop_those_of_scene();
         self.start_is_queued = false;
+        (self.card, self.exported) = (false, None);
         self.log.scene_was_closed();
         self.fit.forget();
         self.project = None;
@@ -200,6 +201,7 @@ impl Model {
             true => self.prepare(),
             false => self.check(),
         }
+        self.lay_photos();
     }
 
     /// Checks the scene that was read, beside the window.
@@ -272,6 +274,8 @@ impl Model {
         }
         let findings: Vec<Finding> = self.project.as_ref().map_or(Vec::new(), |own| own.findings[known..].to_vec());
         self.note_findings(&findings);
+        self.lay_photos();
+        self.cache_transport();
         if std::mem::take(&mut self.start_is_queued) {
             self.start_fit();
         }
@@ -322,6 +326,8 @@ impl Model {
         if self.fit.report.is_none() {
             self.log.note("This run is unfinished: Start resumes it from its checkpoint");
         }
+        self.lay_photos();
+        self.cache_transport();
     }
 
     /// Before there is a fitted light the stage is lit by the first light of the shelf.

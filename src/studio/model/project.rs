@@ -1,6 +1,7 @@
 //! What is open: a scene, and the maps and light that belong to it.
 
 use super::known::Known;
+use super::laid::{CachedOf, LaidPhotos};
 use super::lights::LightName;
 use crate::atlas::{AtlasQuality, chart_borders};
 use crate::error::Finding;
@@ -66,6 +67,10 @@ pub struct Project {
     pub findings: Vec<Finding>,
     /// Time of each stage so far.
     pub timings: Vec<StageTime>,
+    /// The photos on the surface, once they are laid.
+    pub laid: Option<LaidPhotos>,
+    /// The cache that relights the surface, once it is traced.
+    pub transport: Option<Arc<CachedOf>>,
     /// The newest maps.
     pub maps: Option<Arc<MaterialMaps>>,
     /// The newest light of the run.

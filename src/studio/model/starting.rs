@@ -119,10 +119,12 @@ impl Model {
         for kind in [TaskKind::Residuals, TaskKind::NovelLighting, TaskKind::ContactSheet] {
             self.tasks.stop(&kind);
         }
+        let mut is_other_atlas = false;
         if let Some(project) = &mut self.project {
             if project.surface.as_ref().is_none_or(|own| !Arc::ptr_eq(own, &surface)) {
                 // The atlas was made anew for another size of the maps.
                 project.take_surface(surface);
+                is_other_atlas = true;
                 if !goes_on {
                     // What is known of texels is known of those of the atlas before.
                     (project.times_seen, project.coverage) = (None, None);
@@ -132,6 +134,10 @@ impl Model {
             project.settings.fit = settings.clone();
             project.entanglement = None;
             project.strip.clear();
+        }
+        if is_other_atlas {
+            self.lay_photos();
+            self.cache_transport();
         }
         if !goes_on {
             // Only now: a start that fails leaves the curve and the scores of the run before.

@@ -17,6 +17,10 @@ pub enum TaskKind {
     Checking,
     /// The UV atlas and the tracer of a scene that was checked.
     Preparing,
+    /// Projecting the photos of a scene onto its mesh.
+    LayingPhotos,
+    /// Tracing the transport that relights a surface.
+    CachingTransport,
     /// Starting or resuming a fit.
     Starting,
     /// Rendering every photo again for its residual.
@@ -27,6 +31,10 @@ pub enum TaskKind {
     ContactSheet,
     /// Rendering images to files.
     Saving,
+    /// Writing a run for other programs.
+    Exporting,
+    /// Writing a run at another scale.
+    Rescaling,
     /// Reading an environment.
     ReadingEnvironment(PathBuf),
     /// Reading a measured material.
@@ -52,11 +60,15 @@ impl TaskKind {
             TaskKind::Opening => "Opening".into(),
             TaskKind::Checking => "Checking".into(),
             TaskKind::Preparing => "Preparing".into(),
+            TaskKind::LayingPhotos => "Projecting photos".into(),
+            TaskKind::CachingTransport => "Caching light transport".into(),
             TaskKind::Starting => "Starting the fit".into(),
             TaskKind::Residuals => "Computing residuals".into(),
             TaskKind::NovelLighting => "Comparing under novel lighting".into(),
             TaskKind::ContactSheet => "Rendering the contact sheet".into(),
             TaskKind::Saving => "Rendering".into(),
+            TaskKind::Exporting => "Exporting".into(),
+            TaskKind::Rescaling => "Rescaling".into(),
             TaskKind::ReadingEnvironment(path) | TaskKind::ReadingMaterial(path) => {
                 format!("Reading {}", path.display())
             }
@@ -76,11 +88,15 @@ impl TaskKind {
             TaskKind::Opening
             | TaskKind::Checking
             | TaskKind::Preparing
+            | TaskKind::LayingPhotos
+            | TaskKind::CachingTransport
             | TaskKind::Starting
             | TaskKind::Residuals
             | TaskKind::NovelLighting
             | TaskKind::ContactSheet => true,
             TaskKind::Saving
+            | TaskKind::Exporting
+            | TaskKind::Rescaling
             | TaskKind::ReadingEnvironment(_)
             | TaskKind::ReadingMaterial(_)
             | TaskKind::Choosing
@@ -98,7 +114,10 @@ impl TaskKind {
             TaskKind::Opening
             | TaskKind::Checking
             | TaskKind::Preparing
+            | TaskKind::LayingPhotos
             | TaskKind::Starting
+            | TaskKind::Exporting
+            | TaskKind::Rescaling
             | TaskKind::ReadingEnvironment(_)
             | TaskKind::ReadingMaterial(_)
             | TaskKind::Choosing
@@ -106,6 +125,7 @@ impl TaskKind {
             | TaskKind::SavingResult
             | TaskKind::DrawingMaterial => true,
             TaskKind::Residuals
+            | TaskKind::CachingTransport
             | TaskKind::NovelLighting
             | TaskKind::ContactSheet
             | TaskKind::Saving

@@ -16,6 +16,8 @@ pub fn show(context: &Context, model: &mut Model) {
         Dialog::Help => "help",
         Dialog::Path { .. } => "path",
         Dialog::Save(_) => "save",
+        Dialog::Export(_) => "export",
+        Dialog::Import(_) => "import",
     };
     let mut next = dialog.clone();
     let modal = Modal::new(Id::unique(id)).show(context, |ui| match &mut next {
@@ -38,6 +40,16 @@ pub fn show(context: &Context, model: &mut Model) {
         }
         Dialog::Save(request) => {
             if save(ui, model, request) {
+                next = Dialog::None;
+            }
+        }
+        Dialog::Import(request) => {
+            if super::import::show(ui, model, request) {
+                next = Dialog::None;
+            }
+        }
+        Dialog::Export(request) => {
+            if super::export::show(ui, model, request) {
                 next = Dialog::None;
             }
         }

@@ -69,6 +69,7 @@ fn controls(ui: &mut Ui, model: &mut Model) {
             ui.label(phase.words());
         }
         Phase::Finished => {
+            act_button(ui, model, Act::Export);
             act_button(ui, model, Act::OpenReport);
             act_button(ui, model, Act::OpenRunFolder);
             act_button(ui, model, Act::SavePicture);

@@ -31,7 +31,11 @@ impl Map {
     const ALL: [(Map, &'static str, &'static str); 11] = [
         (Map::Diffuse, "Diffuse", "Diffuse reflectance, linear RGB"),
         (Map::Specular, "Specular", "Specular reflectance F0, linear RGB"),
-        (Map::Roughness, "Roughness", "r, the square of the microfacet width"),
+        (
+            Map::Roughness,
+            "Roughness",
+            "Perceptual roughness, as glTF, Blender and Unreal take it: the square root of the microfacet width",
+        ),
         (Map::TimesSeen, "View count", "How many photos see a texel; hatched: none"),
         (Map::PhotoError, "Residual", "Root mean square residual over the photos that see a texel"),
         (Map::Disagreement, "Inconsistency", "Variance over photos of the gradient by diffuse, in [0, 1]"),
@@ -45,7 +49,11 @@ impl Map {
             "Std. dev. (specular)",
             "Posterior standard deviation of specular, mean of the channels",
         ),
-        (Map::Told(Told::Roughness), "Std. dev. (roughness)", "Posterior standard deviation of roughness"),
+        (
+            Map::Told(Told::Roughness),
+            "Std. dev. (roughness)",
+            "Posterior standard deviation of r, the square of the microfacet width",
+        ),
         (
             Map::Told(Told::LobeSharing),
             "Lobe cluster size",
@@ -152,7 +160,11 @@ fn source(project: &Project, memory: &mut MapsMemory) -> Option<(Source, (usize,
                 None => match memory.map {
                     Map::Diffuse => Source::from(Arc::new(maps.diffuse.clone())),
                     Map::Specular => Source::from(Arc::new(maps.specular.clone())),
-                    _ => Source::numbers(Arc::new(maps.roughness.clone()), ValueScale::linear(0.0, 1.0)),
+                    _ => {
+                        // Stored as the square of the width.
+                        let perceptual = maps.roughness.map(|roughness| roughness.max(0.0).sqrt().sqrt());
+                        Source::numbers(Arc::new(perceptual), ValueScale::linear(0.0, 1.0))
+                    }
                 },
             };
             memory.copied = Some((Arc::clone(maps), memory.map, source.clone()));

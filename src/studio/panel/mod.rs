@@ -4,11 +4,14 @@
 //! Every panel has an empty state that says what would fill it.
 
 pub mod banner;
+pub mod card;
 pub mod curves;
 pub mod dialog;
+pub mod export;
 pub mod fit;
 pub mod form;
 pub mod guide;
+pub mod import;
 pub mod light;
 pub mod light_known;
 pub mod maps;

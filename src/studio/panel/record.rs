@@ -25,6 +25,17 @@ pub struct RecordMemory {
     pending: Option<(Question, Receiver<TexelRecord>)>,
     /// A question whose thread fell: it is not asked again.
     failed: Option<Question>,
+    /// What the pinned patch is known to reflect.
+    known_grey: KnownGrey,
+}
+
+/// A reflectance in (0, 1]; that of a grey card at first.
+struct KnownGrey(f32);
+
+impl Default for KnownGrey {
+    fn default() -> Self {
+        KnownGrey(0.18)
+    }
 }
 
 /// The texel that is asked about, and a number that changes with whatever the answer depends on.
@@ -63,7 +74,10 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut RecordMemory) {
         let place = place_of(&cursor);
         // What another texel said is not shown for this one; older maps stand until the new ones were asked.
         match memory.record.as_ref().filter(|(own, _)| own.place == place) {
-            Some((_, record)) => body(ui, model, record),
+            Some((_, record)) => {
+                body(ui, model, record);
+                scale(ui, model, &cursor, &mut memory.known_grey.0);
+            }
             None if !cursor.pinned => {
                 ui.label("Click the surface to list the observations of every photo");
             }
@@ -144,6 +158,11 @@ fn ask(ui: &Ui, model: &Model, cursor: &Cursor, memory: &mut RecordMemory) {
     }
 }
 
+/// Perceptual roughness of a map's `r = a^2`: the square root of the microfacet width.
+fn perceptual(roughness: f32) -> f32 {
+    roughness.max(0.0).sqrt().sqrt()
+}
+
 /// In place of a figure that only photos tell.
 const UNSEEN: &str = "no photo sees it";
 
@@ -164,7 +183,13 @@ fn body(ui: &mut Ui, model: &mut Model, record: &TexelRecord) {
         };
         line("Diffuse", rgb(record.diffuse), "Diffuse reflectance, linear");
         line("Specular", rgb(record.specular), "Specular reflectance F0, linear");
-        line("Roughness", format!("{:.4}", record.roughness), "r, the square of the microfacet width");
+        let help = format!(
+            "Perceptual roughness, as glTF, Blender and Unreal take it: the square root of the microfacet width. That width is \
+             a = {:.4}; redner's r = a² is {:.4}",
+            record.roughness.max(0.0).sqrt(),
+            record.roughness
+        );
+        line("Roughness", format!("{:.4}", perceptual(record.roughness)), &help);
         for (name, value, help) in uncertainty {
             line(name, value, help);
         }
@@ -210,13 +235,34 @@ fn body(ui: &mut Ui, model: &mut Model, record: &TexelRecord) {
     });
 }
 
+/// Sets the scale that photos leave open by what the pinned patch is known to reflect.
+fn scale(ui: &mut Ui, model: &mut Model, cursor: &Cursor, grey: &mut f32) {
+    heading(ui, "Scale");
+    ui.horizontal(|ui| {
+        let label = ui.label("This patch reflects");
+        let field = egui::DragValue::new(grey).speed(0.005).range(0.01..=1.0).max_decimals(3);
+        ui.add(field).labelled_by(label.id).on_hover_text("Diffuse reflectance: 0.18 is a grey card, 0.9 white paper");
+        let can = model.can_rescale();
+        let button = ui.add_enabled(can, egui::Button::new("Rescale"));
+        let help =
+            "Write a copy of the run in which it does, with the environment scaled against it; photos leave this open";
+        if button.on_hover_text(help).on_disabled_hover_text("Available when a fit is finished").clicked() {
+            model.rescale(cursor.uv, *grey);
+        }
+    });
+}
+
 /// What the solver tells of a texel, as lines; none under Adam.
 fn uncertainty(model: &Model, (row, column): (usize, usize)) -> Vec<(&'static str, String, &'static str)> {
     let Some(project) = &model.project else { return Vec::new() };
     let named = [
         (Told::Diffuse, "Std. dev. (diffuse)", "Posterior standard deviation, mean of the channels"),
         (Told::Specular, "Std. dev. (specular)", "Posterior standard deviation, mean of the channels"),
-        (Told::Roughness, "Std. dev. (roughness)", "Posterior standard deviation"),
+        (
+            Told::Roughness,
+            "Std. dev. (roughness)",
+            "Posterior standard deviation of r, the square of the microfacet width",
+        ),
         (Told::LobeSharing, "Lobe cluster size", "Number of texels that share this texel's specular lobe"),
         (
             Told::Choice,
@@ -265,6 +311,11 @@ fn pull(ui: &mut Ui, residual: Vec3, largest: f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn roughness_is_told_as_other_programs_take_it() {
+        assert!((perceptual(0.0625) - 0.5).abs() < 1e-6 && perceptual(-1.0) == 0.0);
+    }
 
     #[test]
     fn a_figure_that_is_none_says_why() {

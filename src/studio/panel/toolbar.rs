@@ -84,6 +84,7 @@ fn start(ui: &mut Ui, model: &mut Model) {
 }
 
 fn layers(ui: &mut Ui, model: &mut Model) {
+    act_switch(ui, model, Act::LayerPhotos, "Projected", model.edits.layer == Layer::Photos);
     for (act, layer) in [
         (Act::LayerLit, Layer::Lit),
         (Act::LayerDiffuse, Layer::Diffuse),

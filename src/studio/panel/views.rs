@@ -2,10 +2,13 @@
 
 use super::{act_button_named, empty};
 use crate::fit::ViewUse;
+use crate::image::RgbImage;
+use crate::image::display::DisplaySettings;
 use crate::studio::act::Act;
 use crate::studio::model::Model;
 use crate::studio::theme;
-use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui, vec2};
+use egui::{Align, Layout, RichText, ScrollArea, Sense, TextureHandle, Ui, vec2};
+use std::sync::Arc;
 
 /// Size of the table's letters: many rows are to be seen at once.
 const TEXT_POINTS: f32 = 11.5;
@@ -14,8 +17,12 @@ const CONSPICUOUS: f32 = 1.4;
 /// Points between two columns.
 const GAP: f32 = 6.0;
 
+/// The small picture of the photo under the mouse.
+type Hovered = (Arc<RgbImage>, DisplaySettings, TextureHandle);
+
 /// What the panel keeps.
 pub struct ViewsMemory {
+    hovered: Option<Hovered>,
     sorted_by: Column,
     descending: bool,
     last_chosen: usize,
@@ -23,7 +30,7 @@ pub struct ViewsMemory {
 
 impl Default for ViewsMemory {
     fn default() -> Self {
-        ViewsMemory { sorted_by: Column::Name, descending: false, last_chosen: usize::MAX }
+        ViewsMemory { hovered: None, sorted_by: Column::Name, descending: false, last_chosen: usize::MAX }
     }
 }
 
@@ -108,7 +115,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ViewsMemory) {
     let usual = crate::math::statistics::quantile(&errors, 0.5) as f32;
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         for row in &rows {
-            line(ui, model, row, row.index == chosen, usual, scroll);
+            line(ui, model, row, row.index == chosen, (usual, scroll), &mut memory.hovered);
         }
     });
 }
@@ -190,7 +197,14 @@ fn header(ui: &mut Ui, memory: &mut ViewsMemory) {
     ui.separator();
 }
 
-fn line(ui: &mut Ui, model: &mut Model, row: &Row, chosen: bool, usual: f32, scroll: bool) {
+fn line(
+    ui: &mut Ui,
+    model: &mut Model,
+    row: &Row,
+    chosen: bool,
+    (usual, scroll): (f32, bool),
+    hovered: &mut Option<Hovered>,
+) {
     let colours = theme::palette(ui.visuals());
     let width: f32 = Column::ALL.iter().map(|(_, _, width, _)| width + GAP).sum();
     let (rect, response) = ui.allocate_exact_size(vec2(width.max(ui.available_width()), 20.0), Sense::click());
@@ -234,7 +248,31 @@ fn line(ui: &mut Ui, model: &mut Model, row: &Row, chosen: bool, usual: f32, scr
     if response.double_clicked() && !model.switches.looking_through {
         model.act(Act::LookThrough);
     }
-    response.on_hover_text(format!("{}\nClick to choose, double-click for its camera view", row.name));
+    let small = model.project.as_ref().and_then(|project| project.thumbnails.get(row.index)).cloned();
+    let display = model.edits.display;
+    response.on_hover_ui(|ui| {
+        if let Some(small) = small {
+            let texture = texture_of(ui, &small, &display, hovered);
+            ui.image((texture.id(), texture.size_vec2()));
+        }
+        ui.label(format!("{}\nClick to choose, double-click for its camera view", row.name));
+    });
+}
+
+/// The small picture as the display shows it, made once.
+fn texture_of(
+    ui: &Ui,
+    small: &Arc<RgbImage>,
+    display: &DisplaySettings,
+    hovered: &mut Option<Hovered>,
+) -> TextureHandle {
+    let known = hovered.take().filter(|(own, shown, _)| Arc::ptr_eq(own, small) && shown == display);
+    let made = known.unwrap_or_else(|| {
+        let image = super::relight::colour_image(small, display);
+        let texture = ui.ctx().load_texture("photo under the mouse", image, egui::TextureOptions::LINEAR);
+        (Arc::clone(small), *display, texture)
+    });
+    hovered.insert(made).2.clone()
 }
 
 #[cfg(test)]
@@ -253,7 +291,7 @@ mod tests {
         };
         let rows = vec![row(0, Some(0.1)), row(1, None), row(2, Some(0.3))];
         let order = |descending| {
-            let memory = ViewsMemory { sorted_by: Column::Error, descending, last_chosen: 0 };
+            let memory = ViewsMemory { hovered: None, sorted_by: Column::Error, descending, last_chosen: 0 };
             sorted(rows.clone(), &memory).iter().map(|row| row.index).collect::<Vec<_>>()
         };
         assert_eq!(order(false), [0, 2, 1]);

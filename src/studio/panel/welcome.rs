@@ -65,6 +65,10 @@ fn page(ui: &mut Ui, model: &mut Model, memory: &mut WelcomeMemory) {
         if ui.add(open).on_hover_text("A scene folder or a run folder").clicked() {
             model.pick(PickFor::Open);
         }
+        let import = Button::new(RichText::new("Import…").size(16.0)).min_size(vec2(110.0, 40.0));
+        if ui.add(import).on_hover_text(Act::Import.info().help).clicked() {
+            model.act(Act::Import);
+        }
         ui.label(RichText::new("or drop one here").weak());
     });
     ui.add_space(6.0);

@@ -23,7 +23,7 @@ pub enum Layer {
     Diffuse,
     /// The specular map.
     Specular,
-    /// The roughness map, as grey.
+    /// Perceptual roughness, the square root of the microfacet width, as grey.
     Roughness,
     /// Shading normals of the world, `0.5 n + 0.5`.
     Normal,
@@ -47,11 +47,13 @@ pub enum Layer {
     Choice,
     /// A checker of texture coordinates.
     Uv,
+    /// The photos, laid on the surface: colours of vertices where the content has them, else its diffuse map as radiance.
+    Photos,
 }
 
 impl Layer {
     /// All layers with their names on screen.
-    pub const NAMED: [(Layer, &str); 15] = [
+    pub const NAMED: [(Layer, &str); 16] = [
         (Layer::Lit, "Shaded"),
         (Layer::Diffuse, "Diffuse"),
         (Layer::Specular, "Specular"),
@@ -67,6 +69,7 @@ impl Layer {
         (Layer::LobeSharing, "Lobe cluster size"),
         (Layer::Choice, "Lobe model"),
         (Layer::Uv, "UV coordinates"),
+        (Layer::Photos, "Projected photos"),
     ];
 
     /// Whether the layer shows [`StageContent::quantity`] by the colour scale.
@@ -151,6 +154,8 @@ pub struct StageContent {
     pub maps: Option<Arc<MaterialMaps>>,
     /// Texels of the maps inside a chart. Where known, the filters of the textures do not mix in what is outside.
     pub covered: Option<Arc<Image<bool>>>,
+    /// Linear colours of the mesh's vertices times their weights, and the weights in [0, 1]; for [`Layer::Photos`].
+    pub vertex_colours: Option<Arc<Vec<[f32; 4]>>>,
     /// Strength of the specular lobe in [0, 1]; 0 for maps without one.
     pub lobe_strength: f32,
     /// The light; black without.
@@ -175,6 +180,7 @@ impl Default for StageContent {
             mesh: None,
             maps: None,
             covered: None,
+            vertex_colours: None,
             lobe_strength: 1.0,
             light: None,
             other_light: None,

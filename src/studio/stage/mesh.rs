@@ -7,6 +7,7 @@ use crate::error::{Finding, Severity};
 use crate::scene::Mesh;
 use eframe::wgpu;
 use glam::Vec3;
+use half::f16;
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -29,8 +30,9 @@ pub(super) struct GpuMesh {
 }
 
 impl GpuMesh {
-    /// Checks and uploads a mesh. Normals are made where it has none; without texture coordinates all are 0.
-    pub fn new(maker: &Maker, mesh: &Mesh) -> Self {
+    /// Checks and uploads a mesh. Normals are made where it has none; without texture coordinates all are 0. `colours` are
+    /// those of its vertices, times their weights; none without.
+    pub fn new(maker: &Maker, mesh: &Mesh, colours: Option<&[[f32; 4]]>) -> Self {
         let refused = |code, message: String, remedy: &str| GpuMesh {
             buffers: None,
             coarse: None,
@@ -65,6 +67,10 @@ impl GpuMesh {
             position: mesh.positions[index].to_array(),
             normal: mesh.normals[index].to_array(),
             uv: mesh.uvs.get(index).copied().unwrap_or_default().to_array(),
+            colour: colours.and_then(|colours| colours.get(index)).copied().unwrap_or_default().map(|value| {
+                // Beyond it half precision has no number.
+                f16::from_f32(value.clamp(0.0, 65504.0))
+            }),
         };
         let corners: Vec<MeshCorner> =
             (0..mesh.positions.len()).into_par_iter().with_min_len(4096).map(corner).collect();

@@ -27,6 +27,8 @@ pub(super) struct MeshCorner {
     pub normal: [f32; 3],
     /// Texture coordinate, v up.
     pub uv: [f32; 2],
+    /// Linear colour times its weight, and the weight, in half precision.
+    pub colour: [half::f16; 4],
 }
 
 /// Everything that is made once.
@@ -224,7 +226,9 @@ impl Pipelines {
                 buffer: Some(wgpu::VertexBufferLayout {
                     array_stride: size_of::<MeshCorner>() as u64,
                     step_mode: wgpu::VertexStepMode::Vertex,
-                    attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x2],
+                    attributes: &wgpu::vertex_attr_array![
+                        0 => Float32x3, 1 => Float32x3, 2 => Float32x2, 3 => Float16x4
+                    ],
                 }),
                 format: RADIANCE_FORMAT,
                 blend: None,

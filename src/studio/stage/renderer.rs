@@ -42,6 +42,7 @@ pub struct StageStatus {
     pub findings: Vec<Finding>,
 }
 
+type MeshKey = (Arc<Mesh>, Option<Arc<Vec<[f32; 4]>>>);
 type MapsKey = (Arc<MaterialMaps>, Option<Arc<Image<bool>>>);
 
 /// A light on the graphics adapter.
@@ -83,7 +84,7 @@ pub(super) struct StageRenderer {
     screen_buffer: wgpu::Buffer,
     missing: Missing,
     reflectance: GpuTexture,
-    mesh: Slot<Arc<Mesh>, GpuMesh>,
+    mesh: Slot<MeshKey, GpuMesh>,
     maps: Slot<MapsKey, (GpuTexture, GpuTexture, Vec<Finding>)>,
     quantity: Slot<Arc<GreyImage>, GpuTexture>,
     lights: [Slot<Arc<Environment>, GpuLight>; 2],
@@ -206,8 +207,10 @@ impl StageRenderer {
 
         let maker = self.maker.clone();
         let triangles = content.mesh.as_ref().map_or(0, |mesh| mesh.triangles.len());
-        let mut changed =
-            self.mesh.follow(content.mesh.clone(), speed(triangles), move |mesh| GpuMesh::new(&maker, mesh));
+        let key = content.mesh.clone().map(|mesh| (mesh, content.vertex_colours.clone()));
+        let mut changed = self.mesh.follow(key, speed(triangles), move |(mesh, colours)| {
+            GpuMesh::new(&maker, mesh, colours.as_deref().map(Vec::as_slice))
+        });
 
         let maker = self.maker.clone();
         let texels = content.maps.as_ref().map_or(0, |maps| pixels(&maps.diffuse));

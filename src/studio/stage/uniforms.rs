@@ -102,7 +102,7 @@ impl ViewUniform {
                 Backdrop::Light => Vec4::ZERO,
                 Backdrop::Colour(colour) => vec3_of(colour).extend(0.0),
             },
-            choice: UVec4::new(look.layer as u32, 0, 0, 0),
+            choice: UVec4::new(look.layer as u32, u32::from(content.vertex_colours.is_some()), 0, 0),
         }
     }
 }

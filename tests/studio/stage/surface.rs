@@ -68,9 +68,11 @@ fn maps_and_normals_are_shown_as_they_are() {
     let light = Environment::constant(16, 8, Vec3::ONE);
     let mut window = window(SIZE, sphere_frame(one_material(diffuse, specular, roughness), light));
     let display = DisplaySettings::default();
-    for (layer, value) in
-        [(Layer::Diffuse, diffuse), (Layer::Specular, specular), (Layer::Roughness, Vec3::splat(roughness))]
-    {
+    for (layer, value) in [
+        (Layer::Diffuse, diffuse),
+        (Layer::Specular, specular),
+        (Layer::Roughness, Vec3::splat(roughness.sqrt().sqrt())),
+    ] {
         for stops in [0.0, -3.0] {
             let picture = pixels(&mut window, |frame| {
                 (frame.look.layer, frame.look.display.exposure_stops) = (layer, stops);
@@ -161,12 +163,37 @@ fn quantities_are_on_the_colour_scale_and_unknown_texels_grey() {
     frame.content.quantity = Some(StageQuantity { texels: Arc::new(texels), range: [1.0, 5.0] });
     let mut window = window(SIZE, frame);
     let bytes = |value: f32| (scale_colour(value) * 255.0).round().to_array().map(|value| value as u8);
-    for layer in [Layer::PhotoError, Layer::Coverage, Layer::TimesSeen, Layer::Disagreement] {
+    for (layer, _) in Layer::NAMED.into_iter().filter(|(layer, _)| layer.is_quantity()) {
         let picture = pixels(&mut window, |frame| frame.look.layer = layer);
         assert_colour(picture[(60, 80)], bytes(0.5), 2, "in the middle of the range");
         assert_colour(picture[(85, 80)], bytes(1.0), 2, "beyond the range");
         assert_colour(picture[(35, 80)], [102; 3], 2, "unknown");
     }
+}
+
+#[test]
+fn photos_are_colours_of_vertices_or_of_texels_and_follow_the_exposure() {
+    if !has_adapter() {
+        return;
+    }
+    let radiance = Vec3::new(0.5, 0.25, 1.0);
+    let mut frame = sphere_frame(one_material(radiance, Vec3::ZERO, 1.0), Environment::constant(16, 8, Vec3::ZERO));
+    (frame.look.display, frame.look.layer) = (LINEAR, Layer::Photos);
+    let vertices = frame.content.mesh.as_ref().unwrap().positions.len();
+    let mut window = window(SIZE, frame);
+    let picture = pixels(&mut window, |_| {});
+    assert_colour(picture[(60, 80)], LINEAR.bytes(radiance, 60, 80), 2, "texels");
+    let brighter = DisplaySettings { exposure_stops: -1.0, ..LINEAR };
+    let picture = pixels(&mut window, |frame| frame.look.display = brighter);
+    assert_colour(picture[(60, 80)], brighter.bytes(radiance, 60, 80), 2, "texels, darker");
+    let green = Arc::new(vec![[0.0, 0.75, 0.0, 1.0]; vertices]);
+    let picture = pixels(&mut window, |frame| {
+        (frame.look.display, frame.content.vertex_colours) = (LINEAR, Some(green));
+    });
+    assert_colour(picture[(60, 80)], LINEAR.bytes(Vec3::new(0.0, 0.75, 0.0), 60, 80), 2, "vertices");
+    let unseen = Arc::new(vec![[0.0; 4]; vertices]);
+    let picture = pixels(&mut window, |frame| frame.content.vertex_colours = Some(unseen));
+    assert_colour(picture[(60, 80)], [102; 3], 2, "what no photo sees is grey");
 }
 
 #[test]

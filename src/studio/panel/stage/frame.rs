@@ -61,7 +61,11 @@ impl FrameCache {
             PhotoLook::Wipe(share) => PhotoMode::Wipe(share),
         };
         let cameras = if model.switches.frustums && !through { self.cameras(model, project) } else { Arc::default() };
-        let lit = model.edits.layer == Layer::Lit;
+        let layer = model.shown_layer();
+        let lit = layer == Layer::Lit;
+        let laid = project.laid.as_ref().filter(|_| layer == Layer::Photos);
+        let on_texels = laid.and_then(|laid| laid.texels.clone());
+        let on_vertices = laid.filter(|_| on_texels.is_none());
         let backdrop = match lit && relight.as_background {
             true => Backdrop::Light,
             false => Backdrop::Colour(colours.stage),
@@ -69,20 +73,25 @@ impl FrameCache {
         StageFrame {
             eye,
             content: StageContent {
-                mesh: Some(Arc::clone(&project.mesh)),
-                maps: project.maps.clone(),
-                covered: self.covered(project),
+                // Until the atlas has colours of its own, those of the mesh before it stand.
+                mesh: Some(Arc::clone(on_vertices.map_or(&project.mesh, |laid| &laid.mesh))),
+                maps: on_texels.as_ref().map(|(maps, _)| Arc::clone(maps)).or_else(|| project.maps.clone()),
+                covered: match &on_texels {
+                    Some((_, seen)) => Some(Arc::clone(seen)),
+                    None => self.covered(project),
+                },
+                vertex_colours: on_vertices.and_then(|laid| laid.vertices.clone()),
                 lobe_strength: if model.edits.fit.has_lobe() { 1.0 } else { 0.0 },
                 light: first,
                 other_light: second,
-                quantity: quantity(project, model.edits.layer),
+                quantity: quantity(project, layer),
                 photo: (photo_mode != PhotoMode::Off).then(|| self.photo(project)).flatten(),
                 traced: None,
                 frustum_depth: frustum_depth(&cameras, project.mesh.bounds()),
                 cameras,
             },
             look: StageLook {
-                layer: model.edits.layer,
+                layer,
                 display: model.edits.display,
                 photo_mode,
                 light_wipe: (lit && relight.second.is_some()).then_some(relight.wipe),

@@ -1,23 +1,27 @@
 //! The stage panel: what is drawn from the model, and what the mouse does to it.
 
 mod frame;
+mod relit;
 mod traced;
 
 use crate::error::Finding;
-use crate::image::value_scale::three_digits;
+use crate::image::value_scale::{Palette, ValueScale, three_digits};
 use crate::insight::cursor::place_in_view;
 use crate::studio::act::Act;
 use crate::studio::layout::Panel;
 use crate::studio::model::edits::PhotoLook;
+use crate::studio::model::laid::CachedOf;
 use crate::studio::model::log::{Message, capitalised};
 use crate::studio::model::tasks::TaskKind;
 use crate::studio::model::{Cursor, FitStatus, Model};
+use crate::studio::picture::scale_bar::scale_bar;
 use crate::studio::stage::eye::Eye;
 use crate::studio::stage::{self, Layer, Stage, StageFrame};
 use crate::studio::theme;
 use egui::{Align2, Color32, CursorIcon, FontId, Pos2, Rect, Response, Stroke, StrokeKind, Ui, pos2, vec2};
 use frame::FrameCache;
 use glam::Vec2;
+use relit::Relit;
 use std::time::Instant;
 use traced::Traced;
 
@@ -30,6 +34,7 @@ pub struct StageMemory {
     pub rect: Option<Rect>,
     cache: FrameCache,
     traced: Traced,
+    relit: Relit,
     dragging: Option<Dragging>,
     last_moved: Option<Instant>,
     last_eye: Option<Eye>,
@@ -54,6 +59,9 @@ enum Dragging {
 const SETTLED_SECONDS: f32 = 0.15;
 /// Points within which a line is taken by the mouse.
 const GRIP: f32 = 6.0;
+/// Samples a pixel from which a path-traced picture is shown in place of one that was relit from the cache: below, its
+/// noise is larger than what the cache errs.
+const ENOUGH_SAMPLES: usize = 64;
 /// Degrees by which a drag over a point turns the light.
 const DEGREES_PER_POINT: f32 = 0.4;
 
@@ -78,7 +86,17 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut StageMemory) {
         frame.look.resolution_scale = 0.5;
     }
     let size = ui.available_size();
-    let traced = memory.traced.update(ui, model, &frame, size, settled);
+    let mut traced = memory.traced.update(ui, model, &frame, size, settled);
+    if let Some(relit) = memory.relit.update(ui, model, &frame, size, settled) {
+        match &traced.picture {
+            Some(picture) if traced.is_done && relit.is_current => memory.relit.compare(&relit.picture, picture),
+            _ => {}
+        }
+        if traced.picture.is_none() || traced.samples < ENOUGH_SAMPLES {
+            let still = if traced.caption.is_empty() { String::new() } else { format!(" · {}", traced.caption) };
+            (traced.picture, traced.caption) = (Some(relit.picture), relit.caption + &still);
+        }
+    }
     frame.content.traced = traced.picture;
     let Some(stage) = &memory.stage else {
         return super::empty(ui, "No 3-D rendering available", "Maps, curves, photos and renders still work");
@@ -93,6 +111,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut StageMemory) {
     let response = response.on_hover_cursor(CursorIcon::Crosshair);
     interact(ui, model, memory, &frame, &response);
     decorate(ui, model, &frame, response.rect, &traced.caption);
+    colour_bar(ui, &frame, response.rect);
 }
 
 fn place_in(rect: Rect, at: Pos2) -> Vec2 {
@@ -232,10 +251,11 @@ fn decorate(ui: &mut Ui, model: &Model, frame: &StageFrame, rect: Rect, traced: 
         painter.rect_filled(text_rect.expand(4.0), 4.0, Color32::from_black_alpha(140));
         painter.galley(text_rect.min, galley, Color32::WHITE);
     };
-    let name = Layer::NAMED.iter().find(|(layer, _)| *layer == model.edits.layer).map_or("", |(_, name)| name);
-    let lit = model.edits.layer == Layer::Lit;
+    let shown = model.shown_layer();
+    let name = Layer::NAMED.iter().find(|(layer, _)| *layer == shown).map_or("", |(_, name)| name);
+    let lit = shown == Layer::Lit;
     let relight = &model.edits.relight;
-    let told = frame::told_by(model.edits.layer);
+    let told = frame::told_by(shown);
     caption(
         Align2::LEFT_TOP,
         &match told.and_then(|what| model.project.as_ref()?.known.layer(what)) {
@@ -263,14 +283,22 @@ fn decorate(ui: &mut Ui, model: &Model, frame: &StageFrame, rect: Rect, traced: 
     let quick = lit && frame.content.traced.is_none();
     let clay = model.project.as_ref().is_some_and(|project| project.maps.is_none());
     let is_untold = told.is_some_and(|what| !model.project.as_ref().is_some_and(|own| own.known.has(what)));
-    let is_measured = model.edits.layer.is_quantity() && told.is_none();
+    let is_measured = shown.is_quantity() && told.is_none();
     let right = match (quick, clay) {
         _ if is_untold => model.why_untold(),
         _ if is_measured && frame.content.quantity.is_none() => match model.tasks.is_running(&TaskKind::Residuals) {
             true => "Computing residuals…",
             false => "Not computed: View › Compute residuals",
         },
-        (_, true) if lit => "No materials yet. Press Start.",
+        _ if shown == Layer::Photos && model.project.as_ref().is_some_and(|own| own.laid.is_none()) => {
+            "Projecting photos…"
+        }
+        (_, true) if shown == Layer::Photos && model.fit.status.is_live() => {
+            "The mean of the photos · materials are on their way"
+        }
+        (_, true) if lit || shown == Layer::Photos => "No materials yet. Press Start.",
+        // Also while a fit runs.
+        _ if lit && !traced.is_empty() => traced,
         (true, _) if matches!(model.fit.status, FitStatus::Running | FitStatus::Pausing) => {
             "Raster preview (no shadows) · pause for path tracing"
         }
@@ -288,6 +316,42 @@ fn decorate(ui: &mut Ui, model: &Model, frame: &StageFrame, rect: Rect, traced: 
     }
     let border = ui.visuals().widgets.noninteractive.bg_stroke;
     painter.rect_stroke(rect, 0.0, border, StrokeKind::Inside);
+}
+
+/// The colours of the quantity that is shown, with their values and unit, at the lower left of the stage.
+fn colour_bar(ui: &mut Ui, frame: &StageFrame, rect: Rect) {
+    let layer = frame.look.layer;
+    let (Some(quantity), true) = (&frame.content.quantity, layer.is_quantity()) else { return };
+    let Some((name, unit)) = unit_of(layer) else { return };
+    let logarithmic = layer == Layer::LobeSharing;
+    let [low, high] = if logarithmic { quantity.range.map(f32::exp2) } else { quantity.range };
+    let width = (0.45 * rect.width()).clamp(120.0, 360.0);
+    let place = Rect::from_min_size(pos2(rect.min.x + 10.0, rect.max.y - 62.0), vec2(width, 32.0));
+    if !rect.contains_rect(place) {
+        return;
+    }
+    ui.painter().rect_filled(place.expand(6.0), 4.0, ui.visuals().panel_fill.gamma_multiply(0.85));
+    ui.scope_builder(egui::UiBuilder::new().max_rect(place), |ui| {
+        let scale = ValueScale { low, high, logarithmic };
+        scale_bar(ui, &format!("{name}, colour scale"), &scale, Palette::Scale, unit);
+    });
+}
+
+/// Name of a quantity, and its unit; `None` for layers of colours.
+fn unit_of(layer: Layer) -> Option<(&'static str, &'static str)> {
+    let name = Layer::NAMED.iter().find(|(own, _)| *own == layer)?.1;
+    let unit = match layer {
+        Layer::PhotoError => "linear radiance",
+        Layer::Coverage => "share of the photos",
+        Layer::TimesSeen => "photos",
+        Layer::Disagreement => "0 to 1",
+        Layer::DiffuseDeviation | Layer::SpecularDeviation => "reflectance",
+        Layer::RoughnessDeviation => "r = a²",
+        Layer::LobeSharing => "texels",
+        Layer::Choice => "1 none, 2 shared, 3 own",
+        _ => return None,
+    };
+    Some((name, unit))
 }
 
 /// The grip of a line that can be dragged.

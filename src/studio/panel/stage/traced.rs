@@ -1,6 +1,6 @@
 //! The path-traced preview: asked for when nothing moves, shown as long as it is of what is on the stage.
 
-use crate::image::{Image, RgbImage};
+use crate::image::RgbImage;
 use crate::job::preview::{Preview, PreviewRequest};
 use crate::material::MaterialMaps;
 use crate::render::Parameters;
@@ -41,6 +41,10 @@ pub struct TracedPicture {
     pub picture: Option<Arc<RgbImage>>,
     /// What to say about it.
     pub caption: String,
+    /// Samples a pixel; 0 for a picture that was drawn smaller.
+    pub samples: usize,
+    /// Whether it has come to rest.
+    pub is_done: bool,
 }
 
 impl Traced {
@@ -65,7 +69,7 @@ impl Traced {
         }
         let wanted = model.switches.traced
             && !self.failed
-            && model.edits.layer == Layer::Lit
+            && model.shown_layer() == Layer::Lit
             && matches!(
                 model.fit.status,
                 FitStatus::Idle | FitStatus::Paused | FitStatus::Stopped | FitStatus::Finished
@@ -75,10 +79,7 @@ impl Traced {
             self.cancel();
             return TracedPicture::default();
         };
-        let pixels_per_point = ui.ctx().pixels_per_point();
-        let full = size * pixels_per_point;
-        let scale = (MOST_PIXELS / (full.x * full.y).max(1.0)).sqrt().min(1.0);
-        let (width, height) = ((full.x * scale) as usize, (full.y * scale) as usize);
+        let (width, height) = size_of_picture(ui, size);
         let names = [Some(model.edits.relight.first.clone()), model.edits.relight.second.clone()];
         for (side, name) in names.iter().enumerate() {
             match name {
@@ -161,16 +162,22 @@ impl Traced {
     fn shown(&mut self, wipe: Option<f32>) -> TracedPicture {
         let side = |place: usize| self.sides[place].as_ref().and_then(|own| own.picture.clone());
         let Some((first, samples)) = side(0) else {
-            return TracedPicture { caption: "Path tracing…".into(), picture: None };
+            return TracedPicture { caption: "Path tracing…".into(), ..TracedPicture::default() };
         };
         let caption = |samples: usize| match samples {
             0 => "Path tracing…".to_owned(),
             SAMPLES => format!("Path traced · {SAMPLES} spp"),
             _ => format!("Path traced · {samples}/{SAMPLES} spp"),
         };
-        let Some(wipe) = wipe else { return TracedPicture { picture: Some(first), caption: caption(samples) } };
+        let told = |picture, samples| TracedPicture {
+            picture,
+            caption: caption(samples),
+            samples,
+            is_done: samples >= SAMPLES,
+        };
+        let Some(wipe) = wipe else { return told(Some(first), samples) };
         let Some((second, other_samples)) = side(1) else {
-            return TracedPicture { caption: caption(0), picture: None };
+            return told(None, 0);
         };
         if (first.width(), first.height()) != (second.width(), second.height()) {
             return TracedPicture::default();
@@ -179,14 +186,10 @@ impl Traced {
         (Arc::as_ptr(&first) as usize, Arc::as_ptr(&second) as usize, wipe.to_bits()).hash(&mut hasher);
         let key = hasher.finish();
         if self.joined.as_ref().is_none_or(|(own, _)| *own != key) {
-            let border = (wipe * first.width() as f32) as usize;
-            let joined = Image::from_fn(first.width(), first.height(), |row, column| {
-                if column < border { first[(row, column)] } else { second[(row, column)] }
-            });
-            self.joined = Some((key, Arc::new(joined)));
+            self.joined = Some((key, Arc::new(super::relit::side_by_side(&first, &second, wipe))));
         }
         let picture = self.joined.as_ref().map(|(_, picture)| Arc::clone(picture));
-        TracedPicture { picture, caption: caption(samples.min(other_samples)) }
+        told(picture, samples.min(other_samples))
     }
 
     fn cancel(&mut self) {
@@ -199,8 +202,21 @@ impl Traced {
     }
 }
 
+/// Width and height in pixels of a picture of the stage; a large stage is drawn coarser.
+pub(super) fn size_of_picture(ui: &Ui, size: Vec2) -> (usize, usize) {
+    let full = size * ui.ctx().pixels_per_point();
+    let scale = (MOST_PIXELS / (full.x * full.y).max(1.0)).sqrt().min(1.0);
+    ((full.x * scale) as usize, (full.y * scale) as usize)
+}
+
 /// A number that changes whenever the picture would.
-fn key_of(model: &Model, frame: &StageFrame, name: &LightName, maps: &Arc<MaterialMaps>, size: (usize, usize)) -> u64 {
+pub(super) fn key_of(
+    model: &Model,
+    frame: &StageFrame,
+    name: &LightName,
+    maps: &Arc<MaterialMaps>,
+    size: (usize, usize),
+) -> u64 {
     let mut hasher = DefaultHasher::new();
     let camera = frame.eye.as_camera(size.0, size.1);
     let mut numbers: Vec<f32> = vec![model.edits.relight.turn_degrees, model.edits.relight.strength_stops];

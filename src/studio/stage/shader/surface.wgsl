@@ -19,11 +19,19 @@ struct Corner {
     @location(0) place: vec3<f32>,
     @location(1) normal: vec3<f32>,
     @location(2) uv: vec2<f32>,
+    // Times its weight, which is 1 where it is known.
+    @location(3) colour: vec4<f32>,
 }
 
 @vertex
-fn corner_of_mesh(@location(0) place: vec3<f32>, @location(1) normal: vec3<f32>, @location(2) uv: vec2<f32>) -> Corner {
+fn corner_of_mesh(
+    @location(0) place: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    @location(2) uv: vec2<f32>,
+    @location(3) colour: vec4<f32>,
+) -> Corner {
     var out: Corner;
+    out.colour = colour;
     out.clip = view.clip_from_world * vec4(place, 1.0);
     out.place = place;
     out.normal = normal;
@@ -120,13 +128,25 @@ fn colour_of_mesh(corner: Corner, @builtin(front_facing) is_front: bool) -> @loc
             return vec4(textureSample(specular_map, map_sampler, uv).rgb, REFLECTANCE);
         }
         case 3u: {
-            return vec4(vec3(textureSample(specular_map, map_sampler, uv).a), REFLECTANCE);
+            // Perceptual: the square root of the width, of which the map holds the square.
+            let roughness = clamp(textureSample(specular_map, map_sampler, uv).a, 0.0, 1.0);
+            return vec4(vec3(sqrt(sqrt(roughness))), REFLECTANCE);
         }
         case 4u: {
             return vec4(0.5 * normal + 0.5, READY);
         }
-        case 9u: {
+        case 14u: {
             return vec4(checker(corner.uv), READY);
+        }
+        case 15u: {
+            let on_map = textureSample(diffuse_map, map_sampler, uv).rgb;
+            if view.choice.y == 0u {
+                return vec4(min(on_map, vec3(LARGEST)), RADIANCE);
+            }
+            if corner.colour.a < 0.01 {
+                return vec4(UNKNOWN, READY);
+            }
+            return vec4(min(corner.colour.rgb / corner.colour.a, vec3(LARGEST)), RADIANCE);
         }
         default: {
             let quantity = textureSample(quantity_map, map_sampler, uv).xy;

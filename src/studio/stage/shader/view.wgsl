@@ -15,7 +15,7 @@ struct View {
     shading: vec4<f32>,
     // sRGB of the background; 1 where the light is shown instead.
     backdrop: vec4<f32>,
-    // Layer, padding.
+    // Layer; 1 where photos are shown as colours of vertices; padding.
     choice: vec4<u32>,
 }
 

@@ -1,0 +1,118 @@
+//! What is made of a scene beside the window as soon as it is read: its photos laid on the mesh, so that something true is
+//! seen before any fit, and the cached transport by which its maps are relit at once.
+
+use super::tasks::TaskKind;
+use super::{Done, Model};
+use crate::error::{Error, ErrorKind};
+use crate::image::Image;
+use crate::insight::projected_photos::{ProjectedPhotos, WeightedColour};
+use crate::job::relit;
+use crate::material::MaterialMaps;
+use crate::render::Surface;
+use crate::render::cached::CachedTransport;
+use crate::scene::Mesh;
+use crate::studio::stage::Layer;
+use std::sync::Arc;
+
+/// The photos on the surface.
+#[derive(Clone)]
+pub struct LaidPhotos {
+    projected: Arc<ProjectedPhotos>,
+    /// The mesh that is coloured.
+    pub mesh: Arc<Mesh>,
+    /// Colours of its vertices; until there are those of texels.
+    pub vertices: Option<Arc<Vec<WeightedColour>>>,
+    /// Colours of the texels of its atlas as a diffuse map, and which of them some photo sees.
+    pub texels: Option<(Arc<MaterialMaps>, Arc<Image<bool>>)>,
+}
+
+/// A cache, and the surface it is of.
+pub struct CachedOf {
+    /// The surface.
+    pub surface: Arc<Surface>,
+    transport: Arc<CachedTransport>,
+}
+
+impl CachedOf {
+    /// The cache.
+    pub fn transport(&self) -> Arc<CachedTransport> {
+        Arc::clone(&self.transport)
+    }
+}
+
+impl Model {
+    /// Lays the photos of what is open on its mesh, beside the window: on vertices until there is an atlas, on texels then.
+    pub(super) fn lay_photos(&mut self) {
+        let Some(project) = &self.project else { return };
+        let Some(scene) = project.scene.clone().filter(|scene| !scene.views.is_empty()) else { return };
+        let (mesh, surface) = (Arc::clone(&project.mesh), project.surface.clone());
+        let known = project.laid.as_ref().map(|laid| Arc::clone(&laid.projected));
+        let known = known.filter(|known| Arc::ptr_eq(known.scene(), &scene));
+        let map_size = self.edits.fit.map_size;
+        self.tasks.stop(&TaskKind::LayingPhotos);
+        self.tasks.spawn(TaskKind::LayingPhotos, move |context| {
+            let stopped = || Error::new(ErrorKind::Stopped, "stopped while photos were projected");
+            let projected = match known {
+                Some(known) => known,
+                None => Arc::new(ProjectedPhotos::new(scene, &context.stop).ok_or_else(stopped)?),
+            };
+            let mut laid = LaidPhotos { projected, mesh, vertices: None, texels: None };
+            match surface {
+                Some(surface) => {
+                    let (maps, seen) = laid.projected.of_texels(&surface, map_size);
+                    laid.texels = Some((Arc::new(maps), Arc::new(seen)));
+                }
+                None => laid.vertices = Some(Arc::new(laid.projected.of_vertices(&laid.mesh))),
+            }
+            Ok(Done::PhotosLaid(Box::new(laid)))
+        });
+    }
+
+    /// Takes the photos in, unless they are of a mesh that is no longer shown.
+    pub(super) fn photos_were_laid(&mut self, laid: LaidPhotos) {
+        let Some(project) = &mut self.project else { return };
+        let is_of_scene = project.scene.as_ref().is_some_and(|scene| Arc::ptr_eq(scene, laid.projected.scene()));
+        let has_texels = project.laid.as_ref().is_some_and(|own| own.texels.is_some());
+        if is_of_scene && (laid.texels.is_some() || !has_texels) {
+            project.laid = Some(laid);
+        }
+    }
+
+    /// Traces the cache that relights what is open, beside the window, unless it is there already.
+    pub fn cache_transport(&mut self) {
+        let strength = if self.edits.fit.has_lobe() { 1.0 } else { 0.0 };
+        let max_bounces = self.picture_settings(1).max_bounces;
+        let Some(project) = &self.project else { return };
+        let Some(surface) = project.surface.clone().filter(|_| self.switches.traced) else { return };
+        let wanted = relit::settings_of(max_bounces, strength);
+        let is_there = project
+            .transport
+            .as_ref()
+            .is_some_and(|own| own.transport.settings == wanted && Arc::ptr_eq(&own.surface, &surface));
+        if is_there || self.tasks.is_running(&TaskKind::CachingTransport) {
+            return;
+        }
+        self.tasks.spawn(TaskKind::CachingTransport, move |context| {
+            let transport = relit::transport_of(&surface, max_bounces, strength, &context.stop);
+            let stopped = || Error::new(ErrorKind::Stopped, "stopped while light transport was cached");
+            let transport = Arc::new(transport.ok_or_else(stopped)?);
+            Ok(Done::TransportCached(Box::new(CachedOf { surface, transport })))
+        });
+    }
+
+    pub(super) fn transport_was_cached(&mut self, cached: CachedOf) {
+        let Some(project) = &mut self.project else { return };
+        if project.surface.as_ref().is_some_and(|own| Arc::ptr_eq(own, &cached.surface)) {
+            project.transport = Some(Arc::new(cached));
+        } else {
+            // The atlas was made anew meanwhile.
+            self.cache_transport();
+        }
+    }
+
+    /// The layer that is drawn: before there are maps the photos stand in for shaded materials.
+    pub fn shown_layer(&self) -> Layer {
+        let is_blank = self.project.as_ref().is_some_and(|own| own.maps.is_none() && own.laid.is_some());
+        if self.edits.layer == Layer::Lit && is_blank { Layer::Photos } else { self.edits.layer }
+    }
+}
