@@ -166,6 +166,9 @@ pub enum BenchPart {
     Memory,
     /// Whether maps fitted under the window are those fitted without, bit for bit.
     Equality,
+    /// Milliseconds of a new environment from cached transport, and its error against the path tracer; fails beyond its
+    /// limits. Needs no display where it is the only part.
+    Relight,
 }
 
 /// Options of `patina-lab bench scale`.

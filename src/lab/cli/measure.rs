@@ -84,6 +84,22 @@ pub fn bench_studio(options: &BenchStudioOptions, json: bool) -> Result<()> {
     use super::arguments::BenchPart;
     use crate::lab::window as bench;
     let asked = |part: BenchPart| options.parts.is_empty() || options.parts.contains(&part);
+    let tell = std::sync::Arc::new(move |text: &str| {
+        if !json {
+            eprintln!("{text}");
+        }
+    });
+    let relit = match asked(BenchPart::Relight) {
+        true => bench::relight::measure(options.scene.as_deref(), options.quick, &*tell)?,
+        false => Vec::new(),
+    };
+    if options.parts.as_slice() == [BenchPart::Relight] {
+        std::fs::create_dir_all(&options.output).map_err(|source| Error::writing(&options.output, source))?;
+        let report =
+            bench::BenchReport { machine: bench::machine::Machine::here(), relight: relit, ..Default::default() };
+        report.write(&options.output)?;
+        return tell_report(&report, json);
+    }
     let report = bench::run(bench::BenchOptions {
         seconds: if options.quick { options.seconds.min(3.0) } else { options.seconds },
         pairs: if options.quick { options.pairs.min(1) } else { options.pairs },
@@ -96,18 +112,28 @@ pub fn bench_studio(options: &BenchStudioOptions, json: bool) -> Result<()> {
         slowdown: asked(BenchPart::Slowdown),
         memory: asked(BenchPart::Memory),
         equality: asked(BenchPart::Equality),
-        tell: std::sync::Arc::new(move |text| {
-            if !json {
-                eprintln!("{text}");
-            }
-        }),
+        relit,
+        tell,
     })?;
+    tell_report(&report, json)
+}
+
+/// Prints the tables; a view that is relit too slowly or wrongly is an error.
+#[cfg(feature = "studio")]
+fn tell_report(report: &crate::lab::window::BenchReport, json: bool) -> Result<()> {
     if json {
         println!("{}", serde_json::json!({"event": "bench", "report": report}));
     } else {
         println!("{}", report.to_markdown());
     }
-    Ok(())
+    match report.relight.iter().find(|row| !row.passes()) {
+        None => Ok(()),
+        Some(row) => Err(Error::new(
+            ErrorKind::Numerical,
+            format!("{} under {} is relit too slowly or too far from the path tracer", row.scene, row.light),
+        )
+        .remedy("the table above has both figures; on a machine that is busy measure again")),
+    }
 }
 
 /// Says why the window cannot be measured.

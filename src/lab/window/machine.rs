@@ -34,6 +34,20 @@ pub struct Machine {
     pub is_optimised: bool,
 }
 
+impl Machine {
+    /// This machine as it is now, without a window.
+    pub fn here() -> Self {
+        Machine {
+            processors: std::thread::available_parallelism().map_or(1, |count| count.get()),
+            processor: processor(),
+            load_before: load(),
+            load_after: load(),
+            is_optimised: !cfg!(debug_assertions),
+            ..Machine::default()
+        }
+    }
+}
+
 /// Ticks a second in which Linux counts the time of processes, on every machine in use.
 const TICKS_PER_SECOND: f64 = 100.0;
 

@@ -3,7 +3,7 @@
 //! Read [`person`] first: a thread that acts like somebody in front of the window, by keys, mouse and acts, and watches
 //! what comes of it. [`driven`] is the window it sits at: the studio and nothing less, with a mark on every frame that
 //! tells when the adapter was done with it. `script` runs the measurements one after another: [`frames`], [`answers`],
-//! [`slowdown`], [`memory`], [`equality`]; [`scenes`] makes what they work on, [`machine`] reads threads, memory and load
+//! [`slowdown`], [`memory`], [`equality`], and without a window [`relight`]; [`scenes`] makes what they work on, [`machine`] reads threads, memory and load
 //! from the system, [`report`] writes the tables.
 //!
 //! What it refuses to do: to judge. Figures depend on the machine and on what else runs there, so nothing here is a
@@ -17,6 +17,7 @@ pub mod frames;
 pub mod machine;
 pub mod memory;
 pub mod person;
+pub mod relight;
 pub mod report;
 pub mod scenes;
 mod script;
@@ -56,6 +57,8 @@ pub struct BenchOptions {
     pub memory: bool,
     /// Compare maps.
     pub equality: bool,
+    /// What was measured without the window before.
+    pub relit: Vec<relight::RelightRow>,
     /// Hears what is being done.
     pub tell: Arc<dyn Fn(&str) + Send + Sync>,
 }

@@ -5,6 +5,7 @@ use super::equality::EqualityRow;
 use super::frames::FramesRow;
 use super::machine::Machine;
 use super::memory::{MemoryRow, MemoryTrend};
+use super::relight::RelightRow;
 use super::slowdown::SlowdownRow;
 use crate::error::{Error, ErrorKind, Result};
 use std::fmt::Write;
@@ -25,6 +26,8 @@ pub struct BenchReport {
     pub memory: Vec<MemoryRow>,
     /// Its trend.
     pub memory_trend: Option<MemoryTrend>,
+    /// Views relit from cached transport.
+    pub relight: Vec<RelightRow>,
     /// Whether watching changes a fit.
     pub equality: Option<EqualityRow>,
 }
@@ -41,6 +44,7 @@ impl BenchReport {
         self.answers_text(&mut text);
         self.slowdown_text(&mut text);
         self.memory_text(&mut text);
+        self.relight_text(&mut text);
         if let Some(row) = &self.equality {
             let verdict = if row.different == 0 { "none differs" } else { "watching changed the fit: a defect" };
             let _ = writeln!(
@@ -149,6 +153,39 @@ impl BenchReport {
         );
     }
 
+    fn relight_text(&self, text: &mut String) {
+        if self.relight.is_empty() {
+            return;
+        }
+        text.push_str("## A view relit\n\n| scene | environment | new environment [ms] | turning [1/s] | error [%] | bias [%] | lobes | cache [s] | view [s] | fine view [s] |\n");
+        text.push_str("| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n");
+        for row in &self.relight {
+            let _ = writeln!(
+                text,
+                "| {} | {} | {} | {:.1} | **{:.2}** | {:+.2} | {} | {:.1} | {:.2} | {:.2} |",
+                row.scene,
+                row.light,
+                milliseconds(row.light_seconds),
+                row.turns_per_second,
+                100.0 * row.relative_error,
+                100.0 * row.bias,
+                row.lobe_points,
+                row.cache_seconds,
+                row.view_seconds,
+                row.fine_view_seconds,
+            );
+        }
+        let [width, height] = super::relight::VIEW;
+        let _ = writeln!(
+            text,
+            "\nA viewport of {width} x {height} pixels: from the light to the whole picture, medians. The error is that of the \
+             surface against the path tracer under the same environment, relative to the root mean square of its picture, with \
+             its noise taken out by two independent pictures. Limits: {} ms and {:.0} %.\n",
+            milliseconds(super::relight::MOST_SECONDS),
+            100.0 * super::relight::LARGEST_ERROR
+        );
+    }
+
     fn memory_text(&self, text: &mut String) {
         let [Some(first), Some(last)] = [self.memory.first(), self.memory.last()] else { return };
         let mebibytes =
@@ -208,6 +245,16 @@ impl BenchReport {
             own("ratio least", "", row.ratio_least);
             own("ratio most", "", row.ratio_most);
             own("frames while alone", "", row.frames_alone as f64);
+        }
+        for row in &self.relight {
+            let mut own = |measure, unit, value| line("relight", &row.scene, &row.light, measure, unit, value);
+            own("new environment", "s", row.light_seconds);
+            own("turning", "1/s", row.turns_per_second);
+            own("relative error", "", row.relative_error);
+            own("bias", "", row.bias);
+            own("cache", "s", row.cache_seconds);
+            own("view", "s", row.view_seconds);
+            own("fine view", "s", row.fine_view_seconds);
         }
         if let Some(trend) = &self.memory_trend {
             line("memory", "", "", "slope", "bytes/cycle", trend.slope_bytes);

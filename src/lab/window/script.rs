@@ -15,7 +15,7 @@ const LONG: f64 = 900.0;
 
 /// Measures what was asked for.
 pub(super) fn measure(person: &Person, options: &BenchOptions) -> Result<BenchReport> {
-    let mut report = BenchReport::default();
+    let mut report = BenchReport { relight: options.relit.clone(), ..BenchReport::default() };
     let load_before = machine::load();
     let busy = || machine::busy_seconds_of_machine().zip(machine::processor_seconds().map(|seconds| seconds.all));
     let (busy_before, began) = (busy(), Instant::now());

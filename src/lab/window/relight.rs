@@ -1,0 +1,222 @@
+//! A view relit from cached transport: how long a new environment takes, how often a second one turns, and how far the
+//! picture is from the path tracer's.
+//!
+//! It needs no window: what the stage does is done here on its own, with the maps of a truth or of a run. The squared error
+//! is the product of the differences to two independent pictures of the path tracer, so that their noise does not count.
+
+use crate::error::{Error, ErrorKind, Result};
+use crate::export::RunFolder;
+use crate::image::RgbImage;
+use crate::job::pictures::{light_of, matched, parameters};
+use crate::job::relit;
+use crate::light::Environment;
+use crate::material::MaterialMaps;
+use crate::material::texels::texels_from_maps;
+use crate::render::Surface;
+use crate::render::cached::{CachedTransport, FootprintSettings};
+use crate::render::picture::{PictureSettings, render};
+use crate::render::relight::RelitView;
+use crate::scene::{ReadSettings, demo};
+use crate::studio::model::framing::subject;
+use crate::studio::stage::eye::{Eye, OrbitEye};
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+/// Width and height of the viewport in pixels: about what a window of 1440 x 900 leaves to it.
+pub const VIEW: [usize; 2] = [900, 560];
+/// Seconds that a new environment may take.
+pub const MOST_SECONDS: f64 = 0.25;
+/// Largest relative error.
+pub const LARGEST_ERROR: f64 = 0.03;
+/// Height in texels of the environments, as the window keeps them.
+const LIGHT_HEIGHT: usize = 128;
+/// Surface hits of the longest path.
+const BOUNCES: usize = 2;
+/// Times that an environment is timed.
+const TIMES: usize = 7;
+
+/// What one environment gave.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+pub struct RelightRow {
+    /// The scene.
+    pub scene: String,
+    /// The environment.
+    pub light: String,
+    /// Seconds from an environment to the whole picture, median.
+    pub light_seconds: f64,
+    /// Pictures a second of an environment that turns, its rotation included.
+    pub turns_per_second: f64,
+    /// Error relative to the root mean square of the path tracer's picture.
+    pub relative_error: f64,
+    /// Mean difference relative to the mean of that picture.
+    pub bias: f64,
+    /// Shading points at which lobes were integrated.
+    pub lobe_points: usize,
+    /// Seconds that tracing the cache took, once a scene.
+    pub cache_seconds: f64,
+    /// Seconds of a new view of one ray a pixel, once an eye.
+    pub view_seconds: f64,
+    /// Seconds of a view with smooth edges.
+    pub fine_view_seconds: f64,
+}
+
+impl RelightRow {
+    /// Whether both figures are within their limits.
+    pub fn passes(&self) -> bool {
+        self.light_seconds <= MOST_SECONDS && self.relative_error <= LARGEST_ERROR
+    }
+}
+
+/// What is relit.
+struct Subject {
+    name: String,
+    surface: Surface,
+    maps: MaterialMaps,
+    environment: Environment,
+    eye: OrbitEye,
+}
+
+impl Subject {
+    fn demo() -> Result<Self> {
+        let scene = demo::build(&demo::DemoSettings::default())?.scene;
+        let truth = scene.truth.clone();
+        let truth = truth.ok_or_else(|| Error::new(ErrorKind::Internal, "the demo has no truth"))?;
+        let surface = Surface::new(scene.mesh.clone())?;
+        let eye = OrbitEye::around(subject(surface.mesh(), Some(&scene)));
+        Ok(Subject { name: "demo".into(), surface, maps: truth.maps, environment: truth.environment, eye })
+    }
+
+    /// A run folder, or an exchange folder with its truth.
+    fn at(path: &Path) -> Result<Self> {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let folder = RunFolder::open(path)?;
+        if folder.is_run() {
+            let result = folder.read_result()?;
+            let surface = Surface::new(result.mesh)?;
+            let eye = OrbitEye::around(subject(surface.mesh(), None));
+            return Ok(Subject { name, surface, maps: result.maps, environment: result.environment, eye });
+        }
+        let scene = crate::scene::read(path, &ReadSettings { hold_out_every: 0, ..ReadSettings::default() })?;
+        let Some(truth) = scene.truth.clone() else {
+            return Err(Error::new(ErrorKind::Unsupported, "there are no maps to relight")
+                .remedy("name a run folder, or an exchange folder with its truth"));
+        };
+        let surface = Surface::new(scene.mesh.clone())?;
+        let eye = OrbitEye::around(subject(surface.mesh(), Some(&scene)));
+        Ok(Subject { name, surface, maps: truth.maps, environment: truth.environment, eye })
+    }
+}
+
+/// Relights the demo, or what lies at a path, under several environments. `is_quick`: fewer paths in the references.
+///
+/// # Errors
+/// What cannot be read.
+pub fn measure(path: Option<&Path>, is_quick: bool, tell: &dyn Fn(&str)) -> Result<Vec<RelightRow>> {
+    let own = path.map_or_else(Subject::demo, Subject::at)?;
+    let stop = AtomicBool::new(false);
+    let stopped = || Error::new(ErrorKind::Stopped, "the bench was stopped");
+    tell(&format!("caching light transport: {}", own.name));
+    let began = Instant::now();
+    let transport = relit::transport_of(&own.surface, BOUNCES, 1.0, &stop).ok_or_else(stopped)?;
+    let cache_seconds = began.elapsed().as_secs_f64();
+    let map_size = own.maps.diffuse.width();
+    let texels = texels_from_maps(&own.maps);
+    let camera = Eye::Orbit(own.eye).as_camera(VIEW[0], VIEW[1]);
+    let trace = |settings: FootprintSettings| {
+        let began = Instant::now();
+        let settings = FootprintSettings { map_size, ..settings };
+        let view = RelitView::new(&own.surface, &transport, &camera, &texels, &settings, &stop);
+        view.map(|view| (view, began.elapsed().as_secs_f64())).ok_or_else(stopped)
+    };
+    let (_, view_seconds) = trace(FootprintSettings::COARSE)?;
+    let (view, fine_view_seconds) = trace(FootprintSettings::default())?;
+    let reflectance = transport.reflectance_of_points(&texels, map_size);
+    let mut lights = vec![("its own environment".to_owned(), own.environment.clone())];
+    for sky in ["noon", "evening", "overcast"] {
+        let environment = light_of(sky, LIGHT_HEIGHT)?.environment;
+        lights.push((format!("{sky} sky"), matched(&environment, &own.environment).0));
+    }
+    let mut rows = Vec::new();
+    for (light, environment) in lights {
+        tell(&format!("{}: {light}", own.name));
+        let lit = |environment: &Environment| {
+            let began = Instant::now();
+            let picture = view.lit(&transport, environment, &reflectance, true, &stop);
+            picture.map(|picture| (picture, began.elapsed().as_secs_f64())).ok_or_else(stopped)
+        };
+        let mut seconds = Vec::new();
+        for _ in 0..TIMES {
+            seconds.push(lit(&environment)?.1);
+        }
+        let began = Instant::now();
+        for step in 0..TIMES {
+            lit(&environment.rotated_about_up((5.0 * step as f32).to_radians()))?;
+        }
+        let turns_per_second = TIMES as f64 / began.elapsed().as_secs_f64();
+        let of_surface = view.lit(&transport, &environment, &reflectance, false, &stop).ok_or_else(stopped)?;
+        let (relative_error, bias) = errors(&own, &transport, &of_surface.radiance, &environment, is_quick, &view);
+        rows.push(RelightRow {
+            scene: own.name.clone(),
+            light,
+            light_seconds: crate::math::statistics::quantile(&seconds, 0.5),
+            turns_per_second,
+            relative_error,
+            bias,
+            lobe_points: of_surface.lobe_points,
+            cache_seconds,
+            view_seconds,
+            fine_view_seconds,
+        });
+    }
+    Ok(rows)
+}
+
+/// Error and bias of a picture of the surface against two independent ones of the path tracer.
+fn errors(
+    own: &Subject,
+    transport: &CachedTransport,
+    picture: &RgbImage,
+    environment: &Environment,
+    is_quick: bool,
+    view: &RelitView,
+) -> (f64, f64) {
+    let lit = parameters(&own.maps, environment);
+    let references = [7, 8].map(|seed| {
+        let settings = PictureSettings {
+            samples: if is_quick { 8 } else { 32 },
+            max_bounces: transport.settings.max_bounces,
+            background_visible: false,
+            seed,
+            ..PictureSettings::default()
+        };
+        render(&own.surface, view.camera(), &lit, 0, &settings, &AtomicBool::new(false)).radiance
+    });
+    let (mut squared, mut power, mut difference, mut mean) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
+    for ((own, first), second) in picture.pixels().iter().zip(references[0].pixels()).zip(references[1].pixels()) {
+        for channel in 0..3 {
+            let (own, a, b) = (f64::from(own[channel]), f64::from(first[channel]), f64::from(second[channel]));
+            squared += (own - a) * (own - b);
+            power += a * b;
+            difference += own - 0.5 * (a + b);
+            mean += 0.5 * (a + b);
+        }
+    }
+    ((squared / power).max(0.0).sqrt(), difference / mean)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[ignore = "slow: references of the path tracer at the size of a window"]
+    fn the_demo_relit_is_what_the_path_tracer_makes_of_it() {
+        let rows = measure(None, true, &|_| {}).unwrap();
+        assert_eq!(rows.len(), 4);
+        for row in &rows {
+            println!("{row:?}");
+            assert!(row.relative_error <= LARGEST_ERROR, "{row:?}");
+        }
+    }
+}
