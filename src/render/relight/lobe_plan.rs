@@ -11,11 +11,11 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 /// Pixels from corner to corner.
-const SPACING: usize = 4;
+const SPACING: usize = 2;
 /// How far a normal may lie from the mean of those at the corners, as a share of the lobe's microfacet width.
-const NORMAL_TOLERANCE: f32 = 0.3;
+const NORMAL_TOLERANCE: f32 = 0.1;
 /// How far the logarithm of a width may lie from that mean.
-const WIDTH_TOLERANCE: f32 = 0.2;
+const WIDTH_TOLERANCE: f32 = 0.1;
 /// Points with integrals, at most: beyond it tolerances are doubled.
 const MOST_POINTS: usize = 60_000;
 /// How often they are doubled, at most; then whatever corner there is speaks.
