@@ -48,7 +48,9 @@ fn an_export_is_asked_for_told_of_and_written() {
     let mut studio = TestStudio::with_finished_run();
     let folder = tempfile::tempdir().unwrap();
     let into = folder.path().join("out of here");
+    studio.wait("the result", |model| model.fit.folder.as_ref().is_some_and(|folder| folder.has_result()));
     studio.act(Act::Export);
+    studio.frames(2);
     studio.harness.check_accessibility();
     assert!(studio.says("What will be lost") && studio.says("GGX"), "{}", studio.log());
     // Nothing chosen is nothing to write, and the dialog says so.

@@ -13,9 +13,9 @@ use rayon::prelude::*;
 /// Pixels from corner to corner.
 const SPACING: usize = 2;
 /// How far a normal may lie from the mean of those at the corners, as a share of the lobe's microfacet width.
-const NORMAL_TOLERANCE: f32 = 0.1;
+const NORMAL_TOLERANCE: f32 = 0.05;
 /// How far the logarithm of a width may lie from that mean.
-const WIDTH_TOLERANCE: f32 = 0.1;
+const WIDTH_TOLERANCE: f32 = 0.05;
 /// Points with integrals, at most: beyond it tolerances are doubled.
 const MOST_POINTS: usize = 60_000;
 /// How often they are doubled, at most; then whatever corner there is speaks.
@@ -151,7 +151,9 @@ impl<'a> Corners<'a> {
             // Of the same piece of surface: it faces the same way and lies in the same plane, nearly.
             let offset = self.position(other) - position;
             let is_near = offset.dot(point.normal).abs() <= 0.25 * offset.length() + 0.1 * reach;
-            if other.normal.dot(point.normal) < 0.8 || !is_near {
+            // And it looks into the same surroundings: shadows end between points of the grid.
+            let sees_the_same = other.lobe_point == point.lobe_point;
+            if other.normal.dot(point.normal) < 0.8 || !is_near || !sees_the_same {
                 continue;
             }
             (tap.0[k], tap.1[k]) = (corner, weight);
@@ -159,7 +161,8 @@ impl<'a> Corners<'a> {
             normal += other.normal * weight;
             log_width += self.materials[corner as usize][6] * weight;
         }
-        if total <= 0.0 {
+        // Extrapolated, a lobe errs more than between corners.
+        if total < 0.999 {
             return alone;
         }
         let own = self.materials[index as usize][6];
