@@ -22,7 +22,8 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 /// A published benchmark.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Protocol {
     /// Stanford-ORB: a folder of `blender_HDR`, with `ground_truth` two folders up.
     Orb,
