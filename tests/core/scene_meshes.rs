@@ -101,7 +101,7 @@ fn copies_of_faces_go_whichever_way_they_are_wound() {
     let (mesh, findings) = read("a.obj", format!("{tetrahedron}{twice}"));
     assert_eq!(mesh.triangles.len(), 4);
     let told = findings.iter().find(|finding| finding.code == "mesh-copies").unwrap();
-    assert!(told.message.starts_with("4 triangles") && told.message.contains("4 of them turned over"), "{told}");
+    assert!(told.message.starts_with("4 triangles") && told.message.contains("4 of them flipped"), "{told}");
     // The first of each stays: outwards.
     let centre = Vec3::splat(0.25);
     assert!((0..4).all(|triangle| mesh.area_vector(triangle).dot(mesh.corners(triangle)[0] - centre) > 0.0));

@@ -106,8 +106,14 @@ fn a_light_that_turns_with_the_camera_and_two_lights_are_told() {
     let report = check(&relit(from_left));
     assert_eq!(finding(&report, "light-turns-with-camera").severity, Severity::Warning);
 
-    let report = check(&relit(|view, _| if view < 4 { Vec3::new(0.9, 0.4, 0.0) } else { Vec3::new(-0.7, 0.5, 0.5) }));
-    assert!(finding(&report, "light-in-groups").place.contains("00000004"), "{:?}", report.light);
+    let two = |first: Vec3, second: Vec3| check(&relit(|view, _| if view < 4 { first } else { second }));
+    for second in [Vec3::new(0.0, 0.4, 0.9), Vec3::new(-0.3, 0.9, -0.3)] {
+        let report = two(Vec3::new(0.9, 0.4, 0.0), second);
+        assert!(finding(&report, "light-in-groups").place.contains("00000004"), "{:?}", report.light);
+    }
+    // Two that change sides as the cameras do are one or the other, and no light that stands still.
+    let report = two(Vec3::new(0.9, 0.4, 0.0), Vec3::new(-0.7, 0.5, 0.5));
+    assert_ne!(report.light.as_ref().unwrap().kind(), LightKind::One, "{:?}", report.light);
 }
 
 #[test]

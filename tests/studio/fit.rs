@@ -205,7 +205,8 @@ fn another_size_of_the_maps_makes_another_atlas_and_fits() {
     studio.start_endless_fit();
     let project = studio.model().project.as_ref().unwrap();
     assert_eq!(project.settings.fit.map_size, 128);
-    assert!(project.maps.is_some());
+    // Until there are maps, the photos are shown on the mesh.
+    studio.wait("maps", |model| model.project.as_ref().unwrap().maps.is_some());
     studio.show(Panel::Maps);
     studio.control("Map");
 }

@@ -26,6 +26,9 @@ const LEANING: Leaning = Leaning { start: 1e-3, neighbours: Neighbours::Relative
 const NEIGHBOURS_DIFFER: f32 = 4.0;
 /// Iterations of conjugate gradients in each solution; noise and gains are learned before all but the first.
 const ITERATIONS: [usize; 4] = [8, 8, 8, 20];
+/// Reflectances follow gains and gains reflectances, so that each pass leaves a share of what is wrong with the gains: the
+/// larger, the fewer photos share a texel. Going further by this factor is successive over-relaxation of their logarithms.
+const OVER_RELAXATION: f32 = 1.5;
 /// Observations whose lobes are integrated together, sorted by the points of the grid that serve them.
 const TOGETHER: usize = 4096;
 
@@ -224,7 +227,9 @@ impl SolverScene {
         for part in &parts {
             total.iter_mut().zip(part).for_each(|(total, part)| total.merge(part));
         }
-        gains(&total)
+        let found = gains(&total);
+        let further = |before: f32, found: f32| before * (found / before).powf(OVER_RELAXATION);
+        before.iter().zip(&found).map(|(before, found)| [0, 1, 2].map(|c| further(before[c], found[c]))).collect()
     }
 
     /// The bake: one colour a texel, no light. `None` when `stop` was raised.
@@ -330,13 +335,14 @@ mod tests {
                 count += 1.0;
             }
         }
-        assert!(count > 1000.0, "{count}");
+        assert!(count > 500.0, "{count}");
         f64::sqrt(sum / count)
     }
 
     #[test]
     fn reflectance_and_gains_are_found_beside_pixels_that_are_wrong() {
-        let gains = |view: usize| [1.3f32, 0.8, 1.0 / (1.3 * 0.8)].map(|gain| if view < 3 { gain } else { 1.0 });
+        // What differs is large beside what the model's errors have in common, so that hardly any of it is shrunk.
+        let gains = |view: usize| [1.3f32, 0.8, 1.0].map(|gain| if view < 3 { gain } else { 1.0 });
         let (mut solver, truth) = photographed(gains);
         solver.estimate.texels.iter_mut().for_each(|texel| texel.diffuse = [0.4; 3]);
         let never = AtomicBool::new(false);

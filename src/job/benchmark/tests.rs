@@ -190,7 +190,7 @@ fn the_truth_of_stanford_orb_scores_high_and_a_light_of_another_camera_does_not(
     };
     let [novel, relit] = score(0.0);
     assert!(novel > 28.0 && relit > 28.0, "{novel} {relit}");
-    let [_, turned] = score(2.0);
+    let [_, turned] = score(std::f32::consts::PI);
     assert!(turned < relit - 4.0, "{turned} {relit}");
 }
 

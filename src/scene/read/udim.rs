@@ -102,8 +102,9 @@ pub fn lay_out(mesh: &mut SourceMesh) {
         names.join(", ")
     );
     mesh.findings.push(
-        Finding::new(Severity::Note, "mesh-udim", message)
-            .remedy(format!("each tile gets 1 / {side} of --map-size: take it larger to keep their detail")),
+        Finding::new(Severity::Note, "mesh-udim", message).remedy(format!(
+            "each tile gets 1 / {side} of the width of the maps: fit larger ones to keep their detail"
+        )),
     );
 }
 

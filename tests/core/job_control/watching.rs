@@ -56,7 +56,11 @@ fn the_report_marks_what_was_left_out_and_the_snapshot_has_live_figures() {
     assert_eq!(marked, ["view0"]);
     let counts: Vec<_> =
         data.aggregates.iter().map(|aggregate| (aggregate.name.as_str(), aggregate.score.views)).collect();
-    assert_eq!(counts, [("held-out views", 1), ("training views", 3)]);
+    assert_eq!(
+        counts,
+        [("held-out views", 1), ("training views", 3), ("held-out views, the nearest photo", 1)],
+        "a baseline beside what was fitted"
+    );
     let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     assert!(html.contains("left out"));
 
