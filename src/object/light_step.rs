@@ -1,7 +1,7 @@
 //! The step on the light while the reflectance is held.
 //!
 //! The unknown is the logarithm of radiance, so the light stays positive and a sun grows as fast as a sky. Two ways:
-//! * [`newton`]: the loss is replaced by the quadratic that touches it (Laplace reweighted, logarithms made linear), the
+//! * [`mod@newton`]: the loss is replaced by the quadratic that touches it (Laplace reweighted, logarithms made linear), the
 //!   normal equations are solved by conjugate gradients on the matrix of the picture, and the step is halved until the
 //!   loss falls. A few steps do what hundreds of first-order ones do.
 //! * [`first_order`]: Adam through the net of the deep prior, as released.

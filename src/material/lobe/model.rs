@@ -10,10 +10,10 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum LobeModel {
-    /// Normalised Blinn-Phong with Schlick's shadowing, as in the paper: [`blinn_phong`](super::blinn_phong).
+    /// Normalised Blinn-Phong with Schlick's shadowing, as in the paper: [`blinn_phong`].
     #[default]
     BlinnPhong,
-    /// GGX with height-correlated Smith shadowing, as other renderers have it: [`ggx`](super::ggx).
+    /// GGX with height-correlated Smith shadowing, as other renderers have it: [`ggx`].
     Ggx,
 }
 
