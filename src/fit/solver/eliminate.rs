@@ -19,6 +19,8 @@ pub struct BlockRows {
     pub powers: [Vec<f32>; 2],
     /// Columns of the block's unknowns over all rows, column after column.
     columns: Vec<f64>,
+    /// The last unknown, as it was taken out: its unit row over the light, its right side, the length of its column.
+    pub kept: super::coupling::KeptUnknown,
     observation_count: usize,
     unknown_count: usize,
 }
@@ -89,6 +91,7 @@ impl BlockRows {
             let left: f64 = own.iter().map(|value| value * value).sum();
             // A column that the others span takes nothing more away.
             let scale = if left > 1e-18 * full && left > 0.0 { 1.0 / left.sqrt() } else { 0.0 };
+            self.kept.length = if scale > 0.0 { left.sqrt() } else { 0.0 };
             for value in own.iter_mut() {
                 *value *= scale;
             }
@@ -107,6 +110,7 @@ impl BlockRows {
                     }
                 }
             }
+            self.kept.side = dot;
             for (row, &value) in self.rows.chunks_exact_mut(light).zip(column) {
                 if value != 0.0 {
                     for (entry, share) in row.iter_mut().zip(&share) {
@@ -115,6 +119,7 @@ impl BlockRows {
                 }
             }
         }
+        self.kept.row = share;
     }
 }
 

@@ -1,5 +1,6 @@
 //! A round on the light: some blocks are solved under the light as it is, and their rows move it.
 
+use super::coupling::{self, KeptUnknown};
 use super::eliminate::BlockRows;
 use super::estimate::{Estimate, TexelVariance};
 use super::gains::gains_after;
@@ -7,7 +8,7 @@ use super::light_colour::change_by_highlights;
 use super::light_evidence::{LightKnown, Precisions, evidence_shares};
 use super::light_shape::{LightShape, bright_texels};
 use super::light_step::{Gauge, LightPrior, solve_channel};
-use super::light_suns::narrow_scales;
+use super::light_suns::{GROWTHS, narrow_scales};
 use super::normal_equations::NormalEquations;
 use super::pixel_terms::BlockPrior;
 use super::plan;
@@ -119,12 +120,13 @@ impl SolverScene {
         let blocks = &self.round_blocks;
         let chosen = plan::choose(blocks, self.settings.blocks, LEAST_OBSERVATIONS, self.settings.seed, number);
         let part = chosen.len().div_ceil(PARTS).max(1);
-        let parts: Vec<([NormalEquations; 3], Solved)> = chosen
+        let parts: Vec<([NormalEquations; 3], Solved, [Vec<KeptUnknown>; 3])> = chosen
             .par_chunks(part)
             .map(|chosen| {
                 let mut equations = [(); 3].map(|()| NormalEquations::new(shape.count()));
                 let mut done = Vec::with_capacity(chosen.len());
                 let mut rows = [(); 3].map(|()| BlockRows::default());
+                let mut kept: [Vec<KeptUnknown>; 3] = Default::default();
                 for &index in chosen {
                     if stop.load(Ordering::Relaxed) {
                         break;
@@ -139,20 +141,30 @@ impl SolverScene {
                         for (equations, rows) in equations.iter_mut().zip(&rows) {
                             equations.add(rows);
                         }
+                        kept.iter_mut().zip(&rows).for_each(|(kept, rows)| kept.push(rows.kept.clone()));
                     }
                     done.push((index, work));
                 }
                 equations.iter_mut().for_each(NormalEquations::flush);
-                (equations, done)
+                (equations, done, kept)
             })
             .collect();
         let mut total = [(); 3].map(|()| NormalEquations::new(shape.count()));
         let mut done = Vec::new();
-        for (equations, part) in parts {
+        let mut kept: [Vec<KeptUnknown>; 3] = Default::default();
+        for (equations, part, own) in parts {
             for (total, equations) in total.iter_mut().zip(&equations) {
                 total.merge(equations);
             }
             done.extend(part);
+            kept.iter_mut().zip(own).for_each(|(kept, own)| kept.extend(own));
+        }
+        if !self.settings.fixed_light {
+            let own: Vec<&plan::Block> = done.iter().map(|(index, _): &(usize, BlockWork)| &blocks[*index]).collect();
+            let pairs = coupling::neighbours(&own);
+            total.par_iter_mut().zip(&kept).for_each(|(total, kept)| {
+                coupling::add_coupled(total, kept, &pairs, self.settings.independence);
+            });
         }
         (!stop.load(Ordering::Relaxed)).then_some((total, done))
     }
@@ -207,22 +219,29 @@ impl SolverScene {
             // far away as a sky, and the light would grow from round to round.
             gauge_slack: if self.background.is_empty() { self.settings.gauge_slack } else { BACKGROUND_GAUGE_SLACK },
         };
-        let before = shape.coefficients_of_channels(&estimate.light);
-        let narrow = narrow_scales(shape, &estimate.light, &before, self.settings.suns);
-        let channels: Vec<(Vec<f32>, Precisions, f64)> = (0..3usize)
-            .into_par_iter()
-            .map(|c| {
-                let mut x = before[c].clone();
-                let gauge = Gauge { row: &self.gauge.0, mean: held[c] };
-                let known = solve_channel(&equations[c], shape, &prior, &gauge, &narrow, &mut x);
-                let precisions = Precisions::new(&surface[c], &equations[c], known.belief, prior.independence);
-                (shape.expand(&x), precisions, known.scale_deviation)
-            })
-            .collect();
-        let light = (0..estimate.light.len()).map(|texel| [0, 1, 2].map(|c| channels[c].0[texel])).collect();
-        let scale_deviation = channels.iter().map(|(_, _, deviation)| deviation / 3.0).sum();
-        let precisions: Vec<Precisions> = channels.into_iter().map(|(_, precisions, _)| precisions).collect();
-        (!stop.load(Ordering::Relaxed))
-            .then(|| (light, LightKnown { shares: evidence_shares(&precisions, shape), scale_deviation }))
+        let mut light = estimate.light.clone();
+        let mut known = LightKnown::default();
+        for growth in GROWTHS {
+            let before = shape.coefficients_of_channels(&light);
+            let narrow = narrow_scales(shape, &light, &before, self.settings.suns, growth);
+            let channels: Vec<(Vec<f32>, Precisions, f64)> = (0..3usize)
+                .into_par_iter()
+                .map(|c| {
+                    let mut x = before[c].clone();
+                    let gauge = Gauge { row: &self.gauge.0, mean: held[c] };
+                    let known = solve_channel(&equations[c], shape, &prior, &gauge, &narrow, &mut x);
+                    let precisions = Precisions::new(&surface[c], &equations[c], known.belief, prior.independence);
+                    (shape.expand(&x), precisions, known.scale_deviation)
+                })
+                .collect();
+            if stop.load(Ordering::Relaxed) {
+                return None;
+            }
+            light = (0..light.len()).map(|texel| [0, 1, 2].map(|c| channels[c].0[texel])).collect();
+            let scale_deviation = channels.iter().map(|(_, _, deviation)| deviation / 3.0).sum();
+            let precisions: Vec<Precisions> = channels.into_iter().map(|(_, precisions, _)| precisions).collect();
+            known = LightKnown { shares: evidence_shares(&precisions, shape), scale_deviation };
+        }
+        Some((light, known))
     }
 }

@@ -6,8 +6,11 @@ use super::settings::Suns;
 use crate::math::sphere::{direction_of_texel, solid_angle_of_texel};
 use glam::Vec3;
 
-/// How many times its excess over the usual radiance a narrow hat may be, see [`narrow_scales`].
-const NARROW_GROWTH: f64 = 10.0;
+/// How many times its excess over the usual radiance a narrow hat may be (one standard deviation), see [`narrow_scales`], in
+/// one solution after the other. To be weighed by what was found is a prior with heavy tails (reweighted least squares): few
+/// suns, each as bright as it likes. It has many minima, so it begins wide, where all narrow hats are free to share what is
+/// bright, and narrows down (graduated non-convexity; Blake and Zisserman 1987). 0.7 is Cauchy's distribution.
+pub const GROWTHS: [f64; 4] = [10.0, 3.0, 1.0, 0.6];
 /// A sun, with what is bright around it, reaches so far from its brightest texel, in degrees.
 const SUN_RADIUS_DEGREES: f32 = 20.0;
 
@@ -15,7 +18,13 @@ const SUN_RADIUS_DEGREES: f32 = 20.0;
 /// before the step, given with its coefficients. Where all channels are bright there is a sun, and it may be much
 /// brighter; elsewhere there is sky. One channel alone is no sun: solved by themselves, channels put blue or red suns where
 /// only held-out views look.
-pub fn narrow_scales(shape: &LightShape, light: &[[f32; 3]], coefficients: &[Vec<f32>; 3], suns: Suns) -> Vec<f64> {
+pub fn narrow_scales(
+    shape: &LightShape,
+    light: &[[f32; 3]],
+    coefficients: &[Vec<f32>; 3],
+    suns: Suns,
+    growth: f64,
+) -> Vec<f64> {
     let usual = coefficients.each_ref().map(|x| usual_radiance(shape, x));
     let brightness = |&texel: &u32| {
         let radiance = light[texel as usize];
@@ -23,7 +32,7 @@ pub fn narrow_scales(shape: &LightShape, light: &[[f32; 3]], coefficients: &[Vec
     };
     let may_shine = places_of_suns(shape, brightness, suns);
     let scale = |texel: &u32| match may_shine(*texel) {
-        true => 1.0 + NARROW_GROWTH * (brightness(texel) - 1.0).max(0.0),
+        true => 1.0 + growth * (brightness(texel) - 1.0).max(0.0),
         false => 1.0,
     };
     shape.fine.iter().map(scale).collect()
@@ -55,9 +64,9 @@ mod tests {
         light[beside as usize] = [10.0; 3];
         light[lamp as usize] = [500.0; 3];
         let coefficients = shape.coefficients_of_channels(&light);
-        let any = narrow_scales(&shape, &light, &coefficients, Suns::Any);
+        let any = narrow_scales(&shape, &light, &coefficients, Suns::Any, 10.0);
         assert!(any[0] > any[2] && any[2] > any[1] && any[1] > 10.0, "{any:?}");
         // What is beside a sun is of it: here by three texels of 5.6 degrees. The lamp is on the other side.
-        assert_eq!(narrow_scales(&shape, &light, &coefficients, Suns::One), [any[0], any[1], 1.0]);
+        assert_eq!(narrow_scales(&shape, &light, &coefficients, Suns::One, 10.0), [any[0], any[1], 1.0]);
     }
 }

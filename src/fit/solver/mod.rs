@@ -7,7 +7,8 @@
 //! 2. [`block`] (with `cell_sums`): under a known light, the reflectances of a block in closed form and its lobe's width by
 //!    looking at all.
 //! 3. [`round`]: a block's rows over the light; [`eliminate`] takes the block's own unknowns out of them, so that what is
-//!    left is the Schur complement of the joint Gauss-Newton system.
+//!    left is the Schur complement of the joint Gauss-Newton system; [`coupling`] takes out the reflectances of all blocks
+//!    together, with what neighbours are believed to have in common.
 //! 4. [`light_step`]: the light from those rows, added up ([`normal_equations`]), at least zero ([`non_negative`]), in
 //!    wide and narrow hats ([`light_shape`]), with a weak wish for smoothness but for suns ([`light_suns`]).
 //!    [`light_round`] is the round as a whole, [`light_evidence`] says what each texel of the light is known by, `light_holes` fills what lies between texels
@@ -29,6 +30,7 @@
 pub mod block;
 mod cell_sums;
 pub mod choice;
+pub mod coupling;
 pub mod diffuse;
 pub mod diffuse_system;
 pub mod eliminate;

@@ -15,6 +15,8 @@ pub struct Block {
     pub cell_count: usize,
     /// Number of observations.
     pub observations: usize,
+    /// Mean position of its texels in the world.
+    pub centre: Vec3,
 }
 
 /// Cuts square maps into blocks of `side` texels with cells of `cell` texels.
@@ -57,6 +59,7 @@ pub fn blocks(
                 }
             };
             let (_, block, cells) = &mut pieces[index];
+            block.centre += (place - block.centre) / (block.texels.len() + 1) as f32;
             let cell_key = (row / cell * side + column / cell) as u32;
             let cell_index = cells.iter().position(|&known| known == cell_key).unwrap_or_else(|| {
                 cells.push(cell_key);

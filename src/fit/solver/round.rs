@@ -187,7 +187,7 @@ impl Round<'_> {
         let mut errors: Vec<f32> = work.terms.iter().zip(&models).map(|(term, model)| squared(term, model)).collect();
         let middle = errors.len() / 2;
         let median = *errors.select_nth_unstable_by(middle, f32::total_cmp).1;
-        let scale = 6.0 * median + 1e-12;
+        let scale = 60.0 * median + 1e-12;
         for ((term, model), &used) in work.terms.iter_mut().zip(&models).zip(&work.used) {
             let clipped = self.observations.list[used as usize].clipped;
             let darker = (0..3).all(|c| model[c] < term.radiance[c]);
@@ -249,21 +249,22 @@ impl Round<'_> {
                 let lobe = reduced[1].iter().zip(&reduced[2]).map(|(&b, &g)| scale32 * (specular * b + g));
                 rows.set_row(row, lobe, reduced[0].iter().map(|&d| scale32 * rho * d));
                 let arriving = f64::from(term.arriving[c]);
-                rows.set_unknown(row, 0, scale * arriving);
-                rows.set_unknown(row, 1 + usize::from(term.cell), scale * arriving);
-                rows.set_unknown(row, 1 + cells, scale * f64::from(sums.base[c]));
-                rows.set_unknown(row, 2 + cells, scale * f64::from(d_width));
+                rows.set_unknown(row, 2 + cells, scale * arriving);
+                rows.set_unknown(row, usize::from(term.cell), scale * arriving);
+                rows.set_unknown(row, cells, scale * f64::from(sums.base[c]));
+                rows.set_unknown(row, 1 + cells, scale * f64::from(d_width));
             }
         }
         for (c, rows) in made.iter_mut().enumerate() {
             for (cell, value) in solution.cells.iter().enumerate() {
-                rows.set_prior(1 + cell, 1.0 / prior.spread, -f64::from(value[c] - solution.diffuse[c]));
+                rows.set_prior(cell, 1.0 / prior.spread, -f64::from(value[c] - solution.diffuse[c]));
             }
             let (mean, deviation) = prior.specular;
-            rows.set_prior(1 + cells, 1.0 / deviation, mean[c] - f64::from(solution.specular[c]));
+            rows.set_prior(cells, 1.0 / deviation, mean[c] - f64::from(solution.specular[c]));
             let (mean, deviation) = prior.log_width;
-            rows.set_prior(2 + cells, 1.0 / deviation, mean - f64::from(solution.log_width));
+            rows.set_prior(1 + cells, 1.0 / deviation, mean - f64::from(solution.log_width));
             rows.eliminate();
+            rows.kept.value = f64::from(solution.diffuse[c]);
         }
     }
 }

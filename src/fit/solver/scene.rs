@@ -23,8 +23,10 @@ const SCATTER_SWEEPS: usize = 60;
 /// Mean reflectance that fixes the scale between surface and light: nothing in the photos of a diffuse surface does, see
 /// [`crate::fit::gauge`]. That of the measured start.
 const HELD_REFLECTANCE: f64 = 0.5;
-/// Texels along a block's side, and along a cell's, in the rounds that look for the light.
-const ROUND_BLOCK: (usize, usize) = (8, 2);
+/// Most texels along a block's side in the rounds that look for the light; its cells are a quarter of that.
+const ROUND_BLOCK: usize = 8;
+/// What blocks at most are cut into, so that there are enough of them on small maps.
+const LEAST_ROUND_BLOCK: usize = 2;
 /// The same where maps are made.
 const MAP_BLOCK: (usize, usize) = (4, 1);
 
@@ -159,7 +161,7 @@ impl SolverScene {
         let gauge = gauge(&transport, &footprints, &observations);
         let blocks = |(side, cell)| plan::blocks(&observations, &transport.grid, settings.map_size, side, cell);
         Ok(Some(SolverScene {
-            round_blocks: blocks(ROUND_BLOCK),
+            round_blocks: blocks(round_block(&settings)),
             map_blocks: blocks(MAP_BLOCK),
             settings,
             views: targets.iter().map(|target| target.view).collect(),
@@ -175,6 +177,16 @@ impl SolverScene {
             held_out_pixels,
         }))
     }
+}
+
+/// Texels along a block's side, and along a cell's, in the rounds that look for the light: the largest blocks of which maps
+/// have as many as a round asks for.
+fn round_block(settings: &SolverSettings) -> (usize, usize) {
+    let mut side = ROUND_BLOCK;
+    while side > LEAST_ROUND_BLOCK && (settings.map_size / side).pow(2) < settings.blocks {
+        side /= 2;
+    }
+    (side, (side / 4).max(1))
 }
 
 /// Logarithms of gains by exposures in stops, less their mean: a common gain belongs to the light.

@@ -116,5 +116,4 @@ fn absent(path: &Path, what: &str) -> Error {
 
 #[cfg(test)]
 #[allow(clippy::disallowed_methods)]
-#[path = "../../../tests/core/benchmark_protocols.rs"]
 mod tests;
