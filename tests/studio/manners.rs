@@ -226,7 +226,7 @@ fn the_first_stop_of_tab_is_the_main_button_and_it_wears_a_ring() {
 #[test]
 fn hand_movements_are_chosen_in_the_menu_and_remembered() {
     let mut studio = TestStudio::with_finished_run();
-    studio.click("View");
+    studio.click_first("View");
     studio.line("Navigate as in Blender").click();
     studio.frames(3);
     assert_eq!(studio.model().preferences.navigation, Navigation::Blender);
@@ -235,5 +235,6 @@ fn hand_movements_are_chosen_in_the_menu_and_remembered() {
     studio.model().dialog = Dialog::None;
     let folder = studio.close();
     let mut again = TestStudio::in_folder(folder, None);
+    again.frames(1);
     assert_eq!(again.model().preferences.navigation, Navigation::Blender);
 }

@@ -24,13 +24,15 @@ fn drawing(rows: &[LossRow]) -> Option<String> {
         (!points.is_empty()).then(|| Series { name: name.into(), points, marked })
     };
     let held_out = of("Held-out photos", |row| row.held_out_rmse, true);
-    let series = held_out.or_else(|| of("Training photos", |row| row.surface_rmse, false)).into_iter().collect();
+    let series = held_out.or_else(|| of("Training photos", |row| row.surface_rmse, false))?;
+    // A single line is named by its axis.
+    let y_label = format!("RMSE of {}, linear radiance", series.name.to_lowercase());
     let plot = LinePlot {
         x_label: "time (s)".into(),
-        y_label: "RMSE, linear radiance".into(),
+        y_label,
         x_scale: Scale::Linear,
         y_scale: Scale::Logarithmic,
-        series,
+        series: vec![series],
         marks: Vec::new(),
     };
     plot.svg().map(|svg| standalone(&[svg]))
