@@ -231,6 +231,7 @@ fn hand_movements_are_chosen_in_the_menu_and_remembered() {
     studio.frames(3);
     assert_eq!(studio.model().preferences.navigation, Navigation::Blender);
     studio.act(Act::Help);
+    studio.frames(2);
     assert!(studio.says("Middle-drag to orbit, Shift-middle-drag to pan"));
     studio.model().dialog = Dialog::None;
     let folder = studio.close();
