@@ -42,7 +42,8 @@ pub fn check(options: &CheckOptions, json: bool) -> Result<()> {
         println!(
             "{}",
             serde_json::json!({"event": "check", "understood": understood, "findings": report.findings,
-            "views": report.views, "texels_resolved": report.texels_resolved, "surface": report.surface,
+            "views": report.views, "texels_resolved": report.texels_resolved,
+            "texels_resolved_sharpest": report.texels_resolved_sharpest, "surface": report.surface,
             "agreement": report.agreement, "light": report.light, "ask": ask})
         );
     } else {

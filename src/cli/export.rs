@@ -27,16 +27,16 @@ pub struct ExportArguments {
     /// Write the cameras of the run's scene too, as cameras.json in the convention of OpenCV.
     #[arg(long)]
     pub cameras: bool,
-    /// The folder to make; an earlier export there is replaced.
+    /// The folder to make, `export` in the run folder when not given; an earlier export there is replaced.
     #[arg(short, long)]
-    pub output: PathBuf,
+    pub output: Option<PathBuf>,
 }
 
 /// Exports a run for other programs.
 pub fn export(arguments: &ExportArguments, json: bool) -> Result<()> {
     let options = ExportOptions {
         run: arguments.run.clone(),
-        output: arguments.output.clone(),
+        output: arguments.output.clone().unwrap_or_else(|| arguments.run.join("export")),
         formats: arguments.to.clone(),
         size: arguments.size,
         onto: arguments.onto.clone(),

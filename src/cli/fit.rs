@@ -3,8 +3,10 @@
 use super::arguments::{DemoOptions, FitOptions, ResumeOptions};
 use crate::error::{Error, ErrorKind, Result};
 use crate::export::RunFolder;
+use crate::export::run_folder::new_run_folder;
 use crate::fit::{FitSettings, Method};
 use crate::insight::report::data::ReportData;
+use crate::job::advance::{Advance, FIRST_RATIO};
 use crate::job::open::{self, OpenStage, Tell};
 use crate::job::prepare::RunSettings;
 use crate::job::{self, Event, JobHandle, demo};
@@ -45,9 +47,13 @@ pub fn fit(options: &FitOptions, json: bool) -> Result<()> {
     settings.fit.validate()?;
     let stop = Arc::new(AtomicBool::new(false));
     stop_on_interrupt(Arc::clone(&stop));
-    let folder = RunFolder::create(&options.output)?.held()?;
+    let output = options.output.clone().unwrap_or_else(|| usual_run_folder(&settings.scene));
+    let folder = RunFolder::create(&output)?.held()?;
     if !json {
         eprintln!("reading and checking {}", settings.scene.display());
+        if options.output.is_none() {
+            eprintln!("the run goes to {}", output.display());
+        }
     }
     let mut told = Vec::new();
     let (prepared, fitter, settings) = with_bar(json, |tell| {
@@ -60,6 +66,14 @@ pub fn fit(options: &FitOptions, json: bool) -> Result<()> {
     }
     let job = job::start(prepared, fitter, settings, folder.clone())?;
     watch(job, &folder, &stop, json)
+}
+
+/// Where a run goes that no folder was named for: `runs/SCENE-1`, `runs/SCENE-2`, ... where the program was started.
+fn usual_run_folder(scene: &Path) -> PathBuf {
+    // A manifest is known by the folder it lies in.
+    let named = if scene.is_file() { scene.parent().unwrap_or(scene) } else { scene };
+    let name = named.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    new_run_folder(Path::new("runs"), &name)
 }
 
 /// Settings that are asked for, before they are resolved for a scene.
@@ -162,42 +176,49 @@ fn with_bar<T>(json: bool, work: impl FnOnce(Tell) -> Result<T>) -> Result<T> {
 
 /// Shows the events of a job until it ends.
 fn watch(job: JobHandle, folder: &RunFolder, stop: &AtomicBool, json: bool) -> Result<()> {
-    let bar = if json { ProgressBar::hidden() } else { ProgressBar::new(0) };
-    let style = ProgressStyle::with_template("{prefix:>13} [{bar:30}] {pos}/{len} {msg}");
+    let bar = if json { ProgressBar::hidden() } else { ProgressBar::new(PARTS) };
+    // The message is cut where the terminal ends: a line that wraps would be drawn anew below itself.
+    let style = ProgressStyle::with_template("{prefix:>13} [{bar:30}] {percent:>3} % {wide_msg}");
     bar.set_style(style.unwrap_or(ProgressStyle::default_bar()));
     let say = |text: String| if bar.is_hidden() { eprintln!("{text}") } else { bar.println(text) };
     let mut last_line = std::time::Instant::now();
+    // One share of the whole job, as the window shows it: steps by their seconds, then what comes after them.
+    let mut advance = Advance::new(FIRST_RATIO);
     let outcome = loop {
         if stop.load(Ordering::Relaxed) {
             job.stop();
         }
         let event = match job.events.recv_timeout(std::time::Duration::from_millis(100)) {
             Ok(event) => event,
-            Err(crossbeam_channel::RecvTimeoutError::Timeout) => continue,
+            Err(crossbeam_channel::RecvTimeoutError::Timeout) => {
+                advance.tick();
+                bar.set_position(parts_of(&advance));
+                continue;
+            }
             Err(crossbeam_channel::RecvTimeoutError::Disconnected) => {
                 break Err(Error::new(ErrorKind::Internal, "the fit ended without a word"));
             }
         };
+        match &event {
+            Event::Progress(progress) => advance.stepped(progress),
+            Event::Finishing(stage) => advance.finishing(*stage),
+            Event::Finished(_) => advance.finished(),
+            _ => {}
+        }
+        bar.set_position(parts_of(&advance));
         if json {
-            println!("{}", line_of(&event));
+            println!("{}", line_of(&event, &advance));
         }
         match event {
-            Event::Started { steps_done, steps_total } => {
-                bar.set_length(steps_total as u64);
-                bar.set_position(steps_done as u64);
-            }
             Event::Progress(progress) => {
                 let row = &progress.row;
-                bar.set_position(row.step as u64);
                 bar.set_prefix(row.stage.clone());
                 let held_out = row.held_out_rmse.map_or(String::new(), |rms| format!(", held-out residual {rms:.4}"));
                 // Of the pixels and the level of this step: another measure than the RMSE of whole photos at the end.
                 let residual = row.image_loss.max(0.0).sqrt();
-                let left = crate::insight::report::number::duration(progress.seconds_left);
-                bar.set_message(format!(
-                    "residual (RMS) {residual:.4}{held_out}, {:.1} steps/s, {left} left",
-                    progress.steps_per_second
-                ));
+                let seconds_left = advance.seconds_left().unwrap_or(progress.seconds_left);
+                let left = crate::insight::report::number::duration(seconds_left);
+                bar.set_message(format!("{left} left, residual (RMS) {residual:.4}{held_out}"));
                 // Without a terminal a bar shows nothing: a line now and then does.
                 if !json && bar.is_hidden() && (last_line.elapsed().as_secs() >= 5 || row.held_out_rmse.is_some()) {
                     eprintln!(
@@ -231,20 +252,32 @@ fn watch(job: JobHandle, folder: &RunFolder, stop: &AtomicBool, json: bool) -> R
     Ok(())
 }
 
-fn line_of(event: &Event) -> serde_json::Value {
+/// Parts of the bar; finer than the percent that is written beside it.
+const PARTS: u64 = 1000;
+
+fn parts_of(advance: &Advance) -> u64 {
+    (PARTS as f32 * advance.share()) as u64
+}
+
+fn line_of(event: &Event, advance: &Advance) -> serde_json::Value {
     use serde_json::json;
     match event {
         Event::Started { steps_done, steps_total } => {
             json!({"event": "started", "steps_done": steps_done, "steps_total": steps_total})
         }
-        Event::Progress(progress) => json!({"event": "progress", "progress": progress}),
+        Event::Progress(progress) => json!({
+            "event": "progress", "progress": progress, "share": advance.share(),
+            "seconds_left_of_job": advance.seconds_left(),
+        }),
         Event::Finding(finding) => json!({"event": "finding", "finding": finding}),
         Event::Checkpoint(path) => json!({"event": "checkpoint", "path": path}),
         Event::SettingsChanged(settings) => json!({"event": "settings-changed", "settings": settings}),
         Event::Refused(error) => json!({"event": "refused", "message": error.to_string()}),
         Event::Paused => json!({"event": "paused"}),
         Event::Resumed => json!({"event": "resumed"}),
-        Event::Finishing(stage) => json!({"event": "finishing", "what": stage.label()}),
+        Event::Finishing(stage) => {
+            json!({"event": "finishing", "what": stage.label(), "share": advance.share()})
+        }
         Event::Finished(data) => {
             json!({"event": "finished", "aggregates": data.aggregates, "truth": data.truth, "timings": data.timings})
         }

@@ -72,7 +72,7 @@ fn of_path(typed: &str) -> Option<String> {
         ],
         false => [
             ("validate the scene", format!("patina check {shown}")),
-            ("fit it", format!("patina fit {shown} -o RUN")),
+            ("fit it, into a new folder in runs", format!("patina fit {shown}")),
             ("open it in the window", format!("patina studio {shown}")),
         ],
     };
@@ -106,7 +106,7 @@ mod tests {
         let scene = scene.to_string_lossy().into_owned();
         let hint = of(&mistake(&[&scene])).unwrap();
         assert!(hint.contains(&format!("patina check '{scene}'")), "{hint}");
-        assert!(hint.contains(&format!("patina fit '{scene}' -o RUN")), "{hint}");
+        assert!(hint.contains(&format!("patina fit '{scene}'")), "{hint}");
     }
 
     #[test]

@@ -1,7 +1,6 @@
 //! `loss.csv`: the loss of every step.
 
 use crate::error::{Error, ErrorKind, Place, Result};
-use std::io::Write;
 use std::path::Path;
 
 const HEADER: &str = "step,stage,seconds,loss,image_loss,mvcl,surface_rmse,held_out_rmse";
@@ -39,16 +38,27 @@ pub fn number_or_nan<'de, D: serde::Deserializer<'de>>(deserializer: D) -> std::
 
 /// Writes the rows. Numbers keep every digit; a comma or line end in a stage's name becomes a blank.
 pub fn write(path: &Path, rows: &[LossRow]) -> Result<()> {
-    crate::files::write_atomically(path, |writer| {
-        writeln!(writer, "{HEADER}")?;
-        for row in rows {
-            let stage = row.stage.replace([',', '\n', '\r'], " ");
-            write!(writer, "{},{stage},{},{},{},{},", row.step, row.seconds, row.loss, row.image_loss, row.mvcl)?;
-            let field = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
-            writeln!(writer, "{},{}", field(row.surface_rmse), field(row.held_out_rmse))?;
-        }
-        Ok(())
-    })
+    crate::files::write_bytes(path, text(rows).as_bytes())
+}
+
+/// The rows as text, a header line first.
+pub fn text(rows: &[LossRow]) -> String {
+    let mut text = format!("{HEADER}\n");
+    for row in rows {
+        let stage = row.stage.replace([',', '\n', '\r'], " ");
+        let field = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
+        text += &format!(
+            "{},{stage},{},{},{},{},{},{}\n",
+            row.step,
+            row.seconds,
+            row.loss,
+            row.image_loss,
+            row.mvcl,
+            field(row.surface_rmse),
+            field(row.held_out_rmse)
+        );
+    }
+    text
 }
 
 /// Reads the rows of [`fn@write`]. An error names the line.

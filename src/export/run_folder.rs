@@ -19,7 +19,10 @@
 
 pub(super) mod earlier;
 mod lock;
+mod new_folder;
 mod stated;
+
+pub use new_folder::new_run_folder;
 
 use super::{LossRow, convention, loss_log, obj};
 use crate::error::{Error, ErrorKind, Place, Result};

@@ -2,10 +2,12 @@
 //!
 //! It holds the mesh, the maps and a few environments, already blurred by the fitted lobe for eight widths (split sum,
 //! Karis 2013), and a small viewer for WebGL 2. The sun of an environment is taken out of it: it shines on the lobe itself
-//! and casts shadows. How much of the sky each vertex sees is baked with rays; sharp shadows of other lamps and light between
-//! surfaces are not shown, and the page says so.
+//! and casts shadows. What each vertex sees of the sky is baked with rays, in spherical harmonics: soft shadows follow the
+//! light as it turns. Light between surfaces is that of a place's own colour all around; sharp shadows of other lamps are not
+//! shown, and the page says so.
 
 mod prefilter;
+mod transfer;
 
 use super::asset::Asset;
 use super::sun::sun_of;
@@ -14,21 +16,16 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::image::Image;
 use crate::light::Environment;
 use crate::material::LobeModel;
-use crate::math::frame::{Frame, sample_cosine_hemisphere};
 use crate::scene::{Camera, Mesh};
-use crate::trace::{Bvh, Ray};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use glam::Vec3;
-use rayon::prelude::*;
 use serde_json::{Value, json};
 
 const PAGE: &str = include_str!("web/page.html");
 const VIEWER: &str = include_str!("web/viewer.js");
 /// What a page may hold beyond its maps, in bytes.
 pub const LARGEST_BEYOND_MAPS: usize = 8_000_000;
-/// Rays from a vertex that find how much of the sky it sees.
-const OPENNESS_RAYS: usize = 64;
 
 /// A photograph to wipe against.
 #[derive(Clone, Debug)]
@@ -88,7 +85,7 @@ fn words(values: impl Iterator<Item = u16>) -> String {
     STANDARD.encode(values.flat_map(u16::to_le_bytes).collect::<Vec<u8>>())
 }
 
-/// Positions on 65,536 steps of the bounding box, normals on 127, coordinates on 65,536, openness on 255.
+/// Positions on 65,536 steps of the bounding box, normals, openness and transfer on 127, coordinates on 65,536.
 fn mesh_of(mesh: &Mesh) -> Result<Value> {
     let (low, high) = mesh.bounds().ok_or_else(|| {
         Error::new(ErrorKind::InvalidScene, "the mesh has no triangles")
@@ -97,45 +94,30 @@ fn mesh_of(mesh: &Mesh) -> Result<Value> {
     let extent = (high - low).max(Vec3::splat(1e-9));
     let step = |share: f32| (share.clamp(0.0, 1.0) * 65_535.0 + 0.5) as u16;
     let positions = mesh.positions.iter().flat_map(|&p| ((p - low) / extent).to_array().map(step));
-    let openness = openness_of(mesh)?;
+    let transfer = transfer::transfer(mesh)?;
     let normals: Vec<u8> = mesh
         .normals
         .iter()
-        .zip(&openness)
-        .flat_map(|(normal, open)| {
+        .zip(&transfer)
+        .flat_map(|(normal, transfer)| {
+            let open = transfer::openness(transfer);
             let [x, y, z] = normal.to_array().map(|c| (c.clamp(-1.0, 1.0) * 127.0).round() as i8 as u8);
             [x, y, z, (open.clamp(0.0, 1.0) * 127.0).round() as u8]
+        })
+        .collect();
+    // That of band 0 is the openness, which stands beside the normal.
+    let passed: Vec<u8> = transfer
+        .iter()
+        .flat_map(|own| {
+            own.iter().skip(1).map(|value| (127.0 * (value / transfer::LARGEST).clamp(-1.0, 1.0)).round() as i8 as u8)
         })
         .collect();
     let uvs = mesh.uvs.iter().flat_map(|uv| [step(uv.x), step(uv.y)]);
     let indices: Vec<u8> = mesh.triangles.iter().flatten().flat_map(|index| index.to_le_bytes()).collect();
     Ok(json!({
         "low": low.to_array(), "extent": extent.to_array(), "positions": words(positions),
-        "normals": STANDARD.encode(normals), "uvs": words(uvs), "indices": STANDARD.encode(indices),
+        "normals": STANDARD.encode(normals), "transfer": STANDARD.encode(passed), "largest": transfer::LARGEST, "uvs": words(uvs), "indices": STANDARD.encode(indices),
     }))
-}
-
-/// Share of the sky, by the cosine, that each vertex sees.
-fn openness_of(mesh: &Mesh) -> Result<Vec<f32>> {
-    let bvh = Bvh::build(&mesh.positions, &mesh.triangles)?;
-    let (low, high) = bvh.bounds();
-    let lift = 1e-4 * (high - low).length();
-    let side = OPENNESS_RAYS.isqrt();
-    Ok(mesh
-        .positions
-        .par_iter()
-        .zip(&mesh.normals)
-        .map(|(&position, normal)| {
-            let normal = normal.try_normalize().unwrap_or(Vec3::Y);
-            let frame = Frame::around(normal);
-            let free = (0..side * side).filter(|index| {
-                let u = [(index / side) as f32 + 0.5, (index % side) as f32 + 0.5].map(|place| place / side as f32);
-                let direction = frame.outer_from_local(sample_cosine_hemisphere(u));
-                !bvh.is_occluded(&Ray { origin: position + normal * lift, direction, t_max: f32::INFINITY })
-            });
-            free.count() as f32 / (side * side) as f32
-        })
-        .collect())
 }
 
 /// A light as the viewer reads it; its sun is apart, since that casts shadows.
@@ -150,13 +132,14 @@ fn light_of(name: &str, light: &Environment, lobe: LobeModel) -> Value {
         .map(|image| json!({"width": image.width(), "height": image.height(), "values": pack(image)}))
         .collect();
     let irradiance = prefilter::irradiance(light);
+    let harmonics: Vec<[f32; 3]> = transfer::coefficients(light).iter().map(|own| own.to_array()).collect();
     let sun = sun.as_ref().map(|sun| {
         // As a disc: solid angle 2 pi (1 - cos).
         let cosine = 1.0 - sun.solid_angle / std::f64::consts::TAU;
         json!({"towards": sun.towards.to_array(), "irradiance": sun.irradiance.to_array(), "cosine": cosine})
     });
     json!({
-        "name": name, "levels": levels, "mean": mean, "sun": sun,
+        "name": name, "levels": levels, "mean": mean, "sun": sun, "harmonics": harmonics,
         "irradiance": {"width": irradiance.width(), "height": irradiance.height(), "values": pack(&irradiance)},
     })
 }
@@ -193,6 +176,9 @@ mod tests {
         assert_eq!(data["lights"][0]["name"], "fitted </script> light");
         let indices = STANDARD.decode(data["mesh"]["indices"].as_str().unwrap()).unwrap();
         assert_eq!(indices.len(), 4 * 6);
+        let transfer = STANDARD.decode(data["mesh"]["transfer"].as_str().unwrap()).unwrap();
+        assert_eq!(transfer.len(), 8 * asset.mesh.positions.len());
+        assert_eq!(data["lights"][0]["harmonics"].as_array().unwrap().len(), 9);
         // A flat square sees the whole sky.
         let normals = STANDARD.decode(data["mesh"]["normals"].as_str().unwrap()).unwrap();
         assert_eq!(&normals[..4], &[0, 0, 127, 127]);

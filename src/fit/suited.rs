@@ -2,6 +2,7 @@
 
 use super::method::Method;
 use super::settings::FitSettings;
+use crate::error::Finding;
 use crate::material::LobeModel;
 use crate::scene::doctor::{self, Report, exposure};
 use crate::scene::{Scene, View};
@@ -20,6 +21,8 @@ pub struct Suited {
     pub exposure: bool,
     /// Width and height of maps with about as many texels as photos resolve; `None` where that is not known.
     pub map_size: Option<usize>,
+    /// The same for the part of the surface that photos show most sharply.
+    pub sharpest_map_size: Option<usize>,
 }
 
 /// Steps of polishing that let lobes of another kind than the solver's settle.
@@ -49,6 +52,7 @@ impl Suited {
             solver_refine: usize::from(is_photographed),
             exposure: is_photographed && exposure::differ(&report.views),
             map_size: report.texels_resolved.map(map_size_for),
+            sharpest_map_size: report.texels_resolved_sharpest.map(map_size_for),
         }
     }
 
@@ -102,10 +106,12 @@ impl Suited {
         }
     }
 
-    /// What was taken for the scene that nobody asked for, a sentence each, and how to have it otherwise; `settings` are
-    /// what [`Suited::resolve`] made of `asked`.
-    pub fn told(&self, asked: &FitSettings, settings: &FitSettings) -> Vec<String> {
+    /// What was taken for the scene that nobody asked for; `settings` are what [`Suited::resolve`] made of `asked`.
+    pub fn told(&self, asked: &FitSettings, settings: &FitSettings) -> Vec<Taken> {
         let mut told = Vec::new();
+        let mut tell = |sentence: String, setting: &'static str, otherwise: String, does: &'static str| {
+            told.push(Taken { sentence, setting, otherwise, does });
+        };
         if asked.method == Method::Automatic && settings.method == Method::Solver {
             let polished = match settings.solver_polish {
                 0 => String::new(),
@@ -116,21 +122,51 @@ impl Suited {
                 (_, 0) => "",
                 _ => " with whole-pixel refinement of the diffuse map",
             };
-            told.push(format!("Using the solver{why}{polished}; --method adam takes Adam only"));
+            tell(format!("Using the solver{why}{polished}"), "method", "adam".into(), "takes Adam only");
         }
         if settings.exposure != asked.exposure {
-            told.push(
-                "Photo exposures differ: exposure compensation is on, a gain per photo; --exposure=false turns it off"
-                    .into(),
-            );
+            let sentence = "Photo exposures differ: exposure compensation is on, a gain per photo";
+            tell(sentence.into(), "exposure", "false".into(), "turns it off");
         }
         if settings.map_size != asked.map_size {
-            let (size, larger) = (settings.map_size, asked.map_size);
-            told.push(format!(
-                "Map size set to {size} x {size} to match what the photos resolve; --map-size {larger} takes larger maps"
-            ));
+            let size = settings.map_size;
+            let sharpest = match self.sharpest_map_size {
+                Some(sharpest) if sharpest > size => {
+                    format!(" over most of the surface; its sharpest part holds {sharpest} x {sharpest}")
+                }
+                _ => String::new(),
+            };
+            let sentence = format!("Map size set to {size} x {size} to match what the photos resolve{sharpest}");
+            tell(sentence, "map-size", (2 * size).min(asked.map_size).to_string(), "takes larger maps");
         }
         told
+    }
+}
+
+/// A setting that was taken for a scene, and how to have it otherwise.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Taken {
+    /// What was taken and why, without a full stop.
+    pub sentence: String,
+    /// The setting's name.
+    pub setting: &'static str,
+    /// Another value for it.
+    pub otherwise: String,
+    /// What that value does, such as `takes larger maps`.
+    pub does: &'static str,
+}
+
+impl std::fmt::Display for Taken {
+    /// The sentence, with what to type for the other value.
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(formatter, "{}; --{}={} {}", self.sentence, self.setting, self.otherwise, self.does)
+    }
+}
+
+impl FitSettings {
+    /// Whether these settings do already what the remedy of a finding asks for: then it need not be told.
+    pub fn do_what_is_asked(&self, finding: &Finding) -> bool {
+        self.exposure && ["exposure-jump", "exposure-varies"].contains(&finding.code)
     }
 }
 
@@ -210,8 +246,17 @@ mod tests {
 
     #[test]
     fn what_was_taken_is_told_and_nothing_else() {
-        let suited = Suited { method: Method::Solver, solver_refine: 1, exposure: true, map_size: Some(512) };
-        let told = |asked: &FitSettings, chosen: &[&str]| suited.told(asked, &applied(&suited, asked.clone(), chosen));
+        let suited = Suited {
+            method: Method::Solver,
+            solver_refine: 1,
+            exposure: true,
+            map_size: Some(512),
+            sharpest_map_size: None,
+        };
+        let told = |asked: &FitSettings, chosen: &[&str]| -> Vec<String> {
+            let told = suited.told(asked, &applied(&suited, asked.clone(), chosen));
+            told.iter().map(Taken::to_string).collect()
+        };
         let usual = FitSettings::default();
         let all = told(&usual, &[]);
         assert_eq!(all.len(), 3, "{all:?}");
@@ -223,11 +268,33 @@ mod tests {
         assert_eq!(told(&solver, &["exposure", "map-size"]), Vec::<String>::new());
         let as_it_is = FitSettings { exposure: true, map_size: 256, ..solver };
         assert_eq!(told(&as_it_is, &[]), Vec::<String>::new());
+        // What is typed is understood, and the next size is offered rather than the largest.
+        assert!(all[1].contains("--exposure=false") && all[2].contains("--map-size=1024"), "{all:?}");
+        let sharp = Suited { sharpest_map_size: Some(1024), ..suited.clone() };
+        let told = sharp.told(&usual, &applied(&sharp, usual.clone(), &[]));
+        assert!(told[2].sentence.ends_with("its sharpest part holds 1024 x 1024"), "{told:?}");
+    }
+
+    #[test]
+    fn what_is_done_already_is_not_asked_for() {
+        let finding = |code| Finding::new(crate::Severity::Warning, code, "exposures differ");
+        let with_gains = FitSettings { exposure: true, ..FitSettings::default() };
+        let without = FitSettings { exposure: false, ..FitSettings::default() };
+        for code in ["exposure-jump", "exposure-varies"] {
+            assert!(with_gains.do_what_is_asked(&finding(code)) && !without.do_what_is_asked(&finding(code)), "{code}");
+        }
+        assert!(!with_gains.do_what_is_asked(&finding("camera-mirrored")));
     }
 
     #[test]
     fn refinement_and_its_sizes_go_together() {
-        let photographs = Suited { method: Method::Solver, solver_refine: 1, exposure: false, map_size: None };
+        let photographs = Suited {
+            method: Method::Solver,
+            solver_refine: 1,
+            exposure: false,
+            map_size: None,
+            sharpest_map_size: None,
+        };
         let rendered = Suited { solver_refine: 0, ..photographs.clone() };
         let of = |suited: &Suited, (refine, polish): (usize, usize), chosen: &[&str]| {
             let from = FitSettings {
@@ -252,7 +319,13 @@ mod tests {
         // Charts cover six tenths of a map.
         let sizes = [0.0, 100.0, 78_000.0, 79_000.0, 157_000.0, 630_000.0, 5e6, 5.1e6, 1e30].map(map_size_for);
         assert_eq!(sizes, [256, 256, 256, 512, 512, 1024, 2048, 4096, 8192]);
-        let suited = |size| Suited { method: Method::Adam, solver_refine: 0, exposure: false, map_size: size };
+        let suited = |size| Suited {
+            method: Method::Adam,
+            solver_refine: 0,
+            exposure: false,
+            map_size: size,
+            sharpest_map_size: None,
+        };
         let usual = FitSettings::default;
         assert_eq!(applied(&suited(Some(512)), usual(), &[]).map_size, 512);
         assert_eq!(applied(&suited(Some(512)), usual(), &["map-size"]).map_size, 2048);

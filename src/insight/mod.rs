@@ -20,6 +20,7 @@ pub mod label;
 pub mod material_pictures;
 pub mod memory;
 pub mod nearest_photo;
+pub mod plausible;
 pub mod plot;
 pub mod projected_photos;
 pub mod protocols;

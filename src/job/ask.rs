@@ -36,9 +36,18 @@ pub struct Ask {
 impl Ask {
     /// Of a scene that was checked.
     pub fn of(scene: &Scene, report: &Report) -> Self {
-        let map_size = Suited::to(scene, report).map_size.unwrap_or(MAP_SIZE);
+        Ask::of_sizes(scene, Suited::to(scene, report).map_size.unwrap_or(MAP_SIZE))
+    }
+
+    /// Of a scene and maps of this size.
+    pub fn of_sizes(scene: &Scene, map_size: usize) -> Self {
         let pixels: usize = scene.views.iter().map(|view| view.camera.width * view.camera.height).sum();
         Ask::for_sizes(scene.views.len(), pixels, scene.mesh.triangles.len(), map_size)
+    }
+
+    /// Seconds that so many threads are expected to take, without the room that is asked for.
+    pub fn expected_seconds(&self, threads: usize) -> f64 {
+        self.processor_seconds as f64 / SPARE_SECONDS / threads.max(1) as f64
     }
 
     /// Of so many photos with so many pixels together, so many triangles and maps of this size.

@@ -98,8 +98,8 @@ impl Format {
 const GGX: &str = "the Blinn-Phong lobe becomes the nearest GGX lobe";
 const OF_METALNESS: &str = "base colour and metalness stand for the specular map in the variant that is chosen at first; the variant \
     `specular` holds the maps as fitted, for importers that know that workflow";
-const WEB_SHOWS: &str = "the page shows the fitted lobe by maps blurred beforehand: no sharp shadows but those of the sun, no light between \
-     surfaces";
+const WEB_SHOWS: &str = "the page shows the fitted lobe by maps blurred beforehand: no sharp shadows but those of the sun, soft ones by what \
+     each vertex sees of the sky in nine spherical harmonics, light between surfaces as if all around were of one colour";
 
 /// What to export, and how.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

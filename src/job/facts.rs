@@ -13,6 +13,11 @@ use crate::scene::{Background, Scene};
 
 /// The loss history as the run folder keeps it.
 pub fn loss_rows(state: &FitState) -> Vec<LossRow> {
+    rows_of(&state.losses)
+}
+
+/// Lines of a loss history as files have them.
+pub fn rows_of(losses: &[crate::fit::LossRow]) -> Vec<LossRow> {
     let row = |row: &crate::fit::LossRow| LossRow {
         step: row.step as u64,
         stage: row.stage.clone(),
@@ -23,7 +28,7 @@ pub fn loss_rows(state: &FitState) -> Vec<LossRow> {
         surface_rmse: row.surface_rmse,
         held_out_rmse: row.held_out_rmse,
     };
-    state.losses.iter().map(row).collect()
+    losses.iter().map(row).collect()
 }
 
 pub(super) fn describe(

@@ -6,7 +6,7 @@
 
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::image::display::DisplaySettings;
-use crate::image::{Image, RgbImage, file};
+use crate::image::{GreyImage, Image, RgbImage, file};
 use crate::light::Environment;
 use crate::render::measured_regions::render_regions;
 use crate::render::picture::{Picture, PictureSettings, render};
@@ -139,7 +139,8 @@ pub fn write_turntable(
     Ok(files)
 }
 
-/// One picture into a file, drawn in passes so that `progress` and `stop` are heard. Returns the file.
+/// One picture into a file, drawn in passes so that `progress` and `stop` are heard; `cut_out` leaves what the surface does
+/// not cover transparent, and settings that show the background are not heard then. Returns the file.
 ///
 /// # Errors
 /// As of [`save_picture`]; `Stopped` when `stop` was raised.
@@ -150,11 +151,13 @@ pub fn write_picture(
     camera: &Camera,
     settings: &PictureSettings,
     display: &DisplaySettings,
+    cut_out: bool,
     stop: &AtomicBool,
     progress: &dyn Fn(f32),
 ) -> Result<Vec<PathBuf>> {
     is_png(path)?;
-    let tracer = PictureTracer::new(surface, lit, *settings);
+    let background_visible = settings.background_visible && !cut_out;
+    let tracer = PictureTracer::new(surface, lit, PictureSettings { background_visible, ..*settings });
     let mut accumulation = Accumulation::new(camera.width, camera.height);
     while accumulation.samples() < settings.samples {
         let samples = (settings.samples - accumulation.samples()).min(SAMPLES_OF_PASS);
@@ -163,7 +166,10 @@ pub fn write_picture(
         }
         progress(accumulation.samples() as f32 / settings.samples.max(1) as f32);
     }
-    save_picture(path, accumulation.picture(), display)?;
+    match cut_out {
+        true => save_cut_out(path, accumulation.picture(), accumulation.coverage(), display)?,
+        false => save_picture(path, accumulation.picture(), display)?,
+    }
     Ok(vec![path.into()])
 }
 
@@ -265,6 +271,24 @@ pub fn save_picture(path: &Path, picture: &RgbImage, display: &DisplaySettings) 
     } else {
         file::write_exr_rgb(path, picture)
     }
+}
+
+/// The same with what the surface does not cover left transparent. `picture` is black there, so that its colours are
+/// multiplied by `coverage` already.
+///
+/// # Errors
+/// As of [`save_picture`].
+pub fn save_cut_out(path: &Path, picture: &RgbImage, coverage: &GreyImage, display: &DisplaySettings) -> Result<()> {
+    if !is_png(path)? {
+        return file::write_exr_rgba(path, picture, coverage);
+    }
+    let bytes = Image::from_fn(picture.width(), picture.height(), |row, column| {
+        let covered = coverage[(row, column)].clamp(0.0, 1.0);
+        let own = picture[(row, column)] / covered.max(1e-4);
+        let [red, green, blue] = display.bytes(own, row as u32, column as u32);
+        [red, green, blue, (255.0 * covered).round() as u8]
+    });
+    file::write_png_srgba8(path, &bytes)
 }
 
 /// Whether a path ends in `png`; otherwise it ends in `exr`.

@@ -18,6 +18,7 @@
 //! [`object`] is the job of object mode, light and reflectance from photos of one object; [`materials`] its library of
 //! materials to look at.
 
+pub mod advance;
 pub mod against_truth;
 pub mod ask;
 pub mod background;
@@ -28,6 +29,7 @@ pub mod entanglement;
 mod explained;
 pub mod export;
 mod facts;
+pub mod film;
 pub mod gallery;
 pub mod gauge;
 pub mod handle;
@@ -51,6 +53,7 @@ pub mod time_left;
 mod view;
 pub mod worker;
 
+pub use facts::rows_of;
 pub use handle::{JobHandle, JobOptions, Wake};
 pub use prepare::RunSettings;
 pub use slot::Slot;

@@ -99,6 +99,7 @@ pub fn begin(
     let fitter =
         told(OpenStage::Start, stop, tell, || Fitter::new(scene, surface, settings.fit.clone(), known_light.as_ref()))?;
     let settings = RunSettings { fit: fitter.settings().clone(), ..settings };
+    prepared.findings.retain(|finding| !settings.fit.do_what_is_asked(finding));
     Ok((prepared, fitter, settings))
 }
 

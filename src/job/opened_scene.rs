@@ -26,7 +26,7 @@ impl OpenedScene {
     pub fn resolve(&self, settings: &mut FitSettings, chosen: &[String]) -> Vec<String> {
         let suited = Suited::to(&self.scene, &self.report);
         let resolved = suited.resolve(settings, chosen);
-        let told = suited.told(settings, &resolved);
+        let told = suited.told(settings, &resolved).iter().map(ToString::to_string).collect();
         *settings = resolved;
         told
     }

@@ -32,6 +32,9 @@ pub struct SkySettings {
     pub cloud_cover: f32,
     /// Diffuse reflectance of the ground, linear RGB in [0, 1].
     pub ground_reflectance: Vec3,
+    /// How much of the ground straight below is lost in the air before it; further out it is more, and at the horizon the
+    /// ground is as bright as the sky. 0 gives a ground of one brightness.
+    pub ground_haze: f32,
     /// Luminance of the irradiance of an upward surface. At pi a white horizontal diffuse surface has radiance 1.
     pub irradiance: f32,
 }
@@ -86,6 +89,7 @@ impl SkySettings {
             haze: 2.8,
             cloud_cover: 0.0,
             ground_reflectance: Vec3::new(0.20, 0.18, 0.14),
+            ground_haze: 0.0,
             irradiance: PI,
         }
     }
@@ -110,10 +114,7 @@ impl SkySettings {
 /// A daylight of this size; sides of 0 count as 1.
 pub fn sun_and_sky(width: usize, height: usize, settings: &SkySettings) -> Environment {
     let (width, height) = (width.max(1), height.max(1));
-    let elevation = settings.sun_elevation_radians.clamp(0.0, PI / 2.0);
-    let sun = sphere::direction_of_angles(settings.sun_azimuth_radians, PI / 2.0 - elevation);
-    let cloud_cover = settings.cloud_cover.clamp(0.0, 1.0);
-    let clear = ClearSky::new(elevation, settings.haze);
+    let Daylight { elevation, sun, cloud_cover, clear } = Daylight::of(settings);
     // Zenith luminance under cloud in kcd/m^2, Krochmann and Seidl 1974.
     let cloud_zenith = 0.123 + 8.6 * elevation.sin();
     let sky = |direction: Vec3| {
@@ -130,9 +131,54 @@ pub fn sun_and_sky(width: usize, height: usize, settings: &SkySettings) -> Envir
     let scale = settings.irradiance / luminance(horizontal).max(f32::MIN_POSITIVE);
     let radiance = Image::from_fn(width, height, |row, column| {
         let place = (row, column);
-        ((radiance[place] + ground * (Vec3::ONE - below[place])) * scale).max(Vec3::ZERO)
+        let under = Vec3::ONE - below[place];
+        let direction = sphere::direction_of_texel(row, column, width, height);
+        let seen = match settings.ground_haze > 0.0 && direction.y < 0.0 {
+            true => {
+                hazy(ground, sky(Vec3::new(direction.x, 0.0, direction.z).normalize_or(Vec3::X)), direction, settings)
+            }
+            false => ground,
+        };
+        ((radiance[place] + seen * under) * scale).max(Vec3::ZERO)
     });
     Environment { radiance }
+}
+
+/// The ground below through the air before it, which shines like the sky at the horizon: the way to the ground is longer by
+/// one over the sine of the depression (Koschmieder 1924).
+fn hazy(ground: Vec3, horizon: Vec3, direction: Vec3, settings: &SkySettings) -> Vec3 {
+    let left = (-settings.ground_haze / (-direction.y).max(1e-3)).exp();
+    ground * left + horizon * (1.0 - left)
+}
+
+/// Luminance of the irradiance of an upward surface before it is brought to [`SkySettings::irradiance`], in units that all
+/// skies share.
+pub fn physical_irradiance(settings: &SkySettings) -> f32 {
+    const HEIGHT: usize = 32;
+    let Daylight { elevation, sun, cloud_cover, clear } = Daylight::of(settings);
+    let mut radiance = over_upper_half(2 * HEIGHT, HEIGHT, |direction| clear.radiance(direction, sun));
+    add_sun(&mut radiance, sun, settings, sun_illuminance(elevation, settings.haze) * (1.0 - cloud_cover).powi(2));
+    luminance(irradiance_from_above(&radiance))
+}
+
+/// What sun and sky of some settings have in common.
+struct Daylight {
+    elevation: f32,
+    sun: Vec3,
+    cloud_cover: f32,
+    clear: ClearSky,
+}
+
+impl Daylight {
+    fn of(settings: &SkySettings) -> Self {
+        let elevation = settings.sun_elevation_radians.clamp(0.0, PI / 2.0);
+        Daylight {
+            elevation,
+            sun: sphere::direction_of_angles(settings.sun_azimuth_radians, PI / 2.0 - elevation),
+            cloud_cover: settings.cloud_cover.clamp(0.0, 1.0),
+            clear: ClearSky::new(elevation, settings.haze),
+        }
+    }
 }
 
 /// The mean of a radiance over each texel; below the horizon it is 0.

@@ -121,6 +121,17 @@ impl PassKey {
         })
     }
 
+    /// A stream for something beside the samples of this pass at a pixel; passes after it have others.
+    pub fn beside(&self, pixel: usize) -> SampleStream {
+        /// Sets these numbers apart from those of the paths.
+        const BESIDE: u64 = 0x6265_7369_6465;
+        let first = match self.sequence {
+            Sequence::Whole { first } => first,
+            Sequence::Halves => 0,
+        };
+        SampleStream::new(StreamKey::new(self.seed ^ BESIDE, self.step, self.view, pixel as u32), first)
+    }
+
     /// Whether a sample is of the second half, and its number in its sequence.
     fn place(&self, sample: usize, samples: usize) -> (bool, u32) {
         let half = (samples / 2).max(1);

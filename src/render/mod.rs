@@ -12,7 +12,7 @@
 //! 5. [`cached`]: the same light without rays, for scenes whose geometry is known and stays. [`relight`]: a view of it
 //!    under any light, at once.
 //! 6. [`picture`]: pictures and layers. [`first_hits`]: primary rays traced once.
-//!    [`progressive`]: a picture that refines. [`regions`] and [`measured_regions`]: pictures in which parts of the
+//!    [`progressive`]: a picture that refines. [`ground`]: the shadow on a ground that is not there. [`regions`] and [`measured_regions`]: pictures in which parts of the
 //!    surface have measured reflectance in place of the maps'; nothing is fitted there, so no record is kept.
 //!
 //! The record replaces a second tracing pass: it lives for one pixel, so memory grows neither with the picture nor
@@ -23,6 +23,7 @@
 pub mod accumulate;
 pub mod cached;
 pub mod first_hits;
+pub mod ground;
 pub mod measured_regions;
 pub mod packet;
 pub mod path;

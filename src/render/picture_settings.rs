@@ -19,6 +19,9 @@ pub struct PictureSettings {
     pub background_visible: bool,
     /// Whether the back of a triangle reflects like its front; otherwise it is black.
     pub two_sided: bool,
+    /// Height (y of the world) of a level ground that shows the shadow of the surface on the environment behind it; of
+    /// pictures that are refined ([`PictureTracer`](super::progressive::PictureTracer)).
+    pub ground: Option<f32>,
     /// Seed of the random numbers.
     pub seed: u64,
 }
@@ -33,6 +36,7 @@ impl Default for PictureSettings {
             lobe_strength: 1.0,
             background_visible: true,
             two_sided: false,
+            ground: None,
             seed: 1,
         }
     }

@@ -8,15 +8,16 @@
 
 use super::accumulate::{PassKey, estimate_pixel};
 use super::first_hits::CameraRays;
+use super::ground::Ground;
 use super::path::{PathArena, PathSettings, PathTracer};
 use super::picture_settings::PictureSettings;
 use super::sums::Parameters;
 use super::surface::Surface;
 use crate::image::resize::enlarge;
 use crate::image::{GreyImage, Image, RgbImage};
-use crate::light::EnvironmentSampler;
+use crate::light::{Environment, EnvironmentSampler};
 use crate::scene::Camera;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -29,14 +30,18 @@ pub struct PictureTracer<'a> {
     surface: &'a Surface,
     parameters: &'a Parameters<f32>,
     sampler: EnvironmentSampler,
+    /// The environment where a ground lies in it.
+    environment: Option<Environment>,
     settings: PictureSettings,
 }
 
 impl<'a> PictureTracer<'a> {
     /// Prepares the light for sampling. `samples` and `groups` of the settings are not read: each call names its own.
     pub fn new(surface: &'a Surface, parameters: &'a Parameters<f32>, settings: PictureSettings) -> Self {
-        let sampler = EnvironmentSampler::new(&parameters.environment());
-        PictureTracer { surface, parameters, sampler, settings }
+        let environment = parameters.environment();
+        let sampler = EnvironmentSampler::new(&environment);
+        let environment = settings.ground.is_some().then_some(environment);
+        PictureTracer { surface, parameters, sampler, environment, settings }
     }
 
     /// The path tracer behind it, for sums of one's own.
@@ -72,8 +77,8 @@ impl<'a> PictureTracer<'a> {
         &self.settings
     }
 
-    /// Mean radiance of a pixel (row-major index) over `samples` paths, and the share of the pixel that the surface covers,
-    /// in [0, 1]. Sets of different numbers are independent.
+    /// Mean radiance of a pixel (row-major index) over `samples` paths, and the share of the pixel that the surface covers or
+    /// its shadow on the ground darkens, in [0, 1]. Sets of different numbers are independent.
     pub fn pixel(
         &self,
         camera: &Camera,
@@ -96,7 +101,41 @@ impl<'a> PictureTracer<'a> {
     ) -> (Vec3, f32) {
         let rays = CameraRays::fresh(self.surface, camera, self.settings.filter, samples);
         let estimate = estimate_pixel(&self.paths(), &rays, pixel, key, self.parameters, arena);
-        (estimate.mean(rays.samples()), 1.0 - estimate.escaped)
+        let mean = estimate.mean(rays.samples());
+        match (self.settings.ground, &self.environment) {
+            (Some(height), Some(environment)) if estimate.escaped > 0.0 => {
+                let lit = self.lit_ground(environment, height, camera, key, pixel, samples);
+                let behind = match self.settings.background_visible {
+                    true => environment.radiance_towards(lit.direction) * estimate.escaped,
+                    false => Vec3::ZERO,
+                };
+                // Never below nothing: within a pixel the environment may be brighter than where it is looked up.
+                ((mean - behind * (1.0 - lit.share)).max(Vec3::ZERO), 1.0 - estimate.escaped * lit.share)
+            }
+            _ => (mean, 1.0 - estimate.escaped),
+        }
+    }
+
+    /// The share of light on the ground that a ray of this pixel meets.
+    fn lit_ground(
+        &self,
+        environment: &Environment,
+        height: f32,
+        camera: &Camera,
+        key: PassKey,
+        pixel: usize,
+        samples: usize,
+    ) -> LitGround {
+        let ground = Ground::new(self.surface, &self.sampler, environment, height);
+        // A sequence of its own: the paths of the picture stay the same.
+        let mut stream = key.beside(pixel);
+        let [across, down] = stream.next_pair();
+        let place = Vec2::new((pixel % camera.width) as f32 + across, (pixel / camera.width) as f32 + down);
+        let ray = camera.ray_through(place);
+        LitGround {
+            share: ground.lit_share(&ray, samples.max(LEAST_SHADOW_RAYS), &mut stream),
+            direction: ray.direction,
+        }
     }
 
     /// A picture of one sample a pixel at `1/factor` of the camera's size, enlarged bilinearly to the full size: an
@@ -126,6 +165,15 @@ impl<'a> PictureTracer<'a> {
         Some(Image::from_fn(camera.width, camera.height, |row, column| large[(row, column)]))
     }
 }
+
+/// What a pixel sees of the ground.
+struct LitGround {
+    share: f32,
+    direction: Vec3,
+}
+
+/// Directions towards the light for a look at the ground: a ratio of sums of fewer is biased.
+const LEAST_SHADOW_RAYS: usize = 8;
 
 /// The mean of the passes so far.
 #[derive(Clone, Debug, PartialEq)]
@@ -164,7 +212,7 @@ impl Accumulation {
         &self.mean
     }
 
-    /// Share of each pixel that the surface covers, in [0, 1].
+    /// Share of each pixel that the surface covers or its shadow on the ground darkens, in [0, 1].
     pub fn coverage(&self) -> &GreyImage {
         &self.coverage
     }

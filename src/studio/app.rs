@@ -204,6 +204,19 @@ fn is_at_work(status: &FitStatus) -> bool {
     status.is_live() && *status != FitStatus::Paused
 }
 
+/// Draws a ring around whatever has the keys, so that it is seen everywhere and not only where a control draws one itself.
+fn focus_ring(context: &Context) {
+    let Some(focused) = context.memory(|memory| memory.focused()) else { return };
+    let Some(response) = context.read_response(focused) else { return };
+    let rect = response.rect.intersect(response.interact_rect).expand(2.0);
+    if rect.is_positive() {
+        let colour = theme::palette(&context.global_style().visuals).accent;
+        let layer = egui::LayerId::new(egui::Order::Tooltip, egui::Id::unique("focus ring"));
+        let stroke = egui::Stroke::new(2.0, colour);
+        context.layer_painter(layer).rect_stroke(rect, 4.0, stroke, egui::StrokeKind::Outside);
+    }
+}
+
 /// A control that was pressed by the mouse does not keep the keys: Space goes on to pause and not to press it again.
 fn release_focus(context: &Context) {
     let released = context.input(|input| input.pointer.any_released());
@@ -258,6 +271,7 @@ impl eframe::App for Studio {
         }
         self.model.nobody_waits = is_at_work(&self.model.fit.status) && self.touched.elapsed() > PERSON_WAITS;
         self.draw(ui);
+        focus_ring(&context);
         release_focus(&context);
         for act in std::mem::take(&mut self.model.acts) {
             let layout = match self.model.workspace {
@@ -273,6 +287,7 @@ impl eframe::App for Studio {
             }
         }
         self.take_up_sizes(&context);
+        self.model.follow_day();
         let seconds = context.input(|input| input.time);
         self.model.history.feed(seconds, &self.model.edits);
         self.model.send_changed_settings(&context);

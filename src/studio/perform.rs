@@ -28,6 +28,7 @@ pub fn perform(act: Act, model: &mut Model, layout: &mut Layout, context: &Conte
     match act {
         Act::OpenFolder => model.dialog = ask(PickFor::Open),
         Act::Import => model.ask_to_import(None),
+        Act::AddLightFolder => model.dialog = ask(PickFor::LightFolder),
         Act::AddLight => model.dialog = ask(PickFor::Light),
         Act::OpenDemo => model.open_demo(),
         Act::CloseProject => model.close(),
@@ -56,6 +57,9 @@ pub fn perform(act: Act, model: &mut Model, layout: &mut Layout, context: &Conte
         Act::Checkpoint => model.fit.send(Command::Checkpoint),
 
         Act::FitView => model.frame_scene(),
+        Act::NavigatePatina | Act::NavigateBlender | Act::NavigateMaya => {
+            model.preferences.navigation = act.navigation().unwrap_or_default();
+        }
         Act::LookThrough => model.look_through(!model.switches.looking_through),
         Act::NextView => choose_next(model, 1),
         Act::PreviousView => choose_next(model, -1),
@@ -69,6 +73,7 @@ pub fn perform(act: Act, model: &mut Model, layout: &mut Layout, context: &Conte
             let is_wiped = matches!(model.edits.photo, PhotoLook::Wipe(_));
             show_photo(model, if is_wiped { PhotoLook::Off } else { PhotoLook::Wipe(0.5) });
         }
+        Act::CompareRun => model.dialog = ask(PickFor::OtherRun),
         Act::ErrorOverlay if model.edits.layer == Layer::PhotoError => model.edits.layer = Layer::Lit,
         Act::ErrorOverlay | Act::LayerPhotoError => show_computed(model, Layer::PhotoError),
         Act::LayerCoverage => show_computed(model, Layer::Coverage),
@@ -207,7 +212,7 @@ fn show_panel(act: Act, model: &mut Model) {
 }
 
 /// Opens a file or folder with whatever the system shows it by; says so when it is gone.
-fn open_file(path: &Path, log: &mut Log, context: &Context) {
+pub(super) fn open_file(path: &Path, log: &mut Log, context: &Context) {
     if !path.exists() {
         let error = Error::new(ErrorKind::Missing, "this is no longer on disk").at(Place::File(path.into()));
         return log.error(&error.remedy("look whether the folder was moved, and open it again from there"));

@@ -8,7 +8,7 @@ use patina::studio::act::{Act, ActInfo, Group, LIST};
 use patina::studio::layout::Panel;
 use patina::studio::model::tasks::TaskKind;
 use patina::studio::model::{Dialog, FitStatus, LightName, Workspace};
-use patina::studio::stage::Layer;
+use patina::studio::stage::{Layer, Navigation};
 
 /// The title of an act's menu.
 fn menu_of(info: &ActInfo) -> &'static str {
@@ -36,6 +36,7 @@ fn give_it_work(studio: &mut TestStudio, act: Act) {
     model.edits.relight.turn_degrees = 30.0;
     model.edits.display.exposure_stops = 1.25;
     model.eye.distance *= 1.5;
+    model.preferences.navigation = if act == Act::NavigateMaya { Navigation::Patina } else { Navigation::Maya };
     let edits = model.edits.clone();
     model.history.restart(&edits);
     studio.harness.ctx.set_zoom_factor(1.1);
@@ -73,7 +74,7 @@ fn everything(studio: &mut TestStudio) -> String {
         model.edits,
         model.switches,
         (&model.dialog, model.guide),
-        model.preferences.theme,
+        (model.preferences.theme, model.preferences.navigation),
         model.eye
     )
 }

@@ -1,9 +1,10 @@
 //! A film strip of opening a scene and of one fit: pictures to look at, and when each thing was there first.
 
-use super::adapter::has_adapter;
-use super::support::TestStudio;
+use super::adapter::{has_adapter, rendered};
+use super::support::{TestStudio, finished_run};
 use egui_kittest::Harness;
 use patina::studio::act::Act;
+use patina::studio::layout::Panel;
 use patina::studio::model::{FitStatus, Model};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -125,5 +126,45 @@ fn a_scene_from_the_first_second_to_the_end() {
     }
     for (what, seconds) in &film.told {
         println!("{what}: {seconds:.1} s");
+    }
+}
+
+#[test]
+#[ignore = "writes pictures of every panel in a small and in an enlarged window into the folder PATINA_FILM"]
+fn every_panel_in_a_small_window_and_at_a_large_scale() {
+    let (Some(folder), true) = (std::env::var_os("PATINA_FILM"), has_adapter()) else { return };
+    let folder = PathBuf::from(folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    for (name, size, scale) in
+        [("small", [900.0, 600.0], 1.0), ("large_letters", [1440.0, 900.0], 1.7), ("usual", [1440.0, 900.0], 1.0)]
+    {
+        let builder = Harness::builder().with_size(size).wgpu();
+        let folder_of_studio = Arc::new(tempfile::tempdir().unwrap());
+        let mut studio = TestStudio::built(builder, folder_of_studio, None);
+        studio.harness.ctx.set_zoom_factor(scale);
+        studio.frames(3);
+        let shot = |studio: &mut TestStudio, what: &str| {
+            studio.frames(3);
+            rendered(&mut studio.harness).unwrap().save(folder.join(format!("{name}_{what}.png"))).unwrap();
+        };
+        shot(&mut studio, "welcome");
+        studio.model().open(finished_run().into());
+        studio.wait("the run", |model| model.project.is_some());
+        shot(&mut studio, "first");
+        for (panel, title, _) in Panel::ALL {
+            studio.show(panel);
+            shot(&mut studio, &title.to_lowercase().replace(' ', "_"));
+        }
+        for (what, act) in [
+            ("palette", Act::Palette),
+            ("help", Act::Help),
+            ("export", Act::Export),
+            ("image", Act::SavePicture),
+            ("import", Act::Import),
+        ] {
+            studio.act(act);
+            shot(&mut studio, what);
+            studio.model().dialog = Default::default();
+        }
     }
 }

@@ -1,12 +1,14 @@
 //! The manners of a good tool: undo, the palette, themes, help, zoom, the stage alone.
 
 use super::support::{Key, Modifiers, TestStudio};
+use egui_kittest::kittest::NodeT;
 use patina::image::histogram::auto_exposure;
 use patina::studio::act::{Act, LIST};
 use patina::studio::layout::Panel;
 use patina::studio::model::Dialog;
 use patina::studio::model::lights::LightName;
 use patina::studio::model::store::ThemeChoice;
+use patina::studio::stage::Navigation;
 
 /// Frames until a change counts as one step of undo.
 const SETTLED: usize = 6;
@@ -161,4 +163,79 @@ fn display_keys_change_what_they_say() {
     let measured = auto_exposure(&project.thumbnails[project.chosen_view]);
     assert!(measured != 0.0 && measured.abs() <= 20.0, "{measured}");
     assert_eq!(studio.model().edits.display.exposure_stops, measured);
+}
+
+/// A studio in a window of its own size, at a scale of the interface.
+fn sized(size: [f32; 2], zoom: f32) -> TestStudio {
+    let builder = egui_kittest::Harness::builder().with_size(size);
+    let folder = std::sync::Arc::new(tempfile::tempdir().unwrap());
+    let mut studio = TestStudio::built(builder, folder, Some(super::support::finished_run().into()));
+    studio.harness.ctx.set_zoom_factor(zoom);
+    studio.wait("the run", |model| model.project.is_some());
+    studio.frames(3);
+    studio
+}
+
+#[test]
+fn a_small_window_and_large_letters_leave_dialogs_within_the_window() {
+    for (size, zoom) in [([900.0, 600.0], 1.0), ([1440.0, 900.0], 1.7), ([900.0, 600.0], 1.7)] {
+        let mut studio = sized(size, zoom);
+        let within = studio.harness.ctx.content_rect().expand(1.0);
+        for (act, labels) in [
+            (Act::Palette, vec!["Type a command"]),
+            (Act::SavePicture, vec!["Save", "Image file"]),
+            (Act::Export, vec!["Export folder"]),
+            (Act::OpenFolder, vec!["Open this"]),
+        ] {
+            studio.act(act);
+            studio.frames(3);
+            for label in labels {
+                studio.control(label).scroll_to_me();
+                studio.frames(6);
+                let rect = studio.control(label).rect();
+                assert!(within.contains_rect(rect), "{act:?} {size:?} {zoom}: {label} {rect:?} {within:?}");
+            }
+            studio.model().dialog = Dialog::None;
+            studio.frames(2);
+        }
+    }
+}
+
+#[test]
+fn the_palette_keeps_its_height_while_one_types() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.press(Modifiers::COMMAND, Key::K);
+    studio.frames(3);
+    let field = studio.control("Type a command").rect();
+    studio.type_text("layer that is not there");
+    studio.frames(3);
+    assert_eq!(studio.control("Type a command").rect(), field, "what is typed stays where it is");
+}
+
+#[test]
+fn the_first_stop_of_tab_is_the_main_button_and_it_wears_a_ring() {
+    let mut studio = TestStudio::new();
+    studio.frames(2);
+    studio.press(Modifiers::NONE, Key::Tab);
+    assert!(studio.control("Open the built-in demo").accesskit_node().is_focused());
+    // From there Tab goes on, and does not come back by itself.
+    studio.press(Modifiers::NONE, Key::Tab);
+    assert!(!studio.control("Open the built-in demo").accesskit_node().is_focused());
+}
+
+#[test]
+fn hand_movements_are_chosen_in_the_menu_and_remembered() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.click_first("View");
+    studio.line("Navigate as in Blender").click();
+    studio.frames(3);
+    assert_eq!(studio.model().preferences.navigation, Navigation::Blender);
+    studio.act(Act::Help);
+    studio.frames(2);
+    assert!(studio.says("Middle-drag to orbit, Shift-middle-drag to pan"));
+    studio.model().dialog = Dialog::None;
+    let folder = studio.close();
+    let mut again = TestStudio::in_folder(folder, None);
+    again.frames(1);
+    assert_eq!(again.model().preferences.navigation, Navigation::Blender);
 }

@@ -104,9 +104,14 @@ fn a_photo_is_compared_with_its_render() {
     studio.frames(2);
     studio.press(Modifiers::NONE, Key::ArrowRight);
     assert!(studio.number("Photo divider") > before, "the line is moved by keys too");
-    for way in ["Difference", "Photo only"] {
+    for way in ["Difference", "Blink", "Overlay", "Photo only"] {
         studio.click(way);
         assert!(studio.controls("Photo divider").is_empty());
+        assert_eq!(studio.controls("Opacity of the render").is_empty(), way != "Overlay", "{way}");
+        if way == "Overlay" {
+            studio.move_slider("Opacity of the render", 0.25);
+            assert_eq!(studio.number("Opacity of the render"), 0.25);
+        }
     }
     studio.click("Excluded pixels");
     let chosen = studio.model().project.as_ref().unwrap().chosen_view;
@@ -238,11 +243,27 @@ fn a_finding_with_a_place_is_a_link_that_goes_there() {
     assert!(!studio.controls("Rate light").is_empty(), "the form opens at the setting");
 }
 
+/// What a button puts on the clipboard.
+fn copied_by(studio: &mut TestStudio, button: &str) -> String {
+    studio.control(button).click();
+    studio.harness.step();
+    let commands = studio.harness.output().platform_output.commands.clone();
+    let copied = commands.into_iter().find_map(|command| match command {
+        eframe::egui::OutputCommand::CopyText(text) => Some(text),
+        _ => None,
+    });
+    copied.unwrap_or_default()
+}
+
 #[test]
 fn curves_are_drawn_over_steps_and_seconds_whole_and_by_stage() {
     let mut studio = TestStudio::with_finished_run();
     studio.show(Panel::Curves);
     assert!(studio.says("Held-out RMSE") && studio.controls("Log axis").is_empty(), "one line at first");
+    let csv = copied_by(&mut studio, "Copy CSV");
+    assert_eq!(csv.lines().count(), 1 + studio.model().fit.losses.len());
+    let svg = copied_by(&mut studio, "Copy SVG");
+    assert!(svg.contains("<svg") && svg.contains("held-out photos"), "{svg}");
     studio.click("Details");
     for control in ["X axis: Time", "Log axis", "X axis: Steps", "Log axis"] {
         studio.click(control);
@@ -276,4 +297,92 @@ fn the_photo_lies_over_the_stage_and_against_it() {
     assert_eq!(studio.model().edits.photo, PhotoLook::Wipe(0.5));
     studio.press(Modifiers::NONE, Key::C);
     assert_eq!((studio.model().edits.photo, studio.model().switches.looking_through), (PhotoLook::Off, false));
+}
+
+#[test]
+fn a_message_has_a_button_where_the_terminal_names_a_flag() {
+    let mut studio = TestStudio::with_small_scene();
+    let name = studio.model().project.as_ref().unwrap().scene.as_ref().unwrap().views[2].name.clone();
+    let finding = |remedy: &str| {
+        Message::from(
+            &Finding::new(Severity::Warning, "test", "photos differ").at(Place::View(name.clone())).remedy(remedy),
+        )
+    };
+    studio.model().log.clear();
+    studio.model().log.add(finding("fit a gain for each photo: --exposure; or leave it out: --exclude NAME"));
+    studio.show(Panel::Messages);
+    assert!(studio.says("Per-photo exposure compensation") && !studio.says("--exposure"), "{}", studio.log());
+    assert!(!studio.model().edits.fit.exposure);
+    studio.click("Turn exposure compensation on");
+    assert!(studio.model().edits.fit.exposure);
+    assert!(studio.controls("Turn exposure compensation on").is_empty(), "what was taken is no longer offered");
+    studio.click(&format!("Exclude {name}"));
+    assert_eq!(studio.model().edits.fit.exclude, [name]);
+}
+
+#[test]
+fn reflectances_are_held_against_those_of_materials_that_exist() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.show(Panel::Scores);
+    assert!(studio.says("Plausibility"));
+    // The same run with far too much shine.
+    let project = studio.model().project.as_mut().unwrap();
+    let mut maps = (**project.maps.as_ref().unwrap()).clone();
+    maps.specular = maps.specular.map(|_| glam::Vec3::splat(0.136));
+    maps.diffuse = maps.diffuse.map(|_| glam::Vec3::splat(0.5));
+    project.maps = Some(std::sync::Arc::new(maps));
+    studio.frames(2);
+    assert!(studio.says("specular reflectance F0 is 0.136") || studio.says("Specular reflectance F0 is 0.136"));
+    studio.control("Scale reflectance by 0.29");
+}
+
+#[test]
+fn clipped_shares_are_told_once_rays_tell_the_object_from_the_sky() {
+    let mut studio = TestStudio::with_scene_just_read();
+    assert!(studio.model().project.as_ref().unwrap().clipped_shares.is_empty(), "a bright sky would count");
+    studio.show(Panel::Views);
+    studio.wait("the atlas", |model| model.project.as_ref().is_some_and(|own| own.surface.is_some()));
+    assert_eq!(studio.model().project.as_ref().unwrap().clipped_shares.len(), 8);
+}
+
+#[test]
+fn another_run_of_the_scene_stands_in_the_photo_s_place() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.show(Panel::Photo);
+    studio.click("Compare run…");
+    studio.type_text(&super::support::finished_run().display().to_string());
+    studio.click("Open this");
+    studio.wait("the other run", |model| model.other_run.is_some());
+    studio.frames(3);
+    let name = studio.model().other_run.as_ref().unwrap().name.clone();
+    studio.click("Against");
+    studio.click_role(Role::Button, &name);
+    assert_eq!(studio.control("Against").value().as_deref(), Some(name.as_str()));
+    // A folder that is no run, or one of another scene, is refused with a remedy.
+    studio.model().compare_with(super::support::small_scene().into());
+    studio.wait("the error", |model| model.log.banner().is_some());
+    assert!(studio.says("Fix: "), "{}", studio.log());
+    studio.model().close();
+    assert!(studio.model().other_run.is_none());
+}
+
+#[test]
+fn a_message_about_a_file_has_a_link_that_opens_it() {
+    let mut studio = TestStudio::with_small_scene();
+    let there = studio.folder.path().join("my picture.png");
+    std::fs::write(&there, b"").unwrap();
+    studio.model().log.clear();
+    studio.model().log.note_of_file("Saved a picture", &there);
+    let gone = studio.folder.path().join("gone.png");
+    studio.model().log.note_of_file("Saved another", gone);
+    studio.show(Panel::Messages);
+    assert!(studio.controls("Open gone.png").is_empty());
+    studio.control("Open my picture.png").click();
+    studio.harness.step();
+    let commands = studio.harness.output().platform_output.commands.clone();
+    let opened = commands.into_iter().find_map(|command| match command {
+        eframe::egui::OutputCommand::OpenUrl(url) => Some(url.url),
+        _ => None,
+    });
+    assert!(opened.is_some_and(|url| url.starts_with("file://") && url.ends_with("my%20picture.png")));
 }

@@ -4,6 +4,7 @@ use super::support::{Key, Modifiers, Role, TestStudio};
 use eframe::egui;
 use glam::Vec3;
 use patina::image::{RgbImage, file};
+use patina::studio::act::Act;
 use patina::studio::model::LightName;
 use patina::studio::stage::Layer;
 use std::path::{Path, PathBuf};
@@ -58,9 +59,62 @@ fn lights_are_swapped_by_click_and_by_arrow_and_the_fitted_one_comes_back() {
     assert_ne!(studio.model().edits.relight.first, sky("noon"), "the shelf goes on before the skies");
     studio.press(Modifiers::NONE, Key::Home);
     assert_eq!(studio.model().edits.relight.first, LightName::Fitted);
-    studio.click_role(Role::RadioButton, "Overcast sky");
+    studio.click_role(Role::RadioButton, "Sky by the hour");
     studio.press(Modifiers::NONE, Key::ArrowRight);
     assert_eq!(studio.model().edits.relight.first, LightName::Fitted, "the shelf goes around");
+}
+
+#[test]
+fn the_sky_of_an_hour_follows_its_sliders_and_undo() {
+    let mut studio = TestStudio::with_finished_run();
+    assert!(studio.controls("Hour").is_empty(), "sliders of a sky that does not shine");
+    studio.click_role(Role::RadioButton, "Sky by the hour");
+    let sky = |studio: &mut TestStudio| Arc::clone(&studio.model().shelf.find(&LightName::Day).unwrap().environment);
+    let before = sky(&mut studio);
+    studio.move_slider("Hour", 8.0);
+    let morning = sky(&mut studio);
+    assert_ne!(*before, *morning);
+    // A winter in which the sun is not up at that hour: it is as early as it can be.
+    studio.move_slider("Latitude", 60.0);
+    studio.move_slider("Day of the year", 355.0);
+    studio.frames(2);
+    assert!(studio.model().edits.relight.day.hour > 8.5, "{:?}", studio.model().edits.relight.day);
+    assert_ne!(*sky(&mut studio), *morning);
+    // Undo feeds on what has settled for a while.
+    studio.model().edits.relight.day = Default::default();
+    studio.frames(2);
+    assert_eq!(*sky(&mut studio), *before);
+}
+
+#[test]
+fn a_folder_of_environments_is_put_on_the_shelf_and_searched() {
+    let mut studio = TestStudio::with_finished_run();
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["attic.hdr", "barn.hdr", "cellar.exr", "depot.exr", "field.hdr"] {
+        write_light(folder.path(), name);
+    }
+    studio.act(Act::AddLightFolder);
+    studio.type_text(&folder.path().display().to_string());
+    studio.click("Add this");
+    studio.wait("the last of them", |model| {
+        model.shelf.lights().iter().filter(|light| matches!(light.name, LightName::File(_))).count() == 5
+    });
+    assert_eq!(studio.model().edits.relight.first, LightName::Fitted, "a folder chooses none");
+    studio.replace_text("Find an environment", "bar");
+    assert!(studio.controls("attic").is_empty());
+    studio.click_role(Role::RadioButton, "barn");
+    studio.replace_text("Find an environment", "xyzzy");
+    assert!(studio.says("No matching environment"));
+    // A folder without any is an error that says what is wanted.
+    studio.act(Act::AddLightFolder);
+    let empty = tempfile::tempdir().unwrap();
+    studio.type_text(&empty.path().display().to_string());
+    studio.click("Add this");
+    assert!(
+        studio.says("no environment lies in this folder") || studio.log().contains("no environment"),
+        "{}",
+        studio.log()
+    );
 }
 
 #[test]
@@ -130,13 +184,13 @@ fn a_light_comes_by_path_or_by_drop_lights_the_stage_and_goes_again() {
     studio.type_text(&by_path.display().to_string());
     studio.click("Add this");
     studio.wait_for_word("Left was added to the environments");
-    studio.click_role(Role::RadioButton, "left");
     assert_eq!(studio.model().edits.relight.first, LightName::File(by_path.clone()));
 
     let dropped = write_light(folder.path(), "other.exr");
     drop_on_window(&mut studio, &dropped);
     studio.wait_for_word("Other was added to the environments");
     assert_eq!(studio.model().preferences.lights, [by_path.clone(), dropped]);
+    studio.click_role(Role::RadioButton, "left");
 
     studio.controls("left")[0].click_button(egui::PointerButton::Secondary);
     studio.frames(3);

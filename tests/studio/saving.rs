@@ -73,8 +73,9 @@ fn a_strip_shows_every_light_of_the_shelf_and_a_turntable_goes_around() {
     studio.click("Render turntable…");
     studio.type_number("Images", "3");
     save(&mut studio, &turntable, "Image folder");
-    let frames = files_of(&turntable);
-    assert_eq!(frames.len(), 3, "{frames:?}");
+    let (films, frames): (Vec<PathBuf>, Vec<PathBuf>) =
+        files_of(&turntable).into_iter().partition(|file| file.file_stem().is_some_and(|stem| stem == "turntable"));
+    assert_eq!((films.len(), frames.len()), (1, 3), "a film, as an animated PNG or by ffmpeg: {films:?} {frames:?}");
     frames.iter().for_each(|frame| assert_shows_something(frame));
     assert_ne!(std::fs::read(&frames[0]).unwrap(), std::fs::read(&frames[1]).unwrap());
 }
@@ -100,4 +101,32 @@ fn a_picture_that_cannot_be_written_is_told_and_one_that_is_not_wished_is_not() 
     studio.press(Modifiers::NONE, Key::Escape);
     assert!(!studio.says("Size (pixels)"));
     assert!(!studio.model().tasks.is_busy() && files_of(folder.path()).len() == 1);
+}
+
+#[test]
+fn an_image_is_cut_out_of_its_background_and_a_ground_keeps_its_shadow() {
+    let mut studio = TestStudio::with_finished_run();
+    let folder = tempfile::tempdir().unwrap();
+    // From far enough away to have something beside the object.
+    studio.model().eye.zoom(2.0, None);
+    let mut opaque = Vec::new();
+    for (name, ground) in [("alone.png", false), ("with_ground.png", true)] {
+        studio.model().log.clear();
+        if studio.model().edits.relight.ground != ground {
+            studio.click("Ground plane");
+        }
+        studio.press(Modifiers::COMMAND, Key::S);
+        studio.click("Transparent background");
+        let path = folder.path().join(name);
+        save(&mut studio, &path, "Image file");
+        let picture = image::open(&path).unwrap();
+        assert!(picture.color().has_alpha());
+        let alphas: Vec<u8> = picture.to_rgba8().pixels().map(|pixel| pixel.0[3]).collect();
+        assert!(alphas.contains(&255), "the object is opaque");
+        opaque.push(alphas.iter().map(|&alpha| u64::from(alpha)).sum::<u64>());
+        if !ground {
+            assert!(alphas.contains(&0), "and what is beside it is not there");
+        }
+    }
+    assert!(opaque[1] > opaque[0], "a shadow covers something: {opaque:?}");
 }

@@ -17,6 +17,8 @@ fn a_typed_path_opens_a_scene_and_the_next_start_remembers_it() {
     assert!(studio.says("8 photos (2 held out)"));
 
     let folder = studio.close();
+    let pictures = std::fs::read_dir(folder.path().join("thumbnails")).unwrap().count();
+    assert_eq!(pictures, 1, "the list shows what the place looks like");
     let mut again = TestStudio::in_folder(folder, None);
     again.frames(1);
     let name = small_scene().file_name().unwrap().to_string_lossy().into_owned();

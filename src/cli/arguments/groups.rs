@@ -109,7 +109,8 @@ mod tests {
             (Method::Solver, 1, true, Some(512)),
             (Method::Adam, 0, false, Some(256)),
         ] {
-            let settings = Suited { method, solver_refine, exposure, map_size }.resolve(&base, &[]);
+            let settings =
+                Suited { method, solver_refine, exposure, map_size, sharpest_map_size: None }.resolve(&base, &[]);
             for (name, _, taken) in base.differences(&settings) {
                 assert!(!told(&name), "--{name} tells a default, and {taken} was taken");
             }

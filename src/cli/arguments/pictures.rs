@@ -34,7 +34,8 @@ fn hits(text: &str) -> Result<usize, String> {
 pub struct RelightOptions {
     /// The run folder.
     pub run: PathBuf,
-    /// Environments: HDR, EXR or PFM files, or the built-in skies `noon`, `evening`, `overcast`.
+    /// Environments: HDR, EXR or PFM files, the built-in skies `noon`, `evening`, `overcast`, or the sky of an hour and a
+    /// latitude such as `16:30@48`, with a day of the year after a comma.
     #[arg(long, required = true, num_args = 1..)]
     pub env: Vec<String>,
     /// The scene whose cameras are used; the scene of the run when not given.

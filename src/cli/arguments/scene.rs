@@ -144,9 +144,10 @@ pub struct FitOptions {
     /// A settings file as in a run folder; options on the command line take precedence.
     #[arg(long, value_name = "FILE", help_heading = groups::METHOD)]
     pub settings: Option<PathBuf>,
-    /// The run folder to write. A result that is there is set aside in `earlier` until the new one is whole.
+    /// The run folder to write [default: a new one in `runs`, named after the scene]. A result that is there is set aside
+    /// in `earlier` until the new one is whole.
     #[arg(short, long, value_name = "RUN", help_heading = groups::OUTPUT)]
-    pub output: PathBuf,
+    pub output: Option<PathBuf>,
     /// How maps and environment are fitted.
     #[command(flatten)]
     pub fit: TypedSettings,

@@ -39,20 +39,25 @@
     uniform float sun_cosine;`;
   const surface_vertex = `#version 300 es
     precision highp float;
-    in vec3 position; in vec4 normal; in vec2 uv;
+    in vec3 position; in vec4 normal; in vec2 uv; in vec4 transfer_a, transfer_b;
     uniform vec3 low, extent; uniform mat4 clip_from_world;
-    out vec3 world, direction; out vec2 coordinate; out float openness;
+    out vec3 world, direction; out vec2 coordinate; out float openness; out vec4 passed_a, passed_b;
     void main() {
       world = low + extent * position;
       direction = normal.xyz;
       openness = normal.w;
+      passed_a = transfer_a;
+      passed_b = transfer_b;
       coordinate = uv;
       gl_Position = clip_from_world * vec4(world, 1.0);
     }`;
   const surface_fragment = `${common}
     precision highp sampler2DShadow;
-    in vec3 world, direction; in vec2 coordinate; in float openness;
+    in vec3 world, direction; in vec2 coordinate; in float openness; in vec4 passed_a, passed_b;
     uniform vec3 eye;
+    // The light in spherical harmonics about +y, turned, and the transfer that a byte of 127 stands for.
+    uniform vec3 harmonics[9];
+    uniform float largest;
     uniform mat4 shadow_from_world;
     uniform sampler2DShadow shadow_map;
     uniform float shadow_lift;
@@ -67,6 +72,24 @@
       float rows = float(textureSize(levels, 0).y) / (level_count - 1.0);
       float y = clamp(at.y * rows, 0.5, rows - 0.5) + (index - 1.0) * rows;
       return texture(levels, vec2(at.x, y / float(textureSize(levels, 0).y))).rgb;
+    }
+    // Irradiance over pi past the mesh itself: that of the open normal, less what is hidden in bands 0 to 2.
+    vec3 sky(vec3 n) {
+      // x, y and z of the usual definition; cosine lobe over pi: 1, 2/3, 1/4 of the bands.
+      float x = n.z, y = n.x, z = n.y;
+      vec4 a = largest * passed_a, b = largest * passed_b;
+      vec3 open = texture(irradiance_map, place(n)).rgb;
+      vec3 sum = harmonics[0] * 0.2820948 * (openness - 1.0);
+      sum += harmonics[1] * (a.x - 0.6666667 * 0.4886025 * y);
+      sum += harmonics[2] * (a.y - 0.6666667 * 0.4886025 * z);
+      sum += harmonics[3] * (a.z - 0.6666667 * 0.4886025 * x);
+      sum += harmonics[4] * (a.w - 0.25 * 1.0925484 * x * y);
+      sum += harmonics[5] * (b.x - 0.25 * 1.0925484 * y * z);
+      sum += harmonics[6] * (b.y - 0.25 * 0.3153916 * (3.0 * z * z - 1.0));
+      sum += harmonics[7] * (b.z - 0.25 * 1.0925484 * x * z);
+      sum += harmonics[8] * (b.w - 0.25 * 0.5462742 * (x * x - y * y));
+      // Never more than in the open, never less than a tenth of the even share.
+      return clamp(open + sum, 0.1 * openness * open, open);
     }
     // Share of the sun that a place sees: nine places of the map, each between four.
     float sunlit(vec3 n) {
@@ -93,7 +116,14 @@
       if (dot(n, o) < 0.0) n = normalize(n - 1.02 * dot(n, o) * o);
       vec2 at = vec2(coordinate.x, 1.0 - coordinate.y);
       float cosine = clamp(dot(n, o), 0.0, 1.0);
-      vec3 light = texture(diffuse_map, at).rgb * texture(irradiance_map, place(n)).rgb * openness;
+      vec3 albedo = texture(diffuse_map, at).rgb;
+      vec3 sun_share = vec3(0.0);
+      float i = dot(n, sun_towards);
+      if (sun_cosine <= 1.0 && i > 0.0) sun_share = sun_irradiance * i * sunlit(n);
+      // What is hidden of the sky is a surface like this one, as brightly lit: light goes back and forth in it.
+      vec3 falling = sky(n) + sun_share / PI;
+      vec3 returned = (1.0 - openness) * albedo;
+      vec3 light = albedo * (falling / (1.0 - returned) - sun_share / PI);
       if (has_lobe) {
         vec3 f0 = texture(specular_map, at).rgb;
         float width = texture(width_map, at).r;
@@ -106,9 +136,8 @@
         float open = clamp(pow(cosine + openness, exp2(-16.0 * width - 1.0)) - 1.0 + openness, 0.0, 1.0);
         light += (f0 * ab.x + ab.y) * mix(near, far, fract(index)) * open;
       }
-      float i = dot(n, sun_towards);
-      if (sun_cosine <= 1.0 && i > 0.0) {
-        vec3 reflected = texture(diffuse_map, at).rgb / PI;
+      if (sun_share != vec3(0.0)) {
+        vec3 reflected = albedo / PI;
         if (has_lobe) {
           vec3 h = normalize(sun_towards + o), f0 = texture(specular_map, at).rgb;
           // Wider by the sun's own width, of which a half vector sees half.
@@ -117,7 +146,7 @@
           vec3 fresnel = f0 + (1.0 - f0) * pow(clamp(1.0 - dot(h, o), 0.0, 1.0), 5.0);
           reflected += fresnel * lobe(width, i, max(cosine, 1e-3), clamp(dot(n, h), 0.0, 1.0));
         }
-        light += reflected * sun_irradiance * i * sunlit(n);
+        light += reflected * sun_share;
       }
       colour = vec4(shown(light), 1.0);
     }`;
@@ -180,6 +209,15 @@
   };
   attribute("position", words(data.mesh.positions), 3, gl.UNSIGNED_SHORT, true);
   attribute("normal", new Int8Array(bytes(data.mesh.normals).buffer), 4, gl.BYTE, true);
+  const transfer = new Int8Array(bytes(data.mesh.transfer).buffer);
+  const half_of = (first) => {
+    const part = new Int8Array(transfer.length / 2);
+    for (let vertex = 0; vertex < part.length / 4; vertex++)
+      for (let k = 0; k < 4; k++) part[4 * vertex + k] = transfer[8 * vertex + first + k];
+    return part;
+  };
+  attribute("transfer_a", half_of(0), 4, gl.BYTE, true);
+  attribute("transfer_b", half_of(4), 4, gl.BYTE, true);
   attribute("uv", words(data.mesh.uvs), 2, gl.UNSIGNED_SHORT, true);
   const indices = new Uint32Array(bytes(data.mesh.indices).buffer);
   gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
@@ -213,7 +251,7 @@
     }
     const rows = blurred.reduce((sum, part) => sum + part.height, 0);
     return {
-      name: light.name, mean: light.mean, sun: light.sun, sharp: rgba(light.levels[0]), irradiance: rgba(light.irradiance),
+      name: light.name, mean: light.mean, sun: light.sun, harmonics: light.harmonics, sharp: rgba(light.levels[0]), irradiance: rgba(light.irradiance),
       levels: floats(blurred[0].width, rows, stacked, gl.RGBA16F, gl.RGBA, gl.REPEAT),
     };
   });
@@ -309,13 +347,27 @@
     return { towards, irradiance: light.sun.irradiance, cosine: light.sun.cosine, matrix };
   }
 
+  // Harmonics of a light that is turned as the maps are: what was at azimuth phi (from -z towards +x) goes to phi - turn.
+  function turned_harmonics(light, turn) {
+    const own = light.harmonics, result = own.map((value) => value.slice());
+    // About +y, with x at +z and y at +x, the azimuth of the functions goes the other way round.
+    for (const [sine, cosine, order] of [[1, 3, 1], [5, 7, 1], [4, 8, 2]]) {
+      const c = Math.cos(order * turn), s = Math.sin(order * turn);
+      for (let channel = 0; channel < 3; channel++) {
+        result[sine][channel] = c * own[sine][channel] + s * own[cosine][channel];
+        result[cosine][channel] = c * own[cosine][channel] - s * own[sine][channel];
+      }
+    }
+    return new Float32Array(result.flat());
+  }
+
   // ---- Controls
   const chosen = { light: 0, view: -1 };
   const option = (select, text, value) => select.add(new Option(text, value));
   lights.forEach((light, i) => option(element("light"), light.name, i));
   option(element("view"), "none", -1);
   data.photos.forEach((photo, i) => option(element("view"), photo.name, i));
-  const remarks = ["Raster preview: only the sun casts sharp shadows; light between surfaces is not shown."];
+  const remarks = ["Raster preview: only the sun casts sharp shadows; light between surfaces is a rough guess."];
   if (!data.hasLobe) remarks.push("The surface was fitted without a specular lobe.");
   if (!lights.length) remarks.push("The run has no environment.");
   note.textContent = `${data.name} · ${remarks.join(" ")}`;
@@ -430,6 +482,8 @@
     gl.uniform3fv(surface.uniforms.extent, data.mesh.extent);
     gl.uniform3fv(surface.uniforms.eye, camera.eye);
     gl.uniformMatrix4fv(surface.uniforms.clip_from_world, false, camera.clip);
+    gl.uniform3fv(surface.uniforms["harmonics[0]"], turned_harmonics(light, (+element("rotation").value * Math.PI) / 180));
+    gl.uniform1f(surface.uniforms.largest, data.mesh.largest);
     gl.uniform1f(surface.uniforms.level_count, data.levels);
     gl.uniform1i(surface.uniforms.has_lobe, data.hasLobe ? 1 : 0);
     bind(1, "levels", light.levels, surface);

@@ -142,6 +142,12 @@ pub fn write_exr_rgb(path: &Path, image: &RgbImage) -> Result<()> {
     write_atomically(path, |writer| openexr::write_rgb(writer, image))
 }
 
+/// Writes OpenEXR with float channels `R G B A`: one part, scanlines, ZIP. Colours are multiplied by alpha, as the format
+/// has it.
+pub fn write_exr_rgba(path: &Path, image: &RgbImage, alpha: &GreyImage) -> Result<()> {
+    write_atomically(path, |writer| openexr::write_rgba(writer, image, alpha))
+}
+
 /// Writes OpenEXR with one float channel `Y`: one part, scanlines, ZIP.
 pub fn write_exr_grey(path: &Path, image: &GreyImage) -> Result<()> {
     write_atomically(path, |writer| openexr::write_grey(writer, image))
@@ -163,6 +169,20 @@ pub fn write_hdr(path: &Path, image: &RgbImage) -> Result<()> {
 /// Writes sRGB bytes as PNG.
 pub fn write_png_srgb8(path: &Path, image: &Image<[u8; 3]>) -> Result<()> {
     write_bytes(path, &encode_png_srgb8(image)?)
+}
+
+/// Writes sRGB bytes with alpha as PNG; colours are not multiplied by alpha, as the format has it.
+pub fn write_png_srgba8(path: &Path, image: &Image<[u8; 4]>) -> Result<()> {
+    let mut bytes = Vec::new();
+    PngEncoder::new(&mut bytes)
+        .write_image(
+            image.pixels().as_flattened(),
+            image.width() as u32,
+            image.height() as u32,
+            ExtendedColorType::Rgba8,
+        )
+        .map_err(|error| cannot_encode("PNG", &error))?;
+    write_bytes(path, &bytes)
 }
 
 /// sRGB bytes as the bytes of a PNG file. Error: an image without pixels.

@@ -249,6 +249,13 @@ pub fn write_rgb(writer: &mut (impl Write + Seek), image: &RgbImage) -> std::io:
     write_channels(writer, image.width(), image.height(), channels)
 }
 
+/// Writes `R G B A` as floats: one part, scanlines, ZIP.
+pub fn write_rgba(writer: &mut (impl Write + Seek), image: &RgbImage, alpha: &GreyImage) -> std::io::Result<()> {
+    let channel = |index: usize| image.pixels().iter().map(|rgb| rgb[index]).collect();
+    let channels = vec![("A", alpha.pixels().to_vec()), ("B", channel(2)), ("G", channel(1)), ("R", channel(0))];
+    write_channels(writer, image.width(), image.height(), channels)
+}
+
 /// Writes one channel `Y` as floats: one part, scanlines, ZIP.
 pub fn write_grey(writer: &mut (impl Write + Seek), image: &GreyImage) -> std::io::Result<()> {
     write_channels(writer, image.width(), image.height(), vec![("Y", image.pixels().to_vec())])

@@ -127,6 +127,7 @@ fn sums(
     let fit = fitter.settings();
     let settings = PictureSettings {
         two_sided: false,
+        ground: None,
         samples: SAMPLES,
         groups: GROUPS,
         filter: fit.pixel_filter,

@@ -64,6 +64,8 @@ pub struct Report {
     /// How many texels of one size the whole surface takes so that each is as small as what a pixel covers where training
     /// photos look closely; `None` where none of them sees it.
     pub texels_resolved: Option<f64>,
+    /// The same where photos show the surface most sharply; `None` where nothing is seen.
+    pub texels_resolved_sharpest: Option<f64>,
     /// How photos agree where they show the same surface, the median over the views: [`agreement`]; `None` where they share
     /// too little.
     pub agreement: Option<f64>,

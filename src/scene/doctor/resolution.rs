@@ -12,8 +12,10 @@ use rayon::prelude::*;
 /// Share of the surface, each piece counted as often as it is seen, that is covered by larger pixels than the one that
 /// counts: grazing and distant looks at a place go unheeded, and so do a few very close ones.
 const COARSER_SHARE: f64 = 0.75;
+/// The same where only the sharpest part counts.
+const COARSER_THAN_SHARPEST: f64 = 0.95;
 
-/// Sets [`Report::texels_resolved`] from what the probes of the training views meet.
+/// Sets [`Report::texels_resolved`] and [`Report::texels_resolved_sharpest`] from what the probes of the training views meet.
 pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
     let training = scene.views.par_iter().zip(probes).filter(|(view, _)| !view.held_out);
     let mut pieces: Vec<f64> = training
@@ -27,13 +29,18 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
         })
         .collect();
     pieces.sort_unstable_by(|one, other| other.total_cmp(one));
-    let coarser = COARSER_SHARE * pieces.iter().sum::<f64>();
-    let mut so_far = 0.0;
-    let chosen = pieces.iter().find(|&&area| {
-        so_far += area;
-        so_far >= coarser
-    });
-    report.texels_resolved = chosen.map(|area| surface_area(&scene.mesh) / area);
+    let whole = surface_area(&scene.mesh);
+    let resolved = |coarser_share: f64| {
+        let coarser = coarser_share * pieces.iter().sum::<f64>();
+        let mut so_far = 0.0;
+        let chosen = pieces.iter().find(|&&area| {
+            so_far += area;
+            so_far >= coarser
+        });
+        chosen.map(|area| whole / area)
+    };
+    report.texels_resolved = resolved(COARSER_SHARE);
+    report.texels_resolved_sharpest = resolved(COARSER_THAN_SHARPEST);
 }
 
 fn surface_area(mesh: &Mesh) -> f64 {
@@ -90,6 +97,9 @@ mod tests {
         // One of eight looks.
         let few = doctor::check(&square(&[2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 1.0], 64)).texels_resolved.unwrap();
         assert!((few / 1024.0 - 1.0).abs() < 1e-3, "{few}");
+        // They are the sharpest part all the same.
+        let sharpest = doctor::check(&square(&[2.0, 2.0, 1.0], 64)).texels_resolved_sharpest.unwrap();
+        assert!((sharpest / 4096.0 - 1.0).abs() < 1e-3, "{sharpest}");
     }
 
     #[test]

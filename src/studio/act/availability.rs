@@ -27,12 +27,16 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
         | Act::ZoomOut
         | Act::ZoomReset
         | Act::AddLight
+        | Act::AddLightFolder
         | Act::ExposureUp
         | Act::ExposureDown
         | Act::ResetDisplay
         | Act::NextCurve
         | Act::FalseColour
         | Act::Stripes
+        | Act::NavigatePatina
+        | Act::NavigateBlender
+        | Act::NavigateMaya
         | Act::OpenPhoto
         | Act::OpenMaterial
         | Act::PanelObject
@@ -111,6 +115,10 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
         | Act::Thumbnails
         | Act::LayerPhotos
         | Act::LeaveOut => need(has_views, "no photos"),
+        Act::CompareRun => {
+            need(has_views, "no photos")?;
+            need(has_maps, "no maps yet: start a fit")
+        }
         Act::ErrorOverlay | Act::LayerPhotoError | Act::LayerCoverage | Act::LayerDisagreement | Act::SurfaceLayers => {
             need(has_views, "no photos")?;
             need(has_maps, "no maps yet: start a fit")
@@ -159,7 +167,7 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
 fn is_of_scenes(act: Act) -> bool {
     match act.info().group {
         Group::Fit | Group::View => true,
-        Group::Light => act != Act::AddLight,
+        Group::Light => !matches!(act, Act::AddLight | Act::AddLightFolder),
         Group::File | Group::Window => matches!(
             act,
             Act::Export

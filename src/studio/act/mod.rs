@@ -8,6 +8,7 @@ pub mod availability;
 pub mod keys;
 pub mod turns;
 
+use crate::studio::stage::Navigation;
 use egui::{Key, KeyboardShortcut, Modifiers};
 
 /// Something a person can do.
@@ -33,12 +34,16 @@ pub enum Act {
     StepOnce,
     Checkpoint,
     FitView,
+    NavigatePatina,
+    NavigateBlender,
+    NavigateMaya,
     LookThrough,
     NextView,
     PreviousView,
     LeaveOut,
     ShowPhoto,
     WipePhoto,
+    CompareRun,
     ErrorOverlay,
     Traced,
     Frustums,
@@ -73,6 +78,7 @@ pub enum Act {
     TurnLightRight,
     FittedLight,
     AddLight,
+    AddLightFolder,
     LightBackground,
     LightStrip,
     SurfaceLayers,
@@ -216,12 +222,16 @@ pub const LIST: &[ActInfo] = &[
     info(Act::Checkpoint, Group::Fit, "Save checkpoint", "Save the state of the fit now.", with(CTRL_SHIFT, Key::S)),
 
     info(Act::FitView, Group::View, "Frame all", "Frame the object that the photos show.", key(Key::F)),
+    info(Act::NavigatePatina, Group::View, "Navigate as in Patina", "Drag or middle-drag to orbit, right-drag to pan, wheel to zoom.", None),
+    info(Act::NavigateBlender, Group::View, "Navigate as in Blender", "Middle-drag to orbit, with Shift to pan, with Ctrl to zoom.", None),
+    info(Act::NavigateMaya, Group::View, "Navigate as in Maya", "Alt and drag to orbit, Alt and middle-drag to pan, Alt and right-drag to zoom.", None),
     info(Act::LookThrough, Group::View, "Camera view", "View through the camera of the chosen photo, or return.", key(Key::C)),
     info(Act::NextView, Group::View, "Next photo", "Choose the next photo.", key(Key::CloseBracket)),
     info(Act::PreviousView, Group::View, "Previous photo", "Choose the previous photo.", key(Key::OpenBracket)),
     info(Act::LeaveOut, Group::View, "Exclude photo from fit", "Exclude the chosen photo from the fit, or include it again.", key(Key::X)),
     info(Act::ShowPhoto, Group::View, "Overlay photo", "Overlay the photo in its camera view. Hold Shift to peek.", key(Key::G)),
     info(Act::WipePhoto, Group::View, "Photo / render wipe", "Photo on the left, render on the right; drag the divider.", key(Key::W)),
+    info(Act::CompareRun, Group::View, "Compare with another run…", "Hold the render against that of another run of the scene, in the Photo panel.", None),
     info(Act::ErrorOverlay, Group::View, "Show residuals", "Colour the surface by the residual of the photos, or return.", key(Key::O)),
     info(Act::Traced, Group::View, "Path-traced preview", "Refine the viewport by path tracing, with shadows and interreflection, while nothing moves.", key(Key::T)),
     info(Act::Frustums, Group::View, "Show cameras", "Show where the photos were taken.", key(Key::V)),
@@ -259,6 +269,7 @@ pub const LIST: &[ActInfo] = &[
     info(Act::TurnLightLeft, Group::Light, "Rotate environment +15°", "Rotate the environment about the up axis. Shift-drag in the viewport rotates it freely.", with(SHIFT, Key::ArrowLeft)),
     info(Act::TurnLightRight, Group::Light, "Rotate environment −15°", "Rotate the environment about the up axis, the other way.", with(SHIFT, Key::ArrowRight)),
     info(Act::AddLight, Group::Light, "Import HDRI…", "Add an HDRI to the library of environments.", with(CTRL, Key::L)),
+    info(Act::AddLightFolder, Group::Light, "Import folder of HDRIs…", "Add every HDRI of a folder to the library of environments.", None),
     info(Act::LightStrip, Group::Light, "Lighting contact sheet", "Path-trace the viewport under every environment of the library.", key(Key::Y)),
     info(Act::LightBackground, Group::Light, "Show environment as background", "Show the environment behind the surface.", key(Key::H)),
 
@@ -311,6 +322,16 @@ impl Act {
     pub fn info(self) -> &'static ActInfo {
         // A test holds that every act is in the list; the first entry stands in for one that is not.
         LIST.iter().find(|info| info.act == self).unwrap_or(&LIST[0])
+    }
+
+    /// The hand movements it chooses, if it does.
+    pub fn navigation(self) -> Option<Navigation> {
+        match self {
+            Act::NavigatePatina => Some(Navigation::Patina),
+            Act::NavigateBlender => Some(Navigation::Blender),
+            Act::NavigateMaya => Some(Navigation::Maya),
+            _ => None,
+        }
     }
 
     /// Its label.

@@ -3,8 +3,9 @@
 use super::exporting::ExportRequest;
 use super::importing::ImportRequest;
 use super::tasks::TaskKind;
-use super::{Done, Model, lights};
-use std::path::PathBuf;
+use super::{Done, LightName, Model, lights};
+use crate::studio::stage::Layer;
+use std::path::{Path, PathBuf};
 
 /// What a path is picked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,6 +14,10 @@ pub enum PickFor {
     Open,
     /// To put a light on the shelf.
     Light,
+    /// A folder whose HDR maps are put on the shelf.
+    LightFolder,
+    /// A run to compare with the one that is open.
+    OtherRun,
     /// To write new runs into.
     RunsFolder,
     /// To save a picture.
@@ -88,6 +93,10 @@ pub struct SaveRequest {
     pub samples: usize,
     /// Number of frames of a turntable.
     pub frames: usize,
+    /// Whether what the surface does not cover is left transparent; of a picture.
+    pub cut_out: bool,
+    /// Whether a film is made of the frames; of a turntable.
+    pub film: bool,
 }
 
 /// What can be saved from the stage.
@@ -106,7 +115,9 @@ impl Model {
     pub fn picked(&mut self, purpose: PickFor, path: PathBuf) {
         match purpose {
             PickFor::Open => self.open(path),
+            PickFor::OtherRun => self.compare_with(path),
             PickFor::Light => self.add_light(path),
+            PickFor::LightFolder => self.add_light_folder(&path),
             PickFor::RunsFolder => self.preferences.runs_folder = path,
             PickFor::ObjectPhoto => self.edits.object.photos.push(path),
             PickFor::ObjectMask => self.edits.object.masks.push(path),
@@ -137,8 +148,33 @@ impl Model {
         }
     }
 
-    /// Reads an HDR map and puts it on the shelf.
+    /// Reads an HDR map, puts it on the shelf and lights the viewport by it.
     pub fn add_light(&mut self, path: PathBuf) {
+        self.light_to_choose = Some(path.clone());
+        self.read_light(path);
+    }
+
+    /// Puts every environment of a folder on the shelf.
+    pub fn add_light_folder(&mut self, folder: &Path) {
+        match lights::of_folder(folder) {
+            Ok(paths) => {
+                let is_new = |path: &PathBuf| self.shelf.find(&LightName::File(path.clone())).is_none();
+                let new: Vec<PathBuf> = paths.into_iter().filter(is_new).collect();
+                self.log.note(format!("{} environments of {} are read", new.len(), folder.display()));
+                new.into_iter().for_each(|path| self.read_light(path));
+            }
+            Err(error) => self.log.error(&error),
+        }
+    }
+
+    /// Lights the viewport by an environment of the shelf.
+    pub fn choose_light(&mut self, name: LightName) {
+        self.edits.relight.first = name;
+        self.edits.layer = Layer::Lit;
+    }
+
+    /// Reads an HDR map and puts it on the shelf.
+    pub(super) fn read_light(&mut self, path: PathBuf) {
         self.tasks.spawn(TaskKind::ReadingEnvironment(path.clone()), move |_| {
             lights::read(&path).map(|(light, noticed)| Done::LightRead(Box::new(light), noticed))
         });
@@ -160,6 +196,8 @@ impl Model {
             let dialog = rfd::FileDialog::new();
             let path = match purpose {
                 PickFor::Open => dialog.set_title("Open a scene or run folder").pick_folder(),
+                PickFor::LightFolder => dialog.set_title("Folder of HDRIs").pick_folder(),
+                PickFor::OtherRun => dialog.set_title("Run to compare with").pick_folder(),
                 PickFor::RunsFolder => dialog.set_title("Output folder for new runs").pick_folder(),
                 PickFor::ImportFolder => dialog.set_title("Folder of the capture").pick_folder(),
                 PickFor::ImportPhotos => dialog.set_title("Folder of photos").pick_folder(),

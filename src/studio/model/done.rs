@@ -1,7 +1,7 @@
 //! What tasks beside the window bring back to it.
 
 use super::lights::ShelfLight;
-use super::{LightName, PickFor, laid, materials, object, opening, rescaling, starting};
+use super::{LightName, PickFor, laid, materials, object, opening, other_run, rescaling, starting};
 use crate::error::Finding;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -20,6 +20,8 @@ pub enum Done {
     TransportCached(Box<laid::CachedOf>),
     /// A run folder was read.
     RunOpened(Box<opening::RunRead>),
+    /// A run was read, to compare with the one that is open.
+    OtherRun(Box<other_run::OtherRun>),
     /// A job was started.
     FitStarted(Box<starting::Started>),
     /// A light was read; what was noticed.

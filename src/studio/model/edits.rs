@@ -4,6 +4,7 @@ use super::lights::LightName;
 use super::object_form::ObjectForm;
 use crate::fit::FitSettings;
 use crate::image::display::DisplaySettings;
+use crate::light::day::Day;
 use crate::studio::stage::Layer;
 use egui::util::undoer::{Settings, Undoer};
 
@@ -38,6 +39,10 @@ pub struct Relight {
     pub matched: bool,
     /// Whether the light shows behind the surface.
     pub as_background: bool,
+    /// Whether a ground under the surface catches its shadow.
+    pub ground: bool,
+    /// Hour and latitude of [`LightName::Day`].
+    pub day: Day,
 }
 
 impl Default for Relight {
@@ -50,6 +55,8 @@ impl Default for Relight {
             strength_stops: 0.0,
             matched: true,
             as_background: true,
+            ground: false,
+            day: Day::default(),
         }
     }
 }

@@ -5,8 +5,9 @@ use super::log::Message;
 use super::object::RelitObject;
 use super::object_form::{ObjectForm, is_photo};
 use super::tasks::TaskKind;
-use super::{Done, Model, Workspace, store};
+use super::{Done, Model, Workspace};
 use crate::error::{Error, ErrorKind, Place};
+use crate::export::run_folder::new_run_folder;
 use crate::files::unrepeated;
 use crate::job::object::{self, ObjectJobOptions, ObjectOutcome, ObjectRequest, ReopenedObject};
 use crate::light::Environment;
@@ -76,7 +77,7 @@ impl Model {
             Err(error) => return self.log.error(&error),
         };
         let stem = files.photos.first().and_then(|photo| photo.file_stem()).unwrap_or_default().to_string_lossy();
-        let output = store::new_run_folder(&self.runs_folder(), &format!("object {stem}"));
+        let output = new_run_folder(&self.runs_folder(), &format!("object {stem}"));
         let settings = form.settings();
         let light = form.light.trim();
         let request = ObjectRequest {
@@ -209,5 +210,5 @@ impl Model {
 
 /// Whether a light is none of a scene's: built in, or of a file.
 pub fn is_free(name: &LightName) -> bool {
-    matches!(name, LightName::Sky(_) | LightName::File(_))
+    matches!(name, LightName::Sky(_) | LightName::Day | LightName::File(_))
 }

@@ -90,8 +90,8 @@ impl Model {
 
     pub(super) fn run_was_exported(&mut self, exported: Exported) {
         self.note_findings(&exported.findings);
-        self.log
-            .note(format!("Exported to {}; what was lost is told in its convention.txt", exported.folder.display()));
+        let text = format!("Exported to {}; what was lost is told in its convention.txt", exported.folder.display());
+        self.log.note_of_file(text, exported.folder.clone());
         self.exported = Some(exported.folder);
     }
 }

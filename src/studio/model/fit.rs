@@ -1,11 +1,11 @@
 //! The fit as the window knows it: commands out, events in, and in which state it is.
 
-use super::advance::Advance;
 use super::log::{Log, Message};
 use crate::error::{Error, Finding, Severity};
 use crate::export::RunFolder;
 use crate::fit::{FitSettings, LossRow};
 use crate::insight::report::data::ReportData;
+use crate::job::advance::Advance;
 use crate::job::{Command, Event, FinishingStage, JobHandle, Progress, Snapshot};
 use crate::scene::Scene;
 use std::sync::Arc;
@@ -167,7 +167,9 @@ impl FitControl {
         for event in events.drain(..) {
             self.take_in(event, log);
         }
-        self.advance.tick(&self.status);
+        if matches!(self.status, FitStatus::Running | FitStatus::Finishing(_)) {
+            self.advance.tick();
+        }
         if !self.status.is_live() {
             self.job = None;
         }
@@ -218,8 +220,9 @@ impl FitControl {
                 self.report = Some(Arc::from(data));
                 self.status = FitStatus::Finished;
                 self.advance.finished();
-                let folder = self.folder.as_ref().map(|folder| folder.path().display().to_string());
-                log.note(format!("Fit finished. Results: {}", folder.unwrap_or_default()));
+                if let Some(folder) = &self.folder {
+                    log.note_of_file(format!("Fit finished. Results: {}", folder.path().display()), folder.path());
+                }
             }
             Event::Stopped { steps_done } => {
                 self.status = FitStatus::Stopped;

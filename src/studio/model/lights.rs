@@ -1,9 +1,10 @@
 //! The shelf of lights, and which of them lights the stage.
 
-use crate::error::{Finding, Result};
+use crate::error::{Error, ErrorKind, Finding, Place, Result};
 use crate::image::{RgbImage, resize};
 use crate::job::pictures::{light_of, matched};
 use crate::light::Environment;
+use crate::light::day::Day;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -26,6 +27,8 @@ pub enum LightName {
     Unseen,
     /// A built-in sky: `noon`, `evening`, `overcast`.
     Sky(String),
+    /// The sky of an hour and a latitude, as they are set.
+    Day,
     /// An HDR map.
     File(PathBuf),
 }
@@ -43,6 +46,7 @@ impl LightName {
                 "overcast" => "Overcast sky".into(),
                 other => other.into(),
             },
+            LightName::Day => "Sky by the hour".into(),
             LightName::File(path) => path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into()),
         }
     }
@@ -83,6 +87,34 @@ pub fn read(path: &Path) -> Result<(ShelfLight, Vec<Finding>)> {
     Ok((ShelfLight::new(LightName::File(path.into()), Arc::new(read.environment)), read.findings))
 }
 
+/// The sky of an hour; `None` where the sun has not risen.
+pub fn of_day(day: &Day) -> Option<ShelfLight> {
+    let environment = day.environment(SHELF_HEIGHT).ok()?;
+    Some(ShelfLight::new(LightName::Day, Arc::new(environment)))
+}
+
+/// Files of a folder that may be environments, by their names, at most so many.
+///
+/// # Errors
+/// A folder that cannot be read, or holds none.
+pub fn of_folder(folder: &Path) -> Result<Vec<PathBuf>> {
+    const MOST: usize = 200;
+    let entries = std::fs::read_dir(folder).map_err(|source| Error::reading(folder, source))?;
+    let is_light = |path: &PathBuf| {
+        let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+        ["hdr", "exr", "pfm"].contains(&ending.as_str()) && path.is_file()
+    };
+    let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).filter(is_light).collect();
+    files.sort();
+    files.truncate(MOST);
+    if files.is_empty() {
+        return Err(Error::new(ErrorKind::Missing, "no environment lies in this folder")
+            .at(Place::File(folder.into()))
+            .remedy("choose a folder with HDR, EXR or PFM files"));
+    }
+    Ok(files)
+}
+
 /// All lights that can light the stage.
 #[derive(Clone, Debug, Default)]
 pub struct Shelf {
@@ -96,7 +128,8 @@ impl Shelf {
             let environment = light_of(name, SHELF_HEIGHT).ok()?.environment;
             Some(ShelfLight::new(LightName::Sky(name.into()), Arc::new(environment)))
         };
-        Shelf { lights: ["noon", "evening", "overcast"].into_iter().filter_map(sky).collect() }
+        let skies = ["noon", "evening", "overcast"].into_iter().filter_map(sky);
+        Shelf { lights: skies.chain(of_day(&Day::default())).collect() }
     }
 
     /// All lights, in the order of the shelf: of the scene, built-in, files.
@@ -115,7 +148,8 @@ impl Shelf {
                     LightName::Truth => 1,
                     LightName::Unseen => 2,
                     LightName::Sky(_) => 3,
-                    LightName::File(_) => 4,
+                    LightName::Day => 4,
+                    LightName::File(_) => 5,
                 });
             }
         }
@@ -128,7 +162,7 @@ impl Shelf {
 
     /// Takes the lights of a scene off the shelf.
     pub fn forget_scene(&mut self) {
-        self.lights.retain(|light| matches!(light.name, LightName::Sky(_) | LightName::File(_)));
+        self.lights.retain(|light| matches!(light.name, LightName::Sky(_) | LightName::Day | LightName::File(_)));
     }
 
     /// A light by its name.
@@ -168,15 +202,27 @@ mod tests {
     #[test]
     fn the_shelf_steps_around_and_matches_brightness() {
         let mut shelf = Shelf::built_in();
-        assert_eq!(shelf.lights().len(), 3);
+        assert_eq!(shelf.lights().len(), 4);
         let fitted = Environment::constant(8, 4, glam::Vec3::splat(2.0));
         shelf.put(ShelfLight::new(LightName::Fitted, Arc::new(fitted)));
         assert_eq!(shelf.lights()[0].name, LightName::Fitted);
-        assert_eq!(shelf.step(&LightName::Fitted, -1), Some(LightName::Sky("overcast".into())));
+        assert_eq!(shelf.step(&LightName::Fitted, -1), Some(LightName::Day));
         let (noon, factor) = shelf.matched(&LightName::Sky("noon".into())).unwrap();
         assert!((crate::math::luminance(noon.mean_radiance()) - 2.0).abs() < 1e-3 && factor > 0.0);
         shelf.forget_scene();
-        assert_eq!(shelf.lights().len(), 3);
+        assert_eq!(shelf.lights().len(), 4);
         assert_eq!(Shelf::default().step(&LightName::Fitted, 1), None);
+    }
+
+    #[test]
+    fn a_folder_of_environments_is_listed_and_one_without_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(of_folder(folder.path()).unwrap_err().remedy_text().contains("HDR"));
+        for name in ["b.hdr", "a.EXR", "letter.txt", "photo.jpg"] {
+            std::fs::write(folder.path().join(name), b"").unwrap();
+        }
+        let names: Vec<_> =
+            of_folder(folder.path()).unwrap().into_iter().map(|path| path.file_name().unwrap().to_owned()).collect();
+        assert_eq!(names, ["a.EXR", "b.hdr"]);
     }
 }

@@ -1,7 +1,9 @@
 //! What was noticed, newest last: findings, errors, what was done.
 
+use super::offers::{self, Offer};
 use super::tasks::TaskKind;
 use crate::error::{Error, Finding, Place, Severity};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// A line of the log.
@@ -15,6 +17,10 @@ pub struct Message {
     pub text: String,
     /// What can be done; may be empty.
     pub remedy: String,
+    /// What a button does about it.
+    pub offers: Vec<Offer>,
+    /// A file or folder that it is about; a link opens it.
+    pub file: Option<PathBuf>,
     /// Where.
     pub place: Place,
     /// When.
@@ -29,6 +35,8 @@ impl Message {
             is_error: false,
             text: text.into(),
             remedy: String::new(),
+            offers: Vec::new(),
+            file: None,
             place: Place::Nowhere,
             at: Instant::now(),
         }
@@ -55,7 +63,9 @@ impl From<&Finding> for Message {
     fn from(finding: &Finding) -> Self {
         Message {
             severity: finding.severity,
-            remedy: finding.remedy.clone(),
+            remedy: offers::without_flags(&finding.remedy),
+            offers: offers::of_finding(finding),
+            file: file_of(&finding.target),
             place: finding.target.clone(),
             ..Message::note(finding.message.clone())
         }
@@ -67,10 +77,19 @@ impl From<&Error> for Message {
         Message {
             severity: Severity::Fatal,
             is_error: true,
-            remedy: error.remedy_text().into(),
+            remedy: offers::without_flags(error.remedy_text()),
+            file: file_of(error.place()),
             place: error.place().clone(),
             ..Message::note(error.message())
         }
+    }
+}
+
+/// The file that a place is in.
+fn file_of(place: &Place) -> Option<PathBuf> {
+    match place {
+        Place::File(path) | Place::Line(path, _) | Place::Byte(path, _) => Some(path.clone()),
+        _ => None,
     }
 }
 
@@ -115,6 +134,11 @@ impl Log {
         self.add(Message::note(text));
     }
 
+    /// Adds a line of news about a file or folder.
+    pub fn note_of_file(&mut self, text: impl Into<String>, file: impl Into<PathBuf>) {
+        self.add(Message { file: Some(file.into()), ..Message::note(text) });
+    }
+
     /// Adds an error.
     pub fn error(&mut self, error: &Error) {
         self.add(Message::from(error));
@@ -142,6 +166,10 @@ impl Log {
     /// All messages, oldest first.
     pub fn messages(&self) -> &[Message] {
         &self.messages
+    }
+
+    pub(super) fn messages_mut(&mut self) -> &mut [Message] {
+        &mut self.messages
     }
 
     /// The newest message.

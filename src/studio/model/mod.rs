@@ -10,7 +10,6 @@
 //! [`object_form`] is what is asked for, [`object`] the estimation, [`estimating`] how one becomes the other, [`materials`]
 //! the library. Panels read the model and queue acts; they change nothing but [`Edits`] directly.
 
-pub mod advance;
 pub mod dialogs;
 pub mod done;
 pub mod edits;
@@ -26,10 +25,13 @@ pub mod log;
 pub mod materials;
 pub mod object;
 pub mod object_form;
+pub mod offers;
 pub mod opening;
+pub mod other_run;
 pub mod phase;
 pub mod project;
 pub mod rescaling;
+pub mod saving;
 pub mod starting;
 pub mod store;
 pub mod tasks;
@@ -44,6 +46,7 @@ pub use phase::Phase;
 pub use project::Project;
 
 use crate::error::{Place, Result};
+use crate::light::day::Day;
 use crate::studio::act::Act;
 use crate::studio::layout::Panel;
 use crate::studio::stage::eye::OrbitEye;
@@ -131,6 +134,8 @@ pub struct Model {
     pub tasks: Tasks<Done>,
     /// What was noticed.
     pub log: Log,
+    /// Another run of the scene, to compare with.
+    pub other_run: Option<Arc<other_run::OtherRun>>,
     /// Where the run was exported to last.
     pub exported: Option<PathBuf>,
     /// Whether the card of a finished fit is shown.
@@ -143,6 +148,10 @@ pub struct Model {
     pub store: Store,
     /// Lights to look at the materials in.
     pub shelf: Shelf,
+    /// Hour and latitude that the sky of the shelf was made for.
+    pub day_in_force: Day,
+    /// The environment that lights the viewport once it is read.
+    pub light_to_choose: Option<PathBuf>,
     /// The eye, while it is not a photo's.
     pub eye: OrbitEye,
     /// Switches of the stage.
@@ -207,12 +216,15 @@ impl Model {
             history,
             tasks: Tasks::new(Arc::clone(&wake)),
             log,
+            other_run: None,
             exported: None,
             card: false,
             start_is_queued: false,
             preferences,
             store,
             shelf: Shelf::built_in(),
+            day_in_force: Day::default(),
+            light_to_choose: None,
             eye: OrbitEye::default(),
             switches: StageSwitches::default(),
             cursor: None,
@@ -234,7 +246,7 @@ impl Model {
             after_round: None,
         };
         for path in model.preferences.lights.clone() {
-            model.add_light(path);
+            model.read_light(path);
         }
         model
     }
@@ -296,6 +308,7 @@ impl Model {
             Done::PhotosLaid(laid) => self.photos_were_laid(*laid),
             Done::TransportCached(cached) => self.transport_was_cached(*cached),
             Done::RunOpened(run) => self.run_was_opened(*run),
+            Done::OtherRun(other) => self.other_was_read(*other),
             Done::FitStarted(started) => self.fit_was_started(*started),
             Done::LightRead(light, noticed) => {
                 self.note_findings(&noticed);
@@ -305,17 +318,22 @@ impl Model {
                     self.preferences.lights.push(path.clone());
                 }
                 self.log.note(format!("{} was added to the environments", light.name.label()));
+                if matches!((&light.name, &self.light_to_choose), (LightName::File(own), Some(path)) if own == path) {
+                    self.light_to_choose = None;
+                    self.choose_light(light.name.clone());
+                }
                 self.shelf.put(*light);
             }
             Done::Picked(_, None) => {}
             Done::Picked(purpose, Some(path)) => self.picked(purpose, path),
             Done::Saved(paths, seconds_per_path) => {
                 self.preferences.seconds_per_path = Some(seconds_per_path).filter(|own| own.is_finite() && *own > 0.0);
-                let first = paths.first().map(|path| path.display().to_string()).unwrap_or_default();
-                self.log.note(match paths.len() {
-                    0 | 1 => format!("Saved {first}"),
-                    count => format!("Saved {count} images, the first is {first}"),
-                });
+                let Some(first) = paths.first() else { return };
+                let text = match paths.len() {
+                    1 => format!("Saved {}", first.display()),
+                    count => format!("Saved {count} images, the first is {}", first.display()),
+                };
+                self.log.note_of_file(text, first);
             }
             Done::Layers(maps, layers) => self.layers_were_measured(&maps, *layers),
             Done::Strip(pictures) => {

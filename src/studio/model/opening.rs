@@ -18,10 +18,10 @@ use crate::job::prepare::{Prepared, RunSettings, prepare_with};
 use crate::object::result_read;
 use crate::render::Surface;
 use crate::scene::demo::DemoSettings;
-use crate::scene::{Mesh, PixelState, ReadSettings, Scene};
+use crate::scene::{Mesh, ReadSettings, Scene};
 use crate::studio::stage::eye::OrbitEye;
 use rayon::prelude::*;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Longest side of the small picture of a photo, in pixels.
@@ -39,7 +39,6 @@ pub struct SceneRead {
     mesh: Arc<Mesh>,
     timings: Vec<StageTime>,
     thumbnails: Vec<Arc<RgbImage>>,
-    clipped_shares: Vec<f32>,
 }
 
 /// What the check of a scene says.
@@ -151,7 +150,7 @@ impl Model {
     pub fn close(&mut self) {
         self.tasks.stop_those_of_scene();
         self.start_is_queued = false;
-        (self.card, self.exported) = (false, None);
+        (self.card, self.exported, self.other_run) = (false, None, None);
         self.log.scene_was_closed();
         self.fit.forget();
         self.project = None;
@@ -166,6 +165,7 @@ impl Model {
         self.close();
         if let Some(path) = &read.path {
             self.preferences.remember(path, false);
+            self.keep_thumbnail(path, &read.thumbnails);
         }
         let views = read.scene.views.len();
         self.edits.fit = read.settings.fit.clone();
@@ -190,7 +190,6 @@ impl Model {
             default_fit: is_made.then(|| self.edits.fit.clone()),
             timings: read.timings,
             view_errors: vec![None; views],
-            clipped_shares: read.clipped_shares,
             thumbnails: read.thumbnails,
             ..Project::default()
         });
@@ -229,15 +228,14 @@ impl Model {
         if let Ok(joined) = suits.with(&chosen, &self.edits.fit) {
             self.edits.fit = joined;
         }
-        for line in checked.suited.told(&FitSettings::default(), &settings) {
-            self.log.note(line);
-        }
+        let taken = checked.suited.told(&FitSettings::default(), &settings);
         project.suited = Some(checked.suited);
         project.findings.clone_from(&checked.findings);
         project.timings = checked.timings;
         if chosen.is_empty() {
             self.history.restart(&self.edits);
         }
+        self.tell_taken(&taken);
         self.note_findings(&checked.findings);
         self.prepare();
     }
@@ -286,6 +284,7 @@ impl Model {
         let RunRead { folder, run, atlas, thumbnails, clipped_shares } = read;
         self.note_findings(&run.findings);
         self.preferences.remember(folder.path(), true);
+        self.keep_thumbnail(folder.path(), &thumbnails);
         self.edits.fit = run.settings.fit.clone();
         self.eye = OrbitEye::around(super::framing::subject(&atlas.mesh, run.scene.as_deref()));
         let views = run.scene.as_ref().map_or(0, |scene| scene.views.len());
@@ -330,6 +329,14 @@ impl Model {
         self.cache_transport();
     }
 
+    /// Keeps a picture of what was opened for the first page: the photo in the middle, as bright as a screen wants it.
+    fn keep_thumbnail(&self, path: &Path, thumbnails: &[Arc<RgbImage>]) {
+        if let Some(middle) = thumbnails.get(thumbnails.len() / 2) {
+            let factor = crate::image::histogram::auto_exposure(middle.as_ref()).exp2();
+            self.store.keep_thumbnail(path, &middle.map(|radiance| *radiance * factor));
+        }
+    }
+
     /// Before there is a fitted light the stage is lit by the first light of the shelf.
     fn first_light(&mut self) {
         if self.shelf.find(&LightName::Fitted).is_none()
@@ -342,10 +349,11 @@ impl Model {
     }
 
     pub(super) fn note_findings(&mut self, findings: &[Finding]) {
-        for finding in findings {
-            self.log.add(Message::from(finding));
+        let open: Vec<&Finding> = findings.iter().filter(|finding| !self.edits.fit.do_what_is_asked(finding)).collect();
+        for finding in &open {
+            self.log.add(Message::from(*finding));
         }
-        let warnings = findings.iter().filter(|finding| finding.severity == Severity::Warning).count();
+        let warnings = open.iter().filter(|finding| finding.severity == Severity::Warning).count();
         if warnings > 0 {
             self.activate = Some(crate::studio::layout::Panel::Messages);
         }
@@ -367,43 +375,28 @@ impl SceneRead {
         if mesh.normals.len() != mesh.positions.len() {
             mesh.compute_normals();
         }
-        let (thumbnails, clipped_shares) = small_pictures(&scene);
-        SceneRead {
-            path,
-            suited: None,
-            settings,
-            scene: Arc::new(scene),
-            mesh: Arc::new(mesh),
-            timings,
-            thumbnails,
-            clipped_shares,
-        }
+        let thumbnails = small_pictures(&scene);
+        SceneRead { path, suited: None, settings, scene: Arc::new(scene), mesh: Arc::new(mesh), timings, thumbnails }
     }
 }
 
 impl RunRead {
     fn new(folder: RunFolder, run: OpenedRun) -> Self {
         let atlas = Atlas::of(Arc::clone(&run.surface));
-        let (thumbnails, _) = run.scene.as_deref().map(small_pictures).unwrap_or_default();
+        let thumbnails = run.scene.as_deref().map(small_pictures).unwrap_or_default();
         let of_rays = |scene: &Scene| clipped_shares(scene, &run.surface);
         let clipped_shares = run.scene.as_deref().map(of_rays).unwrap_or_default();
         RunRead { folder, run, atlas, thumbnails, clipped_shares }
     }
 }
 
-/// A small picture of each photo, and the share of each photo's surface pixels that are clipped.
-fn small_pictures(scene: &Scene) -> (Vec<Arc<RgbImage>>, Vec<f32>) {
-    let shares = scene.views.par_iter().map(|view| {
-        let surface = view.states.pixels().iter().filter(|state| state.is_surface()).count();
-        let clipped = view.states.pixels().iter().filter(|state| **state == PixelState::SurfaceClipped).count();
-        clipped as f32 / surface.max(1) as f32
-    });
-    let shares = shares.collect();
+/// A small picture of each photo.
+fn small_pictures(scene: &Scene) -> Vec<Arc<RgbImage>> {
     let small = |view: &crate::scene::View| {
         let (photo, size) = (&view.photo, (view.photo.width(), view.photo.height()));
         Arc::new(crate::image::area::thumbnail_of(size, |row, column| photo.radiance(row, column), THUMBNAIL_SIDE))
     };
-    (scene.views.par_iter().map(small).collect(), shares)
+    scene.views.par_iter().map(small).collect()
 }
 
 /// The share of clipped pixels among those whose rays meet the surface, of each photo: without a mask only rays tell the

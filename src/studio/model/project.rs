@@ -95,7 +95,7 @@ pub struct Project {
     pub entanglement: Option<Arc<Entanglement>>,
     /// Root mean square error of each view, where it is known.
     pub view_errors: Vec<Option<f32>>,
-    /// Share of each view's surface pixels that are clipped.
+    /// Share of each view's surface pixels that are clipped; empty until rays tell the surface from the sky.
     pub clipped_shares: Vec<f32>,
     /// A small picture of each photo.
     pub thumbnails: Vec<Arc<RgbImage>>,

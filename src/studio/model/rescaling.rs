@@ -1,8 +1,10 @@
 //! "This is 18 % grey": the scale that photos leave open between reflectance and light, set by a patch that is known.
 
 use super::tasks::TaskKind;
-use super::{Done, Model, store};
+use super::{Done, Model};
 use crate::error::Finding;
+use crate::export::run_folder::new_run_folder;
+use crate::insight::plausible::{Plausibility, plausibility};
 use crate::job::gauge::{Move, move_run};
 use glam::{Vec2, Vec3};
 use std::path::PathBuf;
@@ -21,14 +23,28 @@ impl Model {
     /// Writes the finished run anew so that the diffuse reflectance around a place of the atlas (v up) is this grey in
     /// (0, 1], and opens what was written. The run itself stays as it is.
     pub fn rescale(&mut self, uv: Vec2, reflectance: f32) {
+        self.rescale_by(Move::Patch { uv, radius_texels: PATCH_RADIUS, target: Vec3::splat(reflectance) });
+    }
+
+    /// The same with reflectance times a factor, and the light divided by it.
+    pub fn rescale_by_factor(&mut self, factor: f32) {
+        self.rescale_by(Move::Factor(Vec3::splat(factor)));
+    }
+
+    fn rescale_by(&mut self, by: Move) {
         let Some(folder) = self.fit.folder.clone().filter(|_| self.can_rescale()) else { return };
         let name = folder.path().file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        let output = store::new_run_folder(&self.runs_folder(), &format!("{name}-rescaled"));
+        let output = new_run_folder(&self.runs_folder(), &format!("{name}-rescaled"));
         self.tasks.spawn(TaskKind::Rescaling, move |_| {
-            let by = Move::Patch { uv, radius_texels: PATCH_RADIUS, target: Vec3::splat(reflectance) };
             let moved = move_run(folder.path(), &by, &output)?;
             Ok(Done::Rescaled(Box::new(Rescaled { folder: output, factor: moved.factor, findings: moved.findings })))
         });
+    }
+
+    /// How the maps look beside materials that exist; `None` without maps.
+    pub fn plausibility(&self) -> Option<Plausibility> {
+        let project = self.project.as_ref()?;
+        plausibility(project.maps.as_ref()?, project.times_seen.as_deref(), self.edits.fit.has_lobe())
     }
 
     /// Whether there is a finished run whose scale can be set.

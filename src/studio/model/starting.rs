@@ -4,6 +4,7 @@ use super::tasks::TaskKind;
 use super::{Done, FitStatus, Model, store};
 use crate::error::Result;
 use crate::export::RunFolder;
+use crate::export::run_folder::new_run_folder;
 use crate::fit::{FitSettings, Fitter};
 use crate::job::open::{self, OpenStage};
 use crate::job::prepare::{Prepared, RunSettings, prepare_with};
@@ -64,7 +65,7 @@ impl Model {
         let (Some(scene), Some(surface)) = (project.scene.clone(), project.surface.clone()) else { return };
         let mut settings = project.settings.clone();
         settings.fit = self.edits.fit.clone();
-        let path = store::new_run_folder(&self.runs_folder(), &project.title);
+        let path = new_run_folder(&self.runs_folder(), &project.title);
         let (findings, timings, quality) = (project.findings.clone(), project.timings.clone(), project.quality.clone());
         // The atlas keeps its charts apart at the size it was made for; other map sizes need another atlas.
         let same_atlas = project.settings.fit.map_size == settings.fit.map_size || project.is_run;
@@ -146,7 +147,7 @@ impl Model {
         self.preferences.remember(folder.path(), true);
         // A failure of the fit before is past.
         self.log.dismiss();
-        self.log.note(format!("Output folder: {}", folder.path().display()));
+        self.log.note_of_file(format!("Output folder: {}", folder.path().display()), folder.path());
         self.fit.begin(job, folder, settings, self.preferences.finishing_ratio);
         self.activate = Some(Panel::Curves);
     }

@@ -5,6 +5,8 @@
 
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::image::display::DisplaySettings;
+use crate::image::{RgbImage, file};
+use crate::studio::stage::Navigation;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -75,6 +77,8 @@ pub struct Preferences {
     pub object_layout: String,
     /// How often the window follows a running fit.
     pub follow: Follow,
+    /// Whose hand movements the viewport follows.
+    pub navigation: Navigation,
     /// Seconds of finishing for a second of fitting on this machine, as learned from former runs.
     pub finishing_ratio: f64,
     /// Seconds a path of a render took on this machine, as learned from former renders; `None` before the first.
@@ -109,7 +113,8 @@ impl Default for Preferences {
             layout: String::new(),
             object_layout: String::new(),
             follow: Follow::Live,
-            finishing_ratio: super::advance::FIRST_RATIO,
+            navigation: Navigation::default(),
+            finishing_ratio: crate::job::advance::FIRST_RATIO,
             seconds_per_path: None,
             running: None,
         }
@@ -156,6 +161,26 @@ impl Store {
     /// A store in a file of one's own; `None` remembers nothing.
     pub fn at(path: Option<PathBuf>) -> Self {
         Store { path, written: None }
+    }
+
+    /// Where the small picture of a path that was opened before is kept; `None` where nothing is remembered.
+    pub fn thumbnail_path(&self, opened: &Path) -> Option<PathBuf> {
+        // FNV-1a: a name that is the same in every build of the program.
+        let hash = opened
+            .as_os_str()
+            .as_encoded_bytes()
+            .iter()
+            .fold(0xcbf2_9ce4_8422_2325u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3));
+        Some(self.path.as_ref()?.parent()?.join("thumbnails").join(format!("{hash:016x}.png")))
+    }
+
+    /// Keeps a small picture of what was opened. One that cannot be written is missed by nobody.
+    pub fn keep_thumbnail(&self, opened: &Path, picture: &RgbImage) {
+        let Some(path) = self.thumbnail_path(opened) else { return };
+        let is_there = path.parent().is_some_and(|folder| std::fs::create_dir_all(folder).is_ok());
+        if is_there {
+            let _ = file::write_png_srgb8(&path, &file::srgb8_from_linear(picture, 0.0));
+        }
     }
 
     /// Reads what was remembered. A damaged file is set aside beside the new one and reported.
@@ -205,15 +230,6 @@ pub fn usual_runs_folder() -> PathBuf {
     documents.unwrap_or_else(std::env::temp_dir).join("Patina runs")
 }
 
-/// A folder for a new run of a scene that does not exist yet: `runs/scene-1`, `runs/scene-2`, ...
-pub fn new_run_folder(runs: &Path, scene: &str) -> PathBuf {
-    let safe: String = scene.chars().map(|c| if c.is_alphanumeric() || "-_. ".contains(c) { c } else { '_' }).collect();
-    let safe = safe.trim_matches([' ', '.']);
-    let stem = if safe.is_empty() { "scene" } else { safe };
-    let numbered = |number: usize| runs.join(format!("{stem}-{number}"));
-    (1..).map(numbered).find(|path| !path.exists()).unwrap_or_else(|| numbered(0))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -239,15 +255,5 @@ mod tests {
         crate::files::write_bytes(&path, b"{ \"zoom\": 900, \"window-size\": [1, 1e9] }").unwrap();
         let (mended, error) = Store::at(Some(path)).read();
         assert!(error.is_none() && mended.zoom == 1.0 && mended.window_size == [640.0, 16_384.0]);
-    }
-
-    #[test]
-    fn new_runs_never_meet_an_old_folder() {
-        let folder = tempfile::tempdir().unwrap();
-        let first = new_run_folder(folder.path(), "a/b");
-        assert!(first.ends_with("a_b-1"));
-        std::fs::create_dir(&first).unwrap();
-        assert!(new_run_folder(folder.path(), "a/b").ends_with("a_b-2"));
-        assert!(new_run_folder(folder.path(), "..").ends_with("scene-1"));
     }
 }

@@ -13,6 +13,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub enum TaskKind {
     /// Reading a scene or a run.
     Opening,
+    /// Reading a run to compare with.
+    OpeningOther,
     /// The check of a scene that was read.
     Checking,
     /// The UV atlas and the tracer of a scene that was checked.
@@ -58,6 +60,7 @@ impl TaskKind {
     pub fn words(&self) -> String {
         match self {
             TaskKind::Opening => "Opening".into(),
+            TaskKind::OpeningOther => "Opening the other run".into(),
             TaskKind::Checking => "Checking".into(),
             TaskKind::Preparing => "Preparing".into(),
             TaskKind::LayingPhotos => "Projecting photos".into(),
@@ -86,6 +89,7 @@ impl TaskKind {
     pub fn is_of_scene(&self) -> bool {
         match self {
             TaskKind::Opening
+            | TaskKind::OpeningOther
             | TaskKind::Checking
             | TaskKind::Preparing
             | TaskKind::LayingPhotos
@@ -112,6 +116,7 @@ impl TaskKind {
     pub fn is_waited_for(&self) -> bool {
         match self {
             TaskKind::Opening
+            | TaskKind::OpeningOther
             | TaskKind::Checking
             | TaskKind::Preparing
             | TaskKind::LayingPhotos

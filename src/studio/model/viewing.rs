@@ -1,12 +1,12 @@
-//! Where the eye stands, which light it sees by, and what is measured for it.
+//! Where the eye stands, which light it sees by, and what is measured for it. What is saved of it is in `saving`.
 
 use super::lights::LightName;
 use super::tasks::TaskKind;
-use super::{Done, Model, SaveRequest, SaveWhat};
+use super::{Done, Model};
 use crate::error::Place;
 use crate::insight::surface_layers::{LayerSettings, SurfaceLayers, surface_layers};
 use crate::job::entanglement::{EntanglementSettings, entanglement};
-use crate::job::gallery::{self, NamedLight, Turning, TurntableSettings};
+use crate::job::gallery::NamedLight;
 use crate::job::pictures::parameters_with;
 use crate::light::Environment;
 use crate::material::MaterialMaps;
@@ -15,14 +15,7 @@ use crate::render::picture::PictureSettings;
 use crate::scene::Camera;
 use crate::studio::layout::Panel;
 use crate::studio::stage::eye::{Eye, OrbitEye};
-use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Instant;
-
-/// Width and height of a picture of the strip of lights in pixels.
-const STRIP_SIZE: (usize, usize) = (240, 160);
-/// Paths a pixel of the strip.
-const STRIP_SAMPLES: usize = 24;
 
 impl Model {
     /// Moves the eye so that what the photos show fills the viewport.
@@ -104,6 +97,18 @@ impl Model {
         }
     }
 
+    /// Makes the sky of the hour anew where hour or latitude changed, by hand or by undo. Where the sun has not risen the sky
+    /// before stands.
+    pub fn follow_day(&mut self) {
+        let day = self.edits.relight.day;
+        if self.day_in_force != day {
+            self.day_in_force = day;
+            if let Some(light) = super::lights::of_day(&day) {
+                self.shelf.put(light);
+            }
+        }
+    }
+
     /// A light as it lights the stage: brought to the fitted one's brightness if so wished, made stronger; not turned.
     pub fn stage_light(&self, name: &LightName) -> Option<Arc<Environment>> {
         let relight = &self.edits.relight;
@@ -136,9 +141,16 @@ impl Model {
                 .as_ref()
                 .and_then(|project| project.scene.as_ref())
                 .is_none_or(|scene| scene.truth.is_none()),
+            ground: self.ground_height().filter(|_| self.edits.relight.ground),
             seed: 11,
             ..PictureSettings::default()
         }
+    }
+
+    /// Height of the lowest point of the surface.
+    pub fn ground_height(&self) -> Option<f32> {
+        let (low, _) = self.project.as_ref()?.mesh.bounds()?;
+        Some(low.y)
     }
 
     /// Maps and light as the tracer reads them; `None` while there are no maps.
@@ -169,6 +181,7 @@ impl Model {
             picture: PictureSettings {
                 background_visible: scene.background == crate::scene::Background::Environment,
                 max_bounces: self.edits.fit.bounces,
+                ground: None,
                 ..self.picture_settings(8)
             },
             gains: self.gains(),
@@ -211,101 +224,6 @@ impl Model {
         self.fit.gains(self.project.as_ref().and_then(|project| project.scene.as_deref()))
     }
 
-    /// Opens the dialog that asks how and where to save.
-    pub fn ask_to_save(&mut self, what: SaveWhat) {
-        let Some(project) = &self.project else { return };
-        let folder = self.fit.folder.as_ref().map_or_else(|| self.runs_folder(), |folder| folder.path().into());
-        let light: String =
-            self.edits.relight.first.label().chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
-        let light = light.to_lowercase();
-        let view = match (self.switches.looking_through, project.chosen_name()) {
-            (true, Some(name)) => name.to_owned(),
-            _ => "viewport".into(),
-        };
-        let path = match what {
-            SaveWhat::Picture => folder.join("renders").join(format!("{view}_{light}.png")),
-            SaveWhat::Turntable => folder.join("renders").join(format!("turntable_{light}")),
-            SaveWhat::Strip => folder.join("renders").join(format!("{view}_lights")),
-        };
-        let (width, height) = match self.eye_in_force() {
-            Eye::Photo(camera) => (camera.width, camera.height),
-            Eye::Orbit(_) => (1280, 800),
-        };
-        self.dialog = super::Dialog::Save(SaveRequest {
-            what,
-            path: path.display().to_string(),
-            width,
-            height,
-            samples: 64,
-            frames: 48,
-        });
-    }
-
-    /// Renders and saves what was asked for, beside the window.
-    pub fn save(&mut self, request: SaveRequest) {
-        let Some(project) = &self.project else { return };
-        let Some(surface) = project.surface.clone() else { return };
-        let first = self.edits.relight.first.clone();
-        let Some(own) = self.traced_parameters(&first) else { return };
-        let camera = self.eye_in_force().as_camera(request.width, request.height);
-        let settings = self.picture_settings(request.samples);
-        let display = self.edits.display;
-        let path = PathBuf::from(request.path.trim());
-        let mut lights: Vec<NamedLight> = Vec::new();
-        if request.what == SaveWhat::Strip {
-            for light in self.shelf.lights() {
-                let name = light.name.label();
-                lights.extend(self.traced_light(&light.name).map(|environment| NamedLight { name, environment }));
-            }
-        }
-        self.tasks.spawn(TaskKind::Saving, move |context| {
-            let tell = |share: f32| context.tell("rendering", share);
-            let stop = &context.stop;
-            let began = Instant::now();
-            let saved = match request.what {
-                SaveWhat::Picture => {
-                    gallery::write_picture(&path, &surface, &own, &camera, &settings, &display, stop, &tell)?
-                }
-                SaveWhat::Turntable => {
-                    let size = (request.width, request.height);
-                    let turntable = TurntableSettings {
-                        frames: request.frames,
-                        size,
-                        turning: Turning::Camera,
-                        start: Some(camera),
-                    };
-                    let (own, display) = (&own, &display);
-                    gallery::write_turntable(&path, &surface, own, None, &turntable, &settings, display, stop, &tell)?
-                }
-                SaveWhat::Strip => {
-                    gallery::write_strip(&path, &surface, &own, &camera, &lights, &settings, &display, stop, &tell)?
-                }
-            };
-            let paths = (request.width * request.height * request.samples * saved.len()) as f64;
-            Ok(Done::Saved(saved, began.elapsed().as_secs_f64() / paths.max(1.0)))
-        });
-    }
-
-    /// Path-traces the stage's view, small, under every light of the shelf.
-    pub fn show_strip(&mut self) {
-        let Some(project) = &self.project else { return };
-        let Some(surface) = project.surface.clone() else { return };
-        let Some(own) = self.traced_parameters(&LightName::Fitted) else { return };
-        let camera = self.eye_in_force().as_camera(STRIP_SIZE.0, STRIP_SIZE.1);
-        let settings = self.picture_settings(STRIP_SAMPLES);
-        let names: Vec<LightName> = self.shelf.lights().iter().map(|light| light.name.clone()).collect();
-        let lights: Vec<NamedLight> = names
-            .iter()
-            .filter_map(|name| Some(NamedLight { name: name.label(), environment: self.traced_light(name)? }))
-            .collect();
-        self.tasks.spawn(TaskKind::ContactSheet, move |context| {
-            let tell = |share: f32| context.tell("rendering", share);
-            let pictures = gallery::relight_strip(&surface, &own, &camera, &lights, &settings, &context.stop, &tell)?;
-            let pictures = pictures.into_iter().map(|picture| Arc::new(picture.radiance));
-            Ok(Done::Strip(names.into_iter().zip(pictures).collect()))
-        });
-    }
-
     /// Compares pictures of the fit with those of the truth under lights it was not fitted to.
     pub fn measure_entanglement(&mut self) {
         let Some(project) = &self.project else { return };
@@ -319,7 +237,7 @@ impl Model {
             })
             .collect();
         let settings = EntanglementSettings {
-            picture: PictureSettings { background_visible: false, ..self.picture_settings(32) },
+            picture: PictureSettings { background_visible: false, ground: None, ..self.picture_settings(32) },
             ..EntanglementSettings::default()
         };
         self.tasks.spawn(TaskKind::NovelLighting, move |context| {

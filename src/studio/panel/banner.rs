@@ -14,7 +14,7 @@ pub fn show(context: &Context, model: &mut Model) {
         context,
         |ui| {
             Frame::popup(ui.style()).stroke(Stroke::new(1.5, colours.error)).inner_margin(12.0).show(ui, |ui| {
-                ui.set_max_width(620.0);
+                ui.set_max_width(620.0f32.min(ui.ctx().content_rect().width() - 40.0));
                 ui.label(RichText::new(message.sentence()).color(colours.error).strong());
                 if !message.remedy.is_empty() {
                     ui.label(format!("Fix: {}", capitalised(&message.remedy)));

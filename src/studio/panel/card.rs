@@ -19,7 +19,7 @@ pub fn show(context: &Context, model: &mut Model) {
     let area = Area::new(Id::unique("card of the finished fit")).order(Order::Middle);
     area.anchor(Align2::RIGHT_BOTTOM, vec2(-18.0, -40.0)).show(context, |ui| {
         Frame::popup(ui.style()).stroke(Stroke::new(1.5, colours.accent)).inner_margin(14.0).show(ui, |ui| {
-            ui.set_max_width(380.0);
+            ui.set_max_width(380.0f32.min(ui.ctx().content_rect().width() - 60.0));
             ui.label(RichText::new("Fit finished").heading().color(colours.accent));
             figures(ui, model, &report);
             ui.add_space(6.0);
@@ -56,6 +56,10 @@ fn figures(ui: &mut Ui, model: &Model, report: &ReportData) {
         let seconds: f64 = report.timings.iter().map(|stage| stage.seconds).filter(|own| own.is_finite()).sum();
         line("Time", number::duration(seconds), "From reading the scene to the report");
         line("Uncertain", uncertain(model, report), "The standard deviations are layers under Diagnostics");
+        if let Some(own) = model.plausibility() {
+            let words = if own.doubts.is_empty() { "as of materials that exist".into() } else { own.doubts.join("; ") };
+            line("Plausible", words, "Reflectances beside those of materials that exist; the Scores panel offers a scale");
+        }
         line("Scale", "reflectance against light: see the report".into(), &report.gauge_statement);
     });
 }

@@ -101,6 +101,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut CurvesMemory) {
         if switch.on_hover_text(help).changed() && !memory.details {
             (memory.over_seconds, memory.logarithmic, memory.stage) = (true, true, None);
         }
+        super::curve_copies::show(ui, rows);
         if !memory.details {
             main_figure(ui, rows);
             return;

@@ -4,8 +4,9 @@ use super::act_line;
 use crate::insight::report::number;
 use crate::studio::act::{Act, ActInfo, Group, LIST};
 use crate::studio::model::{Dialog, Model, PickFor, SaveRequest, SaveWhat};
+use crate::studio::stage::Navigation;
 use crate::studio::theme;
-use egui::{Button, Context, DragValue, Grid, Id, Key, Modal, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Button, Context, DragValue, Grid, Id, Key, Modal, RichText, ScrollArea, TextEdit, Ui, Vec2, vec2};
 
 /// Draws the dialog that is open, if any.
 pub fn show(context: &Context, model: &mut Model) {
@@ -20,39 +21,43 @@ pub fn show(context: &Context, model: &mut Model) {
         Dialog::Import(_) => "import",
     };
     let mut next = dialog.clone();
-    let modal = Modal::new(Id::unique(id)).show(context, |ui| match &mut next {
-        Dialog::None => {}
-        Dialog::Palette(query) => {
-            if palette(ui, model, query) {
-                next = Dialog::None;
+    // Where the window is too low for the whole of a dialog, the dialog scrolls.
+    let scroll = ScrollArea::vertical().max_height(room(context).y);
+    let modal = Modal::new(Id::unique(id)).show(context, |ui| {
+        scroll.show(ui, |ui| match &mut next {
+            Dialog::None => {}
+            Dialog::Palette(query) => {
+                if palette(ui, model, query) {
+                    next = Dialog::None;
+                }
             }
-        }
-        Dialog::Help => {
-            if help(ui, model) {
-                next = Dialog::None;
+            Dialog::Help => {
+                if help(ui, model) {
+                    next = Dialog::None;
+                }
             }
-        }
-        Dialog::Path { purpose, text } => {
-            let purpose = *purpose;
-            if path(ui, model, purpose, text) {
-                next = Dialog::None;
+            Dialog::Path { purpose, text } => {
+                let purpose = *purpose;
+                if path(ui, model, purpose, text) {
+                    next = Dialog::None;
+                }
             }
-        }
-        Dialog::Save(request) => {
-            if save(ui, model, request) {
-                next = Dialog::None;
+            Dialog::Save(request) => {
+                if save(ui, model, request) {
+                    next = Dialog::None;
+                }
             }
-        }
-        Dialog::Import(request) => {
-            if super::import::show(ui, model, request) {
-                next = Dialog::None;
+            Dialog::Import(request) => {
+                if super::import::show(ui, model, request) {
+                    next = Dialog::None;
+                }
             }
-        }
-        Dialog::Export(request) => {
-            if super::export::show(ui, model, request) {
-                next = Dialog::None;
+            Dialog::Export(request) => {
+                if super::export::show(ui, model, request) {
+                    next = Dialog::None;
+                }
             }
-        }
+        })
     });
     if modal.should_close() {
         next = Dialog::None;
@@ -61,6 +66,20 @@ pub fn show(context: &Context, model: &mut Model) {
     if model.dialog == Dialog::None {
         model.dialog = next;
     }
+}
+
+/// Height of the list of commands, and of the help page, in points.
+const LIST_HEIGHT: f32 = 360.0;
+const HELP_HEIGHT: f32 = 480.0;
+
+/// Width and height that a dialog may take of the window, in points.
+fn room(context: &Context) -> Vec2 {
+    (context.content_rect().size() - vec2(48.0, 64.0)).max(vec2(160.0, 120.0))
+}
+
+/// Makes a dialog so wide, or as wide as the window allows.
+pub(super) fn set_width(ui: &mut Ui, width: f32) {
+    ui.set_width(width.min(room(ui.ctx()).x));
 }
 
 /// Acts whose name or help holds all words of a query: the one that is called so first, then those that begin with it.
@@ -78,7 +97,7 @@ fn found(query: &str) -> Vec<&'static ActInfo> {
 }
 
 fn palette(ui: &mut Ui, model: &mut Model, query: &mut String) -> bool {
-    ui.set_width(480.0);
+    set_width(ui, 480.0);
     let label = ui.label("Type a command");
     // The field has the keys before it is drawn for the first time: a person types on while the palette opens.
     let id = Id::unique("palette field");
@@ -93,10 +112,14 @@ fn palette(ui: &mut Ui, model: &mut Model, query: &mut String) -> bool {
     let mut place = ui.data(|data| data.get_temp::<usize>(place_id)).unwrap_or(0);
     let (down, up) = ui.input(|input| (input.key_pressed(Key::ArrowDown), input.key_pressed(Key::ArrowUp)));
     place = (place + usize::from(down)).saturating_sub(usize::from(up)).min(hits.len().saturating_sub(1));
-    ScrollArea::vertical().max_height(360.0).auto_shrink([false, true]).show(ui, |ui| {
+    // The list keeps its height while what is typed narrows it: nothing jumps under the mouse.
+    let height = LIST_HEIGHT.min(room(ui.ctx()).y - 2.0 * ui.spacing().interact_size.y - 24.0).max(60.0);
+    ScrollArea::vertical().max_height(height).min_scrolled_height(height).auto_shrink(false).show(ui, |ui| {
+        ui.set_min_height(height);
+        let width = ui.available_width();
         for (index, info) in hits.iter().enumerate() {
             let marked = index == place;
-            let dress = |button: Button<'static>| button.selected(marked).min_size(egui::vec2(440.0, 0.0));
+            let dress = |button: Button<'static>| button.selected(marked).min_size(vec2(width, 0.0));
             let response = act_line(ui, model, info, dress);
             if marked && (down || up) {
                 response.scroll_to_me(None);
@@ -120,12 +143,19 @@ fn palette(ui: &mut Ui, model: &mut Model, query: &mut String) -> bool {
 }
 
 fn help(ui: &mut Ui, model: &mut Model) -> bool {
-    ui.set_width(720.0);
+    set_width(ui, 720.0);
     ui.heading("Keyboard shortcuts");
-    ui.label("Drag in the viewport to orbit (middle-drag too), right-drag or Shift-middle-drag to pan, wheel to zoom, Shift-drag to rotate the environment.");
+    ui.label(format!("{}, Shift-drag to rotate the environment.", model.preferences.navigation.words()));
+    ui.horizontal(|ui| {
+        ui.label("Navigate as in");
+        for (own, name, words) in Navigation::NAMED {
+            ui.selectable_value(&mut model.preferences.navigation, own, name).on_hover_text(words);
+        }
+    });
     ui.label("Click the surface to pin a texel: photo, viewport and maps show the same place.");
     ui.add_space(6.0);
-    ScrollArea::vertical().max_height(480.0).auto_shrink(false).show(ui, |ui| {
+    let height = HELP_HEIGHT.min(room(ui.ctx()).y - 150.0).max(60.0);
+    ScrollArea::both().max_height(height).auto_shrink(false).show(ui, |ui| {
         for (group, title) in Group::ALL {
             super::heading(ui, title);
             Grid::new(title).num_columns(3).spacing([14.0, 3.0]).striped(true).show(ui, |ui| {
@@ -152,9 +182,11 @@ fn help(ui: &mut Ui, model: &mut Model) -> bool {
 }
 
 fn path(ui: &mut Ui, model: &mut Model, purpose: PickFor, text: &mut String) -> bool {
-    ui.set_width(520.0);
+    set_width(ui, 520.0);
     let (title, hint) = match purpose {
         PickFor::Light => ("Import an HDRI", "/home/me/lights/garden.hdr"),
+        PickFor::OtherRun => ("Compare with another run of this scene", "/home/me/runs/place-2"),
+        PickFor::LightFolder => ("Import a folder of HDRIs", "/home/me/lights"),
         PickFor::ObjectPhoto => ("Add a photo of an object", "/home/me/photos/ball.exr"),
         PickFor::ObjectResult => ("Save result as", "/home/me/results/ball"),
         PickFor::Material => {
@@ -174,13 +206,17 @@ fn path(ui: &mut Ui, model: &mut Model, purpose: PickFor, text: &mut String) -> 
         let typed = !text.trim().is_empty();
         let confirm = match purpose {
             PickFor::ObjectResult => "Save here",
-            PickFor::Light | PickFor::ObjectPhoto => "Add this",
+            PickFor::Light | PickFor::LightFolder | PickFor::ObjectPhoto => "Add this",
             _ => "Open this",
         };
         if ui.add_enabled(typed, Button::new(confirm)).clicked() || (enter && typed) {
             match purpose {
                 PickFor::Light => model.add_light(text.trim().into()),
-                PickFor::ObjectPhoto | PickFor::ObjectResult | PickFor::Material => {
+                PickFor::OtherRun
+                | PickFor::LightFolder
+                | PickFor::ObjectPhoto
+                | PickFor::ObjectResult
+                | PickFor::Material => {
                     model.picked(purpose, text.trim().into());
                 }
                 _ => model.open(text.trim().into()),
@@ -200,7 +236,7 @@ fn path(ui: &mut Ui, model: &mut Model, purpose: PickFor, text: &mut String) -> 
 }
 
 fn save(ui: &mut Ui, model: &mut Model, request: &mut SaveRequest) -> bool {
-    ui.set_width(520.0);
+    set_width(ui, 520.0);
     ui.heading(match request.what {
         SaveWhat::Picture => "Render image",
         SaveWhat::Turntable => "Render turntable",
@@ -208,7 +244,7 @@ fn save(ui: &mut Ui, model: &mut Model, request: &mut SaveRequest) -> bool {
     });
     Grid::new("save").num_columns(2).spacing([12.0, 6.0]).show(ui, |ui| {
         let label = ui.label(if request.what == SaveWhat::Picture { "Image file" } else { "Image folder" });
-        ui.add(TextEdit::singleline(&mut request.path).desired_width(380.0))
+        ui.add(TextEdit::singleline(&mut request.path).desired_width(380.0f32.min(room(ui.ctx()).x - 120.0)))
             .labelled_by(label.id)
             .on_hover_text("PNG as shown in the viewport or EXR in linear radiance, by the file extension");
         ui.end_row();
@@ -232,6 +268,17 @@ fn save(ui: &mut Ui, model: &mut Model, request: &mut SaveRequest) -> bool {
             ui.end_row();
         }
     });
+    match request.what {
+        SaveWhat::Picture => {
+            ui.checkbox(&mut request.cut_out, "Transparent background")
+                .on_hover_text("Leave what the surface does not cover transparent; a ground plane keeps its shadow");
+        }
+        SaveWhat::Turntable => {
+            ui.checkbox(&mut request.film, "Film of the images")
+                .on_hover_text("MP4 where ffmpeg is installed, an animated PNG for browsers otherwise");
+        }
+        SaveWhat::Strip => {}
+    }
     let images = if request.what == SaveWhat::Turntable { request.frames as f64 } else { 1.0 };
     let paths = (request.width * request.height * request.samples) as f64 * images;
     let seconds = model.preferences.seconds_per_path.map(|own| own * paths);

@@ -14,7 +14,7 @@ const SIZES: [usize; 5] = [512, 1024, 2048, 4096, 8192];
 
 /// Draws the dialog; true once it is done with.
 pub(super) fn show(ui: &mut Ui, model: &mut Model, request: &mut ExportRequest) -> bool {
-    ui.set_width(560.0);
+    super::dialog::set_width(ui, 560.0);
     ui.heading("Export");
     super::heading(ui, "Formats");
     for format in Format::ALL {

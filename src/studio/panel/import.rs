@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// Draws the dialog; true once it is done with.
 pub(super) fn show(ui: &mut Ui, model: &mut Model, request: &mut ImportRequest) -> bool {
-    ui.set_width(600.0);
+    super::dialog::set_width(ui, 600.0);
     ui.heading("Import a capture");
     ui.label("A folder with photos, a mesh and calibrated cameras. What is found is filled in; the rest is chosen.");
     ui.horizontal(|ui| {

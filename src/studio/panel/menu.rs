@@ -19,7 +19,8 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
                     let (panels, own): (Vec<&ActInfo>, Vec<&ActInfo>) =
                         LIST.iter().filter(|info| info.group == group).partition(|info| Panel::of(info.act).is_some());
                     for info in own {
-                        line(ui, model, info, false);
+                        let is_on = info.act.navigation() == Some(model.preferences.navigation);
+                        line(ui, model, info, is_on);
                     }
                     if !panels.is_empty() {
                         let list = ui.menu_button("Panels", |ui| {
@@ -51,7 +52,7 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
     });
 }
 
-/// A line of a menu; `is_on` where it shows a panel that is in front.
+/// A line of a menu; `is_on` where it shows a panel that is in front, or the hand movements in force.
 fn line(ui: &mut Ui, model: &mut Model, info: &ActInfo, is_on: bool) {
     if act_line(ui, model, info, |button| button.selected(is_on)).clicked() {
         model.act(info.act);

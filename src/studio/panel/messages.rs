@@ -54,11 +54,30 @@ pub fn line(ui: &mut Ui, model: &mut Model, message: &Message) {
         } else {
             ui.label(message.sentence());
         }
+        // What is no longer there cannot be opened, nor what was never found.
+        if let Some(file) = message.file.as_ref().filter(|file| file.exists()) {
+            let name =
+                file.file_name().map_or_else(|| file.display().to_string(), |name| name.to_string_lossy().into());
+            if ui.link(format!("Open {name}")).on_hover_text(file.display().to_string()).clicked() {
+                let context = ui.ctx().clone();
+                crate::studio::perform::open_file(file, &mut model.log, &context);
+            }
+        }
     });
-    if !message.remedy.is_empty() {
+    if !message.remedy.is_empty() || !message.offers.is_empty() {
         ui.horizontal_wrapped(|ui| {
             ui.add_space(18.0);
-            ui.label(RichText::new(format!("Fix: {}", message.remedy)).weak());
+            if !message.remedy.is_empty() {
+                ui.label(RichText::new(format!("Fix: {}", message.remedy)).weak());
+            }
+            for offer in &message.offers {
+                let can = model.project.is_some();
+                let button = ui.add_enabled(can, egui::Button::new(&offer.label).small());
+                let button = if offer.help.is_empty() { button } else { button.on_hover_text(&offer.help) };
+                if button.clicked() {
+                    model.take_offer(offer);
+                }
+            }
         });
     }
 }

@@ -5,6 +5,7 @@
 
 pub mod banner;
 pub mod card;
+pub mod curve_copies;
 pub mod curves;
 pub mod dialog;
 pub mod export;
@@ -74,6 +75,8 @@ pub fn show(panel: Panel, ui: &mut Ui, model: &mut Model, memory: &mut Memory) {
     }
     egui::Frame::new().fill(ui.visuals().panel_fill).inner_margin(Margin::same(PANEL_MARGIN)).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
+        // Figures and messages are copied by hand into mails and notebooks.
+        ui.style_mut().interaction.selectable_labels = matches!(panel, Panel::Record | Panel::Scores | Panel::Messages);
         match panel {
             Panel::Fit => fit::show(ui, model, &mut memory.form, &mut memory.reading),
             Panel::Views => views::show(ui, model, &mut memory.views),

@@ -1,28 +1,22 @@
-//! The chosen photo beside its render by the fit: wipe, difference, and the linked cursor.
+//! The chosen photo, or the render of another run, beside its render by the fit: overlay, wipe, difference, blink, and the
+//! linked cursor.
+
+mod render;
 
 use super::stage::cursor_in_view;
 use super::{act_button_named, empty};
 use crate::image::RgbImage;
 use crate::insight::cursor::point_of_pixel;
-use crate::job::preview::{Preview, PreviewRequest};
-use crate::material::MaterialMaps;
 use crate::scene::PixelState;
 use crate::studio::act::Act;
 use crate::studio::layout::Panel;
-use crate::studio::model::{Cursor, FitStatus, Model};
+use crate::studio::model::{Cursor, Model};
 use crate::studio::picture::{self, Compare, Comparison, Mark, Overlay, PictureView, Place, Source};
 use crate::studio::theme;
-use egui::{RichText, Ui};
+use egui::{ComboBox, RichText, Ui};
 use glam::Vec2;
+use render::{Rendering, Whose};
 use std::sync::Arc;
-use std::time::Instant;
-
-/// Paths a pixel of the render.
-const SAMPLES: usize = 64;
-/// Pixels of the render, at most.
-const MOST_PIXELS: usize = 300_000;
-/// Seconds between two renders of a photo while a fit runs.
-const RENDER_INTERVAL: f32 = 8.0;
 
 /// How photo and render are shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,8 +24,10 @@ enum Show {
     #[default]
     Photo,
     Render,
+    Overlay,
     Wipe,
     Difference,
+    Blink,
 }
 
 /// What the panel keeps.
@@ -40,15 +36,35 @@ pub struct PhotoMemory {
     show: Show,
     masked: bool,
     wipe: Option<f32>,
+    opacity: Opacity,
     view: PictureView,
     photo: Option<(usize, usize, Arc<RgbImage>)>,
     hatched: Option<(usize, usize, Arc<crate::image::Image<bool>>)>,
-    preview: Option<Preview>,
-    asked: Option<(Arc<MaterialMaps>, usize, Instant)>,
-    key: u64,
-    render: Option<(usize, Arc<RgbImage>)>,
-    seen: u64,
-    failures: u64,
+    render: Rendering,
+    /// The same view of the other run.
+    other: Rendering,
+    /// Whether the other run stands in the photo's place.
+    against_run: bool,
+}
+
+/// How opaque the render lies over the photo; half at first.
+struct Opacity(f32);
+
+impl Default for Opacity {
+    fn default() -> Self {
+        Opacity(0.5)
+    }
+}
+
+/// Seconds that photo and render are each shown when they blink.
+const BLINK_SECONDS: f64 = 0.6;
+
+/// Whether the render is shown now, of photo and render in turn; asks for the next turn.
+fn blink(ui: &Ui) -> bool {
+    let turns = ui.input(|input| input.time) / BLINK_SECONDS;
+    let left = (1.0 - turns.fract()) * BLINK_SECONDS;
+    ui.ctx().request_repaint_after(std::time::Duration::from_secs_f64(left.max(0.01)));
+    turns as u64 % 2 == 1
 }
 
 /// Draws the panel.
@@ -64,38 +80,54 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut PhotoMemory) {
         memory.photo = Some((key, view, Arc::new(scene.views[view].photo.to_linear())));
         let hatched = scene.views[view].states.map(|state| *state == PixelState::Ignored);
         memory.hatched = Some((key, view, Arc::new(hatched)));
-        memory.render = None;
-        memory.asked = None;
+        memory.render.forget();
+        memory.other.forget();
     }
     let name = scene.views[view].name.clone();
     controls(ui, model, memory, &name);
+    memory.against_run &= model.other_run.is_some();
     if memory.show != Show::Photo {
-        render(model, memory, view);
+        memory.render.update(model, view, Whose::Own);
+    }
+    if memory.against_run {
+        memory.other.update(model, view, Whose::Other);
     }
     let Some((.., photo)) = memory.photo.clone() else { return };
-    let own = Source::from(photo);
-    let rendered = memory
-        .render
-        .as_ref()
-        .filter(|(index, _)| *index == view)
-        .map(|(_, picture)| Source::from(Arc::clone(picture)));
-    let names = ["Photo".to_owned(), "Render".to_owned()];
+    let reference = match (memory.against_run, &model.other_run) {
+        (true, Some(other)) => memory.other.picture(view).map(|picture| (picture, other.name.clone())),
+        _ => Some((photo, "Photo".to_owned())),
+    };
+    let Some((reference, reference_name)) = reference else {
+        ui.label("Rendering the other run…");
+        return;
+    };
+    let own = Source::from(reference);
+    // The render of another run may be smaller than the photo.
+    let (camera, (width, height)) = (&scene.views[view].camera, own.size());
+    let photo_per_own = Vec2::new(camera.width as f32 / width as f32, camera.height as f32 / height as f32);
+    let rendered = memory.render.picture(view).map(Source::from);
+    let names = [reference_name.clone(), "Render".to_owned()];
     let compared = |mode| rendered.clone().map(|other| Comparison { other, mode, names: names.clone() });
     let comparison = match memory.show {
         Show::Photo => None,
         Show::Render => compared(Compare::Flip(true)),
+        Show::Overlay => compared(Compare::Blend(memory.opacity.0)),
+        Show::Blink => compared(Compare::Flip(blink(ui))),
         Show::Wipe => compared(Compare::Wipe(memory.wipe.unwrap_or(0.5))),
         Show::Difference => compared(Compare::Difference { signed: true, gain_stops: 2.0 }),
     };
     let badge = match (memory.show, &comparison) {
         (Show::Photo, _) => name.clone(),
         (_, None) => format!("{name}: rendering"),
-        (Show::Render, _) => format!("{name}: render"),
-        (Show::Wipe, _) => format!("{name}: photo left, render right"),
-        (Show::Difference, _) => format!("{name}: green where the photo is brighter, red where the render is, x 4"),
+        (Show::Render | Show::Overlay | Show::Blink, _) => name.clone(),
+        (Show::Wipe, _) => format!("{name}: {} left, render right", reference_name.to_lowercase()),
+        (Show::Difference, _) => {
+            format!("{name}: green where {} is brighter, red where the render is, x 4", reference_name.to_lowercase())
+        }
     };
     let colours = theme::palette(ui.visuals());
     let marks: Vec<Mark> = cursor_in_view(model, view)
+        .map(|place| place / photo_per_own)
         .map(|place| Mark {
             place: Place { row: place.y, column: place.x },
             label: String::new(),
@@ -109,7 +141,8 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut PhotoMemory) {
     let response = picture::show(ui, "Photo", &own, &model.edits.display, &mut memory.view, &overlay);
     memory.wipe = response.wipe.or(memory.wipe);
     if let Some(place) = response.hovered {
-        let cursor = cursor_at(model, &scene, view, place);
+        let in_photo = Place { row: place.row * photo_per_own.y, column: place.column * photo_per_own.x };
+        let cursor = cursor_at(model, &scene, view, in_photo);
         if response.clicked.is_some() {
             model.cursor = cursor.map(|cursor| Cursor { pinned: true, ..cursor });
         } else {
@@ -127,14 +160,16 @@ fn controls(ui: &mut Ui, model: &mut Model, memory: &mut PhotoMemory, name: &str
         let has_maps =
             model.project.as_ref().is_some_and(|project| project.maps.is_some() && project.surface.is_some());
         for (show, label, help) in [
-            (Show::Photo, "Photo only", "The photo as it was read, linear"),
+            (Show::Photo, "Photo only", "The photo as it was read, linear; of a run that is compared, its render"),
             (
                 Show::Render,
                 "Render",
                 "The same view, path traced with the estimated maps and environment, in the photo's exposure",
             ),
+            (Show::Overlay, "Overlay", "Render over the photo, as opaque as the slider says"),
             (Show::Wipe, "Wipe", "Photo left, render right; drag the divider"),
             (Show::Difference, "Difference", "Luminance of photo minus render"),
+            (Show::Blink, "Blink", "Photo and render in turn: what differs seems to move"),
         ] {
             let enabled = show == Show::Photo || has_maps;
             let button = egui::Button::selectable(memory.show == show, label);
@@ -143,7 +178,13 @@ fn controls(ui: &mut Ui, model: &mut Model, memory: &mut PhotoMemory, name: &str
                 memory.show = show;
             }
         }
+        if memory.show == Show::Overlay {
+            ui.add(egui::Slider::new(&mut memory.opacity.0, 0.0..=1.0).show_value(false))
+                .accessible_name("Opacity of the render")
+                .on_hover_text("Opacity of the render over the photo");
+        }
         ui.separator();
+        against(ui, model, memory);
         ui.checkbox(&mut memory.masked, "Excluded pixels")
             .on_hover_text("Hatch pixels that are not used: masked or damaged");
         if ui.button("Fit view").on_hover_text("Show the whole photo").clicked() {
@@ -157,66 +198,20 @@ fn controls(ui: &mut Ui, model: &mut Model, memory: &mut PhotoMemory, name: &str
     });
 }
 
-/// Asks for the render of the view when maps or view changed, and takes in what is there.
-fn render(model: &mut Model, memory: &mut PhotoMemory, view: usize) {
-    let Some(project) = &model.project else { return };
-    let (Some(scene), Some(surface), Some(maps)) = (&project.scene, &project.surface, &project.maps) else { return };
-    let running = matches!(model.fit.status, FitStatus::Running | FitStatus::Pausing | FitStatus::Finishing(_));
-    let due = match &memory.asked {
-        None => true,
-        Some((own, index, then)) => {
-            *index != view || (!Arc::ptr_eq(own, maps) && (!running || then.elapsed().as_secs_f32() > RENDER_INTERVAL))
-        }
+/// What the render is held against: the photo, or the render of another run.
+fn against(ui: &mut Ui, model: &mut Model, memory: &mut PhotoMemory) {
+    let Some(other) = model.other_run.clone() else {
+        act_button_named(ui, model, Act::CompareRun, "Compare run…");
+        return;
     };
-    if due {
-        if memory.preview.is_none() {
-            match Preview::start(1, Some(Arc::clone(&model.wake))) {
-                Ok(preview) => memory.preview = Some(preview),
-                Err(error) => return model.log.error(&error),
-            }
-        }
-        let camera = &scene.views[view].camera;
-        let camera = camera.shrunk(1 << camera.level_within(MOST_PIXELS));
-        let Some(parameters) = model.run_parameters() else { return };
-        memory.key += 1;
-        let request = PreviewRequest {
-            surface: Arc::clone(surface),
-            parameters: Arc::new(parameters),
-            camera,
-            settings: crate::render::picture::PictureSettings {
-                background_visible: scene.background == crate::scene::Background::Environment,
-                max_bounces: model.edits.fit.bounces,
-                ..model.picture_settings(1)
-            },
-            samples_target: if running { SAMPLES / 4 } else { SAMPLES },
-            coarse_first: true,
-            key: memory.key,
-        };
-        memory.asked = Some((Arc::clone(maps), view, Instant::now()));
-        if let Some(preview) = &memory.preview {
-            // A fit keeps its pace: a picture beside it may take its time.
-            preview.set_share(if running { 0.1 } else { 1.0 });
-            preview.request(request);
-        }
-    }
-    if let Some(preview) = &memory.preview
-        && let Some((number, picture)) = preview.pictures.newest()
-        && number > memory.seen
-    {
-        memory.seen = number;
-        if picture.key == memory.key {
-            // What the fit takes for the photo's exposure is no difference between the two.
-            let gain = model.gains().get(view).copied().unwrap_or(1.0);
-            memory.render = Some((view, Arc::new(picture.picture.map(|radiance| *radiance * gain))));
-        }
-    }
-    if let Some(preview) = &memory.preview
-        && let Some((number, failure)) = preview.failures.newest()
-        && number > memory.failures
-    {
-        memory.failures = number;
-        model.log.error(&failure.error);
-    }
+    let label = ui.label("Against");
+    let chosen = if memory.against_run { other.name.clone() } else { "Photo".to_owned() };
+    let list = ComboBox::from_id_salt("reference").selected_text(chosen).show_ui(ui, |ui| {
+        ui.selectable_value(&mut memory.against_run, false, "Photo");
+        ui.selectable_value(&mut memory.against_run, true, &other.name);
+        act_button_named(ui, model, Act::CompareRun, "Compare run…");
+    });
+    list.response.labelled_by(label.id).on_hover_text("What the render is held against");
 }
 
 /// The surface under a place of the photo.

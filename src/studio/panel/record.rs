@@ -6,6 +6,7 @@ use crate::error::{Error, ErrorKind};
 use crate::image::value_scale::three_digits;
 use crate::insight::record::{RecordSettings, TexelRecord, texel_record};
 use crate::job::background;
+use crate::render::picture::PictureSettings;
 use crate::studio::model::known::Told;
 use crate::studio::model::{Cursor, Model};
 use crate::studio::theme;
@@ -29,12 +30,15 @@ pub struct RecordMemory {
     known_grey: KnownGrey,
 }
 
+/// Reflectance of a grey card.
+const GREY_CARD: f32 = 0.18;
+
 /// A reflectance in (0, 1]; that of a grey card at first.
 struct KnownGrey(f32);
 
 impl Default for KnownGrey {
     fn default() -> Self {
-        KnownGrey(0.18)
+        KnownGrey(GREY_CARD)
     }
 }
 
@@ -141,7 +145,7 @@ fn ask(ui: &Ui, model: &Model, cursor: &Cursor, memory: &mut RecordMemory) {
     let Some(parameters) = model.run_parameters() else { return };
     let names: Vec<&String> = scene.views.iter().map(|view| &view.name).collect();
     let settings = RecordSettings {
-        picture: model.picture_settings(SAMPLES),
+        picture: PictureSettings { ground: None, ..model.picture_settings(SAMPLES) },
         gains: model.gains(),
         excluded: names.iter().map(|name| model.edits.fit.exclude.contains(name)).collect(),
     };
@@ -238,11 +242,16 @@ fn body(ui: &mut Ui, model: &mut Model, record: &TexelRecord) {
 /// Sets the scale that photos leave open by what the pinned patch is known to reflect.
 fn scale(ui: &mut Ui, model: &mut Model, cursor: &Cursor, grey: &mut f32) {
     heading(ui, "Scale");
+    let can = model.can_rescale();
+    let card = ui.add_enabled(can, egui::Button::new("This is 18 % grey"));
+    let help = "A grey card: write a copy of the run in which this patch reflects 18 %";
+    if card.on_hover_text(help).on_disabled_hover_text("Available when a fit is finished").clicked() {
+        model.rescale(cursor.uv, GREY_CARD);
+    }
     ui.horizontal(|ui| {
         let label = ui.label("This patch reflects");
         let field = egui::DragValue::new(grey).speed(0.005).range(0.01..=1.0).max_decimals(3);
         ui.add(field).labelled_by(label.id).on_hover_text("Diffuse reflectance: 0.18 is a grey card, 0.9 white paper");
-        let can = model.can_rescale();
         let button = ui.add_enabled(can, egui::Button::new("Rescale"));
         let help =
             "Write a copy of the run in which it does, with the environment scaled against it; photos leave this open";

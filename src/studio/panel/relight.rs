@@ -3,6 +3,7 @@
 use super::{act_button, act_switch, heading};
 use crate::image::display::DisplaySettings;
 use crate::image::{Image, RgbImage};
+use crate::light::day::Day;
 use crate::studio::act::Act;
 use crate::studio::model::Model;
 use crate::studio::model::lights::{LightName, ShelfLight};
@@ -20,16 +21,23 @@ use std::sync::Arc;
 pub struct RelightMemory {
     textures: HashMap<LightName, (Arc<RgbImage>, TextureHandle)>,
     strip: Vec<(Arc<RgbImage>, DisplaySettings, TextureHandle)>,
+    /// What is typed to find an environment.
+    sought: String,
 }
+
+/// So many environments are found by looking.
+const FEW_LIGHTS: usize = 8;
 
 /// Draws the panel.
 pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut RelightMemory) {
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         controls(ui, model);
+        day(ui, model);
         heading(ui, "Environments");
         shelf(ui, model, memory);
         ui.horizontal_wrapped(|ui| {
             act_button(ui, model, Act::AddLight);
+            act_button(ui, model, Act::AddLightFolder);
             act_button(ui, model, Act::LightStrip);
             act_button(ui, model, Act::SavePicture);
             act_button(ui, model, Act::SaveLightStrip);
@@ -59,6 +67,8 @@ fn controls(ui: &mut Ui, model: &mut Model) {
             .on_hover_text("Scale other environments to the mean luminance of the estimated one");
         let on = model.edits.relight.as_background;
         act_switch(ui, model, Act::LightBackground, "Background", on);
+        ui.checkbox(&mut model.edits.relight.ground, "Ground plane")
+            .on_hover_text("Show the shadow of the object on a level ground; path-traced images only");
         act_button(ui, model, Act::FittedLight);
     });
     ui.horizontal_wrapped(|ui| {
@@ -80,9 +90,61 @@ fn controls(ui: &mut Ui, model: &mut Model) {
     });
 }
 
+/// Hour, latitude and day of the sky that is made of them.
+fn day(ui: &mut Ui, model: &mut Model) {
+    let relight = &mut model.edits.relight;
+    if relight.first != LightName::Day && relight.second != Some(LightName::Day) {
+        return;
+    }
+    let day = &mut relight.day;
+    egui::Grid::new("day").num_columns(2).spacing([10.0, 5.0]).show(ui, |ui| {
+        let (rise, set) = day.daylight().unwrap_or((12.0, 12.0));
+        day.hour = day.hour.clamp(rise, set);
+        let label = ui.label("Hour");
+        ui.add(Slider::new(&mut day.hour, rise..=set).custom_formatter(|hour, _| clock(hour)).custom_parser(hour_of))
+            .labelled_by(label.id)
+            .on_hover_text("Solar time: the sun is highest at 12:00");
+        ui.end_row();
+        let label = ui.label("Latitude");
+        ui.add(Slider::new(&mut day.latitude_degrees, -66.0..=66.0).suffix("°").fixed_decimals(0))
+            .labelled_by(label.id)
+            .on_hover_text("Degrees north of the equator");
+        ui.end_row();
+        let label = ui.label("Day of the year");
+        ui.add(Slider::new(&mut day.day_of_year, 1..=365))
+            .labelled_by(label.id)
+            .on_hover_text("1 is the first of January, 172 the longest day of the north");
+        ui.end_row();
+        let label = ui.label("Haze");
+        ui.add(Slider::new(&mut day.haze, 2.0..=10.0).fixed_decimals(1))
+            .labelled_by(label.id)
+            .on_hover_text("Turbidity of the air: 2 is very clear, 10 is thick haze");
+        ui.end_row();
+    });
+}
+
+fn clock(hour: f64) -> String {
+    Day { hour: hour as f32, ..Day::default() }.clock()
+}
+
+fn hour_of(text: &str) -> Option<f64> {
+    Day::of_name(&format!("{}@0", text.trim())).map(|day| f64::from(day.hour))
+}
+
 fn shelf(ui: &mut Ui, model: &mut Model, memory: &mut RelightMemory) {
-    let lights = model.shelf.lights().to_vec();
+    let mut lights = model.shelf.lights().to_vec();
     memory.textures.retain(|name, _| lights.iter().any(|light| light.name == *name));
+    if lights.len() > FEW_LIGHTS || !memory.sought.is_empty() {
+        ui.horizontal(|ui| {
+            let label = ui.label("Find an environment");
+            ui.text_edit_singleline(&mut memory.sought).labelled_by(label.id);
+        });
+        let sought = memory.sought.trim().to_lowercase();
+        lights.retain(|light| light.name.label().to_lowercase().contains(&sought));
+        if lights.is_empty() {
+            ui.label(RichText::new("No matching environment").weak());
+        }
+    }
     let colours = theme::palette(ui.visuals());
     let mut removed = None;
     ui.horizontal_wrapped(|ui| {
@@ -144,7 +206,7 @@ fn strip(ui: &mut Ui, model: &mut Model, memory: &mut RelightMemory) {
         memory.strip.clear();
         return;
     }
-    heading(ui, "Lighting contact sheet");
+    let title = ui.label(RichText::new("Lighting contact sheet").strong());
     let display = model.edits.display;
     let known = memory.strip.len() == pictures.len()
         && memory
@@ -153,6 +215,8 @@ fn strip(ui: &mut Ui, model: &mut Model, memory: &mut RelightMemory) {
             .zip(&pictures)
             .all(|((own, shown, _), (_, other))| Arc::ptr_eq(own, other) && *shown == display);
     if !known {
+        // It was asked for: what lies below the end of the panel would not be found.
+        title.scroll_to_me(Some(egui::Align::TOP));
         let texture = |picture: &Arc<RgbImage>, name: &LightName| {
             let image = colour_image(picture, &display);
             ui.ctx().load_texture(format!("strip {}", name.label()), image, egui::TextureOptions::LINEAR)
@@ -184,6 +248,7 @@ fn about(light: &ShelfLight) -> String {
         LightName::Truth => "The environment the photos were rendered in".into(),
         LightName::Unseen => "A ground-truth environment that no photo shows".into(),
         LightName::Sky(_) => "A built-in sky".into(),
+        LightName::Day => "The sky of an hour and a latitude, which are set above once it is chosen".into(),
     };
     format!(
         "{place}\n{} x {} texels, mean radiance {:.3} {:.3} {:.3}, brightest {brightest:.1}",

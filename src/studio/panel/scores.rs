@@ -29,9 +29,47 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
             }
         });
         ui.label(RichText::new("In brackets: scale-aligned (per channel)").weak());
+        plausible(ui, model);
         truth(ui, &report);
         other_lights(ui, model);
     });
+}
+
+/// Whether such a material exists, and the scale that would make it one.
+fn plausible(ui: &mut Ui, model: &mut Model) {
+    let Some(own) = model.plausibility() else { return };
+    heading(ui, "Plausibility");
+    Grid::new("plausible").num_columns(2).spacing([18.0, 4.0]).show(ui, |ui| {
+        let mut line = |name: &str, [low, middle, high]: [f64; 3]| {
+            ui.label(name);
+            ui.label(format!("{middle:.3} ({low:.3} to {high:.3})"))
+                .on_hover_text("Median of the seen texels, and the range of nine tenths of them");
+            ui.end_row();
+        };
+        line("Diffuse reflectance", own.diffuse);
+        line("Specular reflectance F0", own.specular);
+    });
+    for doubt in &own.doubts {
+        let colours = crate::studio::theme::palette(ui.visuals());
+        ui.label(RichText::new(crate::studio::model::log::capitalised(doubt)).color(colours.warning));
+    }
+    match own.factor {
+        _ if own.doubts.is_empty() => {
+            ui.label(RichText::new("Reflectances of materials that exist").weak());
+        }
+        Some(factor) => {
+            let can = model.can_rescale();
+            let button = ui.add_enabled(can, egui::Button::new(format!("Scale reflectance by {factor:.2}")));
+            let help =
+                "Write a copy of the run with this scale, and the environment scaled against it; photos leave it open";
+            if button.on_hover_text(help).on_disabled_hover_text("Available when a fit is finished").clicked() {
+                model.rescale_by_factor(factor as f32);
+            }
+        }
+        None => {
+            ui.label(RichText::new("No scale mends it: pin a patch whose reflectance is known").weak());
+        }
+    }
 }
 
 /// Scores under lights the fit never saw: the check of the paper.

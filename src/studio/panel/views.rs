@@ -2,27 +2,24 @@
 
 use super::{act_button_named, empty};
 use crate::fit::ViewUse;
-use crate::image::RgbImage;
-use crate::image::display::DisplaySettings;
 use crate::studio::act::Act;
 use crate::studio::model::Model;
+use crate::studio::picture::ThumbnailCache;
 use crate::studio::theme;
-use egui::{Align, Layout, RichText, ScrollArea, Sense, TextureHandle, Ui, vec2};
-use std::sync::Arc;
+use egui::{Align, Layout, RichText, ScrollArea, Sense, Ui, vec2};
 
 /// Size of the table's letters: many rows are to be seen at once.
 const TEXT_POINTS: f32 = 11.5;
 /// An error so many times that of the photo in the middle is marked.
 const CONSPICUOUS: f32 = 1.4;
+/// Room for a photo's small picture in its row, in points.
+const THUMBNAIL: egui::Vec2 = vec2(30.0, 20.0);
 /// Points between two columns.
 const GAP: f32 = 6.0;
 
-/// The small picture of the photo under the mouse.
-type Hovered = (Arc<RgbImage>, DisplaySettings, TextureHandle);
-
 /// What the panel keeps.
 pub struct ViewsMemory {
-    hovered: Option<Hovered>,
+    thumbnails: ThumbnailCache,
     sorted_by: Column,
     descending: bool,
     last_chosen: usize,
@@ -30,7 +27,12 @@ pub struct ViewsMemory {
 
 impl Default for ViewsMemory {
     fn default() -> Self {
-        ViewsMemory { hovered: None, sorted_by: Column::Name, descending: false, last_chosen: usize::MAX }
+        ViewsMemory {
+            thumbnails: ThumbnailCache::default(),
+            sorted_by: Column::Name,
+            descending: false,
+            last_chosen: usize::MAX,
+        }
     }
 }
 
@@ -77,7 +79,7 @@ struct Row {
     name: String,
     error: Option<f32>,
     stops: f32,
-    clipped: f32,
+    clipped: Option<f32>,
     role: ViewUse,
 }
 
@@ -107,6 +109,11 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ViewsMemory) {
     }
     let rows = sorted(rows, memory);
     controls(ui, model);
+    // A panel may be narrower than the table.
+    ScrollArea::horizontal().auto_shrink(false).show(ui, |ui| table(ui, model, memory, &rows));
+}
+
+fn table(ui: &mut Ui, model: &mut Model, memory: &mut ViewsMemory, rows: &[Row]) {
     header(ui, memory);
     let chosen = model.project.as_ref().map_or(0, |project| project.chosen_view);
     let scroll = memory.last_chosen != chosen;
@@ -114,8 +121,8 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ViewsMemory) {
     let errors: Vec<f64> = rows.iter().filter_map(|row| row.error).map(f64::from).collect();
     let usual = crate::math::statistics::quantile(&errors, 0.5) as f32;
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        for row in &rows {
-            line(ui, model, row, row.index == chosen, (usual, scroll), &mut memory.hovered);
+        for row in rows {
+            line(ui, model, row, row.index == chosen, (usual, scroll), &mut memory.thumbnails);
         }
     });
 }
@@ -137,7 +144,7 @@ fn rows(model: &Model) -> Vec<Row> {
             name: view.name.clone(),
             error: project.view_errors.get(index).copied().flatten(),
             stops: if stops.is_finite() { stops } else { 0.0 },
-            clipped: project.clipped_shares.get(index).copied().unwrap_or(0.0),
+            clipped: project.clipped_shares.get(index).copied(),
             role: role(left_out, view.held_out),
         }
     };
@@ -150,7 +157,7 @@ fn sorted(mut rows: Vec<Row>, memory: &ViewsMemory) -> Vec<Row> {
         Column::Name => a.name.cmp(&b.name),
         Column::Error => unknown_last(a.error).total_cmp(&unknown_last(b.error)),
         Column::Exposure => a.stops.total_cmp(&b.stops),
-        Column::Clipped => a.clipped.total_cmp(&b.clipped),
+        Column::Clipped => a.clipped.unwrap_or(-1.0).total_cmp(&b.clipped.unwrap_or(-1.0)),
         Column::Role => role_words(a.role).cmp(role_words(b.role)),
     });
     if memory.descending {
@@ -174,6 +181,7 @@ fn controls(ui: &mut Ui, model: &mut Model) {
 fn header(ui: &mut Ui, memory: &mut ViewsMemory) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = GAP;
+        ui.add_space(THUMBNAIL.x);
         for (column, title, width, help) in Column::ALL {
             let own = memory.sorted_by == column;
             let text = match (own, memory.descending) {
@@ -203,10 +211,10 @@ fn line(
     row: &Row,
     chosen: bool,
     (usual, scroll): (f32, bool),
-    hovered: &mut Option<Hovered>,
+    thumbnails: &mut ThumbnailCache,
 ) {
     let colours = theme::palette(ui.visuals());
-    let width: f32 = Column::ALL.iter().map(|(_, _, width, _)| width + GAP).sum();
+    let width: f32 = THUMBNAIL.x + GAP + Column::ALL.iter().map(|(_, _, width, _)| width + GAP).sum::<f32>();
     let (rect, response) = ui.allocate_exact_size(vec2(width.max(ui.available_width()), 20.0), Sense::click());
     response.widget_info(|| {
         egui::WidgetInfo::selected(egui::Role::RadioButton, true, chosen, format!("photo {}", row.name))
@@ -218,6 +226,18 @@ fn line(
     }
     let mut inner = ui.new_child(egui::UiBuilder::new().max_rect(rect).layout(Layout::left_to_right(Align::Center)));
     inner.spacing_mut().item_spacing.x = GAP;
+    // A small picture is made once it is seen: there may be a thousand photos.
+    let small = model.project.as_ref().and_then(|project| project.thumbnails.get(row.index));
+    let texture = small.filter(|_| ui.is_rect_visible(rect)).and_then(|small| {
+        thumbnails.keep(&row.name, small);
+        thumbnails.texture(ui.ctx(), &row.name, &model.edits.display).cloned()
+    });
+    let (place, _) = inner.allocate_exact_size(THUMBNAIL, Sense::hover());
+    if let Some(texture) = &texture {
+        let size = texture.size_vec2();
+        let own = egui::Rect::from_center_size(place.center(), size * (place.size() / size).min_elem());
+        egui::Image::new((texture.id(), own.size())).paint_at(&inner, own);
+    }
     let dim = row.role == ViewUse::LeftOut;
     let mut cell = |column: Column, text: String, colour: Option<egui::Color32>| {
         let text = RichText::new(text).size(TEXT_POINTS);
@@ -236,8 +256,10 @@ fn line(
     let text = row.error.map_or_else(|| "-".into(), |error| format!("{error:.4}"));
     cell(Column::Error, text, bad.then_some(colours.warning));
     cell(Column::Exposure, if row.stops == 0.0 { "0".into() } else { format!("{:+.2}", row.stops) }, None);
-    let much = row.clipped > 0.05;
-    cell(Column::Clipped, format!("{:.1} %", 100.0 * row.clipped), much.then_some(colours.warning));
+    let much = row.clipped.is_some_and(|share| share > 0.05);
+    // Until the surface is there, nothing tells a bright sky from the object.
+    let text = row.clipped.map_or_else(|| "-".into(), |share| format!("{:.1} %", 100.0 * share));
+    cell(Column::Clipped, text, much.then_some(colours.warning));
     cell(Column::Role, role_words(row.role).into(), None);
     if chosen && scroll {
         response.scroll_to_me(None);
@@ -248,31 +270,13 @@ fn line(
     if response.double_clicked() && !model.switches.looking_through {
         model.act(Act::LookThrough);
     }
-    let small = model.project.as_ref().and_then(|project| project.thumbnails.get(row.index)).cloned();
-    let display = model.edits.display;
+    let texture = texture.map(|texture| (texture.id(), texture.size_vec2()));
     response.on_hover_ui(|ui| {
-        if let Some(small) = small {
-            let texture = texture_of(ui, &small, &display, hovered);
-            ui.image((texture.id(), texture.size_vec2()));
+        if let Some(texture) = texture {
+            ui.image(texture);
         }
         ui.label(format!("{}\nClick to choose, double-click for its camera view", row.name));
     });
-}
-
-/// The small picture as the display shows it, made once.
-fn texture_of(
-    ui: &Ui,
-    small: &Arc<RgbImage>,
-    display: &DisplaySettings,
-    hovered: &mut Option<Hovered>,
-) -> TextureHandle {
-    let known = hovered.take().filter(|(own, shown, _)| Arc::ptr_eq(own, small) && shown == display);
-    let made = known.unwrap_or_else(|| {
-        let image = super::relight::colour_image(small, display);
-        let texture = ui.ctx().load_texture("photo under the mouse", image, egui::TextureOptions::LINEAR);
-        (Arc::clone(small), *display, texture)
-    });
-    hovered.insert(made).2.clone()
 }
 
 #[cfg(test)]
@@ -286,12 +290,12 @@ mod tests {
             name: index.to_string(),
             error,
             stops: 0.0,
-            clipped: 0.0,
+            clipped: None,
             role: ViewUse::Training,
         };
         let rows = vec![row(0, Some(0.1)), row(1, None), row(2, Some(0.3))];
         let order = |descending| {
-            let memory = ViewsMemory { hovered: None, sorted_by: Column::Error, descending, last_chosen: 0 };
+            let memory = ViewsMemory { sorted_by: Column::Error, descending, last_chosen: 0, ..ViewsMemory::default() };
             sorted(rows.clone(), &memory).iter().map(|row| row.index).collect::<Vec<_>>()
         };
         assert_eq!(order(false), [0, 2, 1]);

@@ -1,19 +1,44 @@
 //! The first page: open, recents, the demo, and what a scene folder must hold.
 
+use crate::image::file;
 use crate::studio::act::Act;
 use crate::studio::model::store::Recent;
 use crate::studio::model::tasks::TaskKind;
 use crate::studio::model::{Model, PickFor};
 use crate::studio::theme;
 use egui::{
-    Align, Align2, Button, Color32, Context, Frame, Id, LayerId, Layout, Order, RichText, ScrollArea, TextStyle, Ui,
-    vec2,
+    Align, Align2, Button, Color32, Context, Frame, Id, LayerId, Layout, Order, RichText, ScrollArea, TextStyle,
+    TextureHandle, Ui, vec2,
 };
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// Room for the small picture of what was opened before, in points.
+const RECENT_PICTURE: egui::Vec2 = vec2(48.0, 32.0);
 
 /// What the page keeps.
 #[derive(Default)]
 pub struct WelcomeMemory {
     path: String,
+    /// Whether anything had the keys when the page was drawn last.
+    had_focus: bool,
+    /// Small pictures of what was opened before.
+    pictures: HashMap<PathBuf, TextureHandle>,
+}
+
+impl WelcomeMemory {
+    /// The small picture of a path, read once it is there.
+    fn picture(&mut self, context: &Context, model: &Model, path: &Path) -> Option<TextureHandle> {
+        if let Some(known) = self.pictures.get(path) {
+            return Some(known.clone());
+        }
+        let own = model.store.thumbnail_path(path).filter(|own| own.is_file())?;
+        let bytes = file::read_srgb8(&own).ok()?;
+        let image = egui::ColorImage::from_rgb([bytes.width(), bytes.height()], bytes.pixels().as_flattened());
+        let texture = context.load_texture(path.to_string_lossy(), image, egui::TextureOptions::LINEAR);
+        self.pictures.insert(path.into(), texture.clone());
+        Some(texture)
+    }
 }
 
 /// What a scene folder may be, with what it must hold.
@@ -46,6 +71,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut super::Memory) {
             ui.allocate_ui_with_layout(vec2(width, 0.0), Layout::top_down(Align::Min), |ui| page(ui, model, memory));
         });
     });
+    memory.had_focus = ui.memory(|memory| memory.focused().is_some());
 }
 
 fn page(ui: &mut Ui, model: &mut Model, memory: &mut WelcomeMemory) {
@@ -54,11 +80,16 @@ fn page(ui: &mut Ui, model: &mut Model, memory: &mut WelcomeMemory) {
     ui.label(RichText::new("From calibrated photos to relightable materials").size(16.0));
     ui.add_space(20.0);
     interrupted(ui, model);
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let demo = Button::new(RichText::new("Open the built-in demo").size(16.0).color(colours.on_accent))
             .fill(colours.accent)
             .min_size(vec2(230.0, 40.0));
-        if ui.add(demo).on_hover_text("A small scene with known materials; needs no data").clicked() {
+        let demo = ui.add(demo).on_hover_text("A small scene with known materials; needs no data");
+        // The first stop of Tab is what most people want first, not the menus above it.
+        if !memory.had_focus && ui.input(|input| input.key_pressed(egui::Key::Tab)) {
+            demo.request_focus();
+        }
+        if demo.clicked() {
             model.act(Act::OpenDemo);
         }
         let open = Button::new(RichText::new("Open a folder…").size(16.0)).min_size(vec2(190.0, 40.0));
@@ -72,7 +103,7 @@ fn page(ui: &mut Ui, model: &mut Model, memory: &mut WelcomeMemory) {
         ui.label(RichText::new("or drop one here").weak());
     });
     ui.add_space(6.0);
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let object = Button::new(RichText::new("Single object…").size(16.0)).min_size(vec2(230.0, 40.0));
         if ui.add(object).on_hover_text(Act::ObjectWorkspace.info().help).clicked() {
             model.act(Act::ObjectWorkspace);
@@ -86,7 +117,11 @@ fn page(ui: &mut Ui, model: &mut Model, memory: &mut WelcomeMemory) {
     ui.horizontal(|ui| {
         let label = ui.label("Path");
         let field = ui
-            .add(egui::TextEdit::singleline(&mut memory.path).desired_width(430.0).hint_text("/home/me/scenes/place"))
+            .add(
+                egui::TextEdit::singleline(&mut memory.path)
+                    .desired_width(430.0f32.min(ui.available_width() - 120.0))
+                    .hint_text("/home/me/scenes/place"),
+            )
             .labelled_by(label.id);
         let entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
         let clicked = ui.add_enabled(!memory.path.trim().is_empty(), Button::new("Open path")).clicked();
@@ -96,7 +131,7 @@ fn page(ui: &mut Ui, model: &mut Model, memory: &mut WelcomeMemory) {
     });
     opening(ui, model);
     ui.add_space(18.0);
-    recents(ui, model);
+    recents(ui, model, memory);
     ui.add_space(12.0);
     ui.label(RichText::new("What can be opened").strong());
     egui::Grid::new("kinds").num_columns(2).spacing([16.0, 6.0]).show(ui, |ui| {
@@ -138,11 +173,11 @@ fn opening(ui: &mut Ui, model: &mut Model) {
     Frame::group(ui.style()).inner_margin(12.0).show(ui, |ui| {
         ui.label(RichText::new("Opening").strong());
         ui.label(crate::studio::model::log::capitalised(what));
-        ui.add(egui::ProgressBar::new(*share).desired_width(420.0).show_percentage());
+        ui.add(egui::ProgressBar::new(*share).desired_width(420.0f32.min(ui.available_width())).show_percentage());
     });
 }
 
-fn recents(ui: &mut Ui, model: &mut Model) {
+fn recents(ui: &mut Ui, model: &mut Model, memory: &mut WelcomeMemory) {
     ui.label(RichText::new("Recent").strong());
     if model.preferences.recents.is_empty() {
         ui.label(RichText::new("No recent files").weak());
@@ -152,7 +187,14 @@ fn recents(ui: &mut Ui, model: &mut Model) {
     for recent in recents {
         let name = recent.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         let is_there = recent.path.exists();
+        let picture = memory.picture(ui.ctx(), model, &recent.path);
         ui.horizontal(|ui| {
+            let (place, _) = ui.allocate_exact_size(RECENT_PICTURE, egui::Sense::hover());
+            if let Some(picture) = &picture {
+                let size = picture.size_vec2();
+                let own = egui::Rect::from_center_size(place.center(), size * (place.size() / size).min_elem());
+                egui::Image::new((picture.id(), own.size())).paint_at(ui, own);
+            }
             let link = ui.add_enabled(is_there, Button::new(&name).frame(false));
             let link = link.on_hover_text(recent.path.display().to_string());
             if link.on_disabled_hover_text("No longer there").clicked() {

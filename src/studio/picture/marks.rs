@@ -124,6 +124,13 @@ fn shown_value(source: &Source, overlay: &Overlay, row: usize, column: usize, pa
                 first
             }
         }
+        Compare::Blend(opacity) => {
+            if opacity < 0.5 {
+                first
+            } else {
+                second
+            }
+        }
         Compare::Difference { signed, .. } => {
             let (first, second) = (first?, second?);
             let difference = first.rgb() - second.rgb();

@@ -45,6 +45,8 @@ pub enum Compare {
     Wipe(f32),
     /// The second alone when true, else the first.
     Flip(bool),
+    /// The second over the first with this opacity, in [0, 1].
+    Blend(f32),
     /// First minus second.
     Difference {
         /// Luminance: green where the first is larger, red where the second is. Otherwise the absolute difference of

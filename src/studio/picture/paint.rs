@@ -65,6 +65,7 @@ impl Painting<'_> {
         let (mode, split) = match compare {
             None | Some(Compare::Flip(false)) => (Mode::First, 0),
             Some(Compare::Flip(true)) => (Mode::Second, 0),
+            Some(Compare::Blend(opacity)) => (Mode::Blend { opacity: opacity.clamp(0.0, 1.0) }, 0),
             Some(Compare::Wipe(place)) => (Mode::Wipe, divider(place, visible) - visible.left),
             Some(Compare::Difference { signed, .. }) => (Mode::Difference { signed }, 0),
         };
@@ -80,6 +81,9 @@ impl Painting<'_> {
             for (x, pixel) in pixels.iter_mut().enumerate() {
                 *pixel = match (&mode, &second) {
                     (Mode::Second, Some(second)) => shade.value(second, y, x),
+                    (Mode::Blend { opacity }, Some(second)) => {
+                        shade.value(&first, y, x).lerp_to_gamma(shade.value(second, y, x), *opacity)
+                    }
                     (Mode::Wipe, Some(second)) if x >= split => shade.value(second, y, x),
                     (Mode::Difference { signed }, Some(second)) => shade.difference(&first, second, *signed, y, x),
                     _ => shade.value(&first, y, x),
@@ -105,6 +109,7 @@ pub fn divider(place: f32, visible: PixelRect) -> usize {
 enum Mode {
     First,
     Second,
+    Blend { opacity: f32 },
     Wipe,
     Difference { signed: bool },
 }
@@ -229,6 +234,10 @@ mod tests {
         let wipe = bytes(Compare::Wipe(0.25));
         assert_eq!([wipe[24].r(), wipe[25].r()], [byte(0.5), byte(0.2)]);
         assert!(bytes(Compare::Flip(true)).iter().all(|pixel| pixel.r() == byte(0.2)));
+        assert_eq!(bytes(Compare::Blend(0.0)), bytes(Compare::Flip(false)));
+        assert_eq!(bytes(Compare::Blend(1.0)), bytes(Compare::Flip(true)));
+        let half = bytes(Compare::Blend(0.5))[0].r();
+        assert!((byte(0.2)..byte(0.5)).contains(&half) && half > byte(0.2), "{half}");
         assert!(bytes(Compare::Flip(false)).iter().all(|pixel| pixel.r() == byte(0.5)));
         let difference = bytes(Compare::Difference { signed: false, gain_stops: 1.0 });
         assert!(difference.iter().all(|pixel| pixel.r().abs_diff(byte(0.6)) <= 1));

@@ -229,6 +229,10 @@ fn names(painter: &egui::Painter, rect: Rect, overlay: &Overlay) {
         Compare::Flip(showing_second) => {
             marks::badge(painter, below, Align2::LEFT_TOP, if *showing_second { second } else { first });
         }
+        Compare::Blend(opacity) => {
+            let words = format!("{second} over {first}, {:.0} %", 100.0 * opacity);
+            marks::badge(painter, below, Align2::LEFT_TOP, &words);
+        }
         Compare::Difference { signed, gain_stops } => {
             let kind = if *signed { "signed luminance" } else { "absolute" };
             let words = format!("{first} - {second}, {kind}, {gain_stops:+.1} stops");

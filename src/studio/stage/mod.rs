@@ -42,7 +42,7 @@ pub use content::{
     Backdrop, Layer, PhotoMode, StageCamera, StageContent, StageFrame, StageLight, StageLook, StageQuantity,
 };
 pub use frustum::{frustum_depth, pick_camera};
-pub use navigate::navigate;
+pub use navigate::{Navigation, navigate};
 pub use renderer::StageStatus;
 
 use eframe::{egui, egui_wgpu, wgpu};

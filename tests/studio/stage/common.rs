@@ -24,7 +24,7 @@ impl eframe::App for Shown {
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         egui::CentralPanel::no_frame().show(ui, |ui| {
             let response = self.stage.show(ui, &self.frame);
-            patina::studio::stage::navigate(&response, &mut self.frame.eye, self.bounds);
+            patina::studio::stage::navigate(&response, &mut self.frame.eye, self.bounds, Default::default());
             self.rect = response.rect;
         });
     }

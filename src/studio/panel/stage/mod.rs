@@ -194,7 +194,7 @@ fn bounds_of(model: &Model) -> (glam::Vec3, glam::Vec3) {
 fn move_eye(model: &mut Model, response: &Response) {
     let bounds = bounds_of(model);
     let mut eye = model.eye_in_force();
-    if stage::navigate(response, &mut eye, Some(bounds)) {
+    if stage::navigate(response, &mut eye, Some(bounds), model.preferences.navigation) {
         model.eye = eye.in_orbit(bounds);
         if model.switches.looking_through {
             // The photo no longer lies on what is seen.

@@ -1,9 +1,9 @@
 //! The path-traced preview: asked for when nothing moves, shown as long as it is of what is on the stage.
 
 use crate::image::RgbImage;
+use crate::job::pictures::parameters_with;
 use crate::job::preview::{Preview, PreviewRequest};
 use crate::material::MaterialMaps;
-use crate::render::Parameters;
 use crate::studio::model::lights::LightName;
 use crate::studio::model::{FitStatus, Model};
 use crate::studio::stage::{Layer, StageFrame};
@@ -96,7 +96,7 @@ impl Traced {
                         let Some(light) = model.traced_light(name) else { continue };
                         let request = PreviewRequest {
                             surface: Arc::clone(&surface),
-                            parameters: Arc::new(self.parameters(&maps, &light)),
+                            parameters: Arc::new(parameters_with(&maps, &light, model.edits.fit.lobe)),
                             camera: frame.eye.as_camera(width, height),
                             settings: model.picture_settings(1),
                             samples_target: SAMPLES,
@@ -110,10 +110,6 @@ impl Traced {
         }
         self.take_in(model);
         self.shown(names[1].is_some().then_some(model.edits.relight.wipe))
-    }
-
-    fn parameters(&self, maps: &MaterialMaps, light: &crate::light::Environment) -> Parameters<f32> {
-        crate::job::pictures::parameters(maps, light)
     }
 
     fn request(&mut self, model: &mut Model, side: usize, request: PreviewRequest) {
@@ -230,6 +226,7 @@ pub(super) fn key_of(
     let light = model.shelf.find(name).map_or(0, |light| Arc::as_ptr(&light.environment) as usize);
     let fitted = model.shelf.find(&LightName::Fitted).map_or(0, |light| Arc::as_ptr(&light.environment) as usize);
     (name, light, fitted, Arc::as_ptr(maps) as usize, size).hash(&mut hasher);
-    (model.edits.relight.matched, model.edits.relight.as_background, model.edits.fit.bounces).hash(&mut hasher);
+    let relight = &model.edits.relight;
+    (relight.matched, relight.as_background, relight.ground, model.edits.fit.bounces).hash(&mut hasher);
     hasher.finish() | 1
 }

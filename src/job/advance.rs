@@ -1,10 +1,10 @@
-//! How far a job is, from its first step to its report: one share that never goes back, and the seconds that are left.
+//! How far a job is, from its first step to its report: one share that never goes back, and the seconds that are left; the
+//! same in window and terminal.
 //!
 //! Steps are weighed by the seconds they are expected to take, as the job tells them; what comes after the last step, by
 //! the ratio that finishing had to fitting on this machine before ([`Advance::learned_ratio`], kept between runs).
 
-use super::fit::FitStatus;
-use crate::job::{FinishingStage, Progress};
+use super::{FinishingStage, Progress};
 use std::time::Instant;
 
 /// Seconds of finishing for a second of fitting, where no run has told it yet.
@@ -64,7 +64,8 @@ impl Advance {
         self.learned.take()
     }
 
-    pub(super) fn stepped(&mut self, progress: &Progress) {
+    /// A step was done.
+    pub fn stepped(&mut self, progress: &Progress) {
         let (done, left) = (progress.row.seconds, progress.seconds_left);
         let step = 1.0 / progress.steps_per_second.max(1e-9);
         if done.is_finite() && left.is_finite() {
@@ -73,33 +74,34 @@ impl Advance {
         }
     }
 
-    pub(super) fn finishing(&mut self, stage: FinishingStage) {
+    /// A part of the finishing began.
+    pub fn finishing(&mut self, stage: FinishingStage) {
         let began = self.finishing.map_or_else(Instant::now, |(_, began)| began);
         self.finishing = Some((stage, began));
         self.claim(self.before_finishing() + (1.0 - self.before_finishing()) * f64::from(stage.share_before()));
     }
 
-    pub(super) fn finished(&mut self) {
+    /// The report is written.
+    pub fn finished(&mut self) {
         self.share = 1.0;
         if let (Some((done, ..)), Some((_, began))) = (self.steps, self.finishing) {
             self.learned = Some((began.elapsed().as_secs_f64() / done.max(1e-3)).clamp(RATIOS.0, RATIOS.1));
         }
     }
 
-    /// Time passes within a step, or within the finishing.
-    pub(super) fn tick(&mut self, status: &FitStatus) {
+    /// Time passes within a step, or within the finishing, of a job that is at work.
+    pub fn tick(&mut self) {
         let Some((done, left, step, then)) = self.steps else { return };
-        match (status, self.finishing) {
-            (FitStatus::Running, None) => {
+        match self.finishing {
+            None => {
                 let within = then.elapsed().as_secs_f64().min(MOST_BY_TIME * step).min(left);
                 self.claim((done + within) / self.whole(done, left));
             }
-            (FitStatus::Finishing(_), Some((_, began))) => {
+            Some((_, began)) => {
                 let share = began.elapsed().as_secs_f64() / (self.ratio * (done + left)).max(1e-3);
                 let before = self.before_finishing();
                 self.claim(before + (1.0 - before) * share.min(MOST_BY_TIME));
             }
-            _ => {}
         }
     }
 
@@ -157,7 +159,7 @@ mod tests {
         ];
         for stage in stages {
             advance.finishing(stage);
-            advance.tick(&FitStatus::Finishing(stage));
+            advance.tick();
             assert!(advance.percent() >= before && advance.percent() < 100);
             before = advance.percent();
         }
