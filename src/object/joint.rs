@@ -10,7 +10,6 @@ use super::matrices::{LightMatrix, NodeMatrix};
 use super::nodes::{NodeGrid, NodeTable};
 use super::observations::ObjectView;
 use super::prior::deep::DeepPrior;
-use super::prior::entropy::EntropyPrior;
 use super::prior::gradient::GradientPrior;
 use super::prior::{LightPriorKind, LogLight};
 use super::problem::ObjectProblem;
@@ -204,10 +203,6 @@ impl LightHolder {
         match settings.prior {
             LightPriorKind::None => {}
             LightPriorKind::Gradient => terms.gradient = gradient(settings.gradient_weight),
-            LightPriorKind::Entropy => {
-                terms.gradient = gradient(settings.gradient_weight);
-                terms.entropy = Some(EntropyPrior::new(width, height, settings.entropy_weight));
-            }
             LightPriorKind::Deep => {
                 let mut prior = DeepPrior::new(width, height, settings.net_channels, settings.seed)?;
                 prior.offset = light.mean().map(|mean| mean as f32);
@@ -216,8 +211,7 @@ impl LightHolder {
                     true => settings.net_weight,
                     false => settings.net_weight_of_both,
                 };
-                let carry = settings.net_carry;
-                deep = Some(DeepTie::new(prior, width * height, weight, steps, rate, carry));
+                deep = Some(DeepTie { prior, weight, net_steps: steps, rate });
             }
         }
         Ok(LightHolder { terms, deep })

@@ -53,13 +53,8 @@ pub struct ObjectSettings {
     /// The same where reflectance is estimated as well. What a model of it cannot follow is left to the light, which takes
     /// it up the more the looser it is held; held too fast, it cannot follow the net, which takes few steps a round.
     pub net_weight_of_both: f64,
-    /// Share of the difference between light and net that is carried from step to step: 1 is ADMM, 0 a plain pull. In
-    /// the few steps there are the plain pull found the better light and lowers one objective; ADMM chases what moves.
-    pub net_carry: f32,
     /// Weight of the mean absolute step of the gradient prior.
     pub gradient_weight: f64,
-    /// Weight of the entropy prior.
-    pub entropy_weight: f64,
     /// Steps on the reflectance a round, at most.
     pub reflectance_steps: usize,
     /// Weight of the squared codes of a model that has codes.
@@ -92,9 +87,7 @@ impl Default for ObjectSettings {
             net_rate: 0.01,
             net_weight: 0.05,
             net_weight_of_both: 0.5,
-            net_carry: 0.0,
             gradient_weight: 0.01,
-            entropy_weight: 0.01,
             reflectance_steps: 8,
             code_weight: 1e-5,
             epsilon_share: 1e-3,
@@ -152,9 +145,6 @@ impl ObjectSettings {
         if self.pixels == 0 {
             return wrong("pixels", "at least one pixel is needed");
         }
-        if !(0.0..=1.0).contains(&self.net_carry) {
-            return wrong("net-carry", "this must be a number from 0 to 1");
-        }
         let positive = [
             ("epsilon-share", self.epsilon_share),
             ("loss-width", self.loss_width),
@@ -169,7 +159,6 @@ impl ObjectSettings {
             ("net-weight", self.net_weight),
             ("net-weight-of-both", self.net_weight_of_both),
             ("gradient-weight", self.gradient_weight),
-            ("entropy-weight", self.entropy_weight),
             ("code-weight", self.code_weight),
         ];
         for (name, value) in weights {
