@@ -40,8 +40,13 @@ impl DeepTie {
         budget: NewtonBudget,
     ) -> LightOutcome {
         let outcome = newton(matrix, likelihood, &self.terms(terms), light, budget);
-        self.prior.fit(&light.channels, &shares(light.width, light.height), self.net_steps, self.rate);
+        self.follow(light);
         outcome
+    }
+
+    /// Fits the net to a light.
+    pub fn follow(&mut self, light: &LogLight) {
+        self.prior.fit(&light.channels, &shares(light.width, light.height), self.net_steps, self.rate);
     }
 
     /// The light as the net has it.
