@@ -67,7 +67,7 @@ impl StudyOptions {
 
     /// All fits, and the cases they are.
     fn cases(&self) -> Vec<(FitCase, StudyCase)> {
-        let fit = self.fit_settings(1);
+        let fit = self.fit_settings(64);
         let steps = format!("{} + {}", fit.steps_diffuse, fit.steps_all);
         let size = if self.quick { " quick" } else { "" };
         let mut cases = Vec::new();
@@ -117,7 +117,7 @@ pub fn mvcl(options: &StudyOptions, results: &Path, sitting: &Sitting) -> Result
             .at(Place::Setting("seeds".into()))
             .remedy("give a number of seeds, such as --seeds 5"));
     }
-    options.fit_settings(1).validate()?;
+    options.fit_settings(64).validate()?;
     let mut results = Results::read(results)?;
     let sources = options.sources();
     let (fits, cases): (Vec<FitCase>, Vec<StudyCase>) = options.cases().into_iter().unzip();
@@ -217,7 +217,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mvcl.jsonl");
         let stop = AtomicBool::new(false);
-        let pattern = "none".parse().unwrap();
+        let pattern = "/none/".parse().unwrap();
         let sitting = Sitting { budget: None, pattern, stop: &stop, tell: &|_| {} };
         let error = mvcl(&StudyOptions::default(), &path, &sitting).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::InvalidSetting);

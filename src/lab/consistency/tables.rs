@@ -97,7 +97,7 @@ impl SceneTable {
         for &case in self.cases.iter().filter(|case| **case != Case::None) {
             words.push(format!("`{}` {}", case.name(), percent(quantile(&self.changes(case, IMAGE), 0.5))));
         }
-        let paper = PAPER_CHANGES.iter().find(|(name, _)| *name == self.name);
+        let paper = PAPER_CHANGES.iter().find(|(name, _)| self.name.split(' ').next() == Some(*name));
         let paper = paper.map_or("none".to_string(), |(_, change)| percent(*change));
         format!(
             "{}: image RMSE against `none`, median over seeds: {}; the paper's figure for a scene of this name: {paper}. \
