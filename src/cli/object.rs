@@ -29,7 +29,8 @@ pub struct ObjectOptions {
     /// The mesh of the object: OBJ or PLY.
     #[arg(long, requires = "camera")]
     pub mesh: Option<PathBuf>,
-    /// The object is a sphere that fills the shorter side of the photo, seen from infinitely far along -z.
+    /// The object is a sphere, seen from infinitely far along -z: the circle of its mask, or without one the circle that
+    /// fills the shorter side of the photo.
     #[arg(long)]
     pub sphere: bool,
     /// Normals of the object in place of a mesh, one EXR or PFM a photo, of its size: unit vectors in the world (+y up,
@@ -118,7 +119,7 @@ pub fn object(options: &ObjectOptions, json: bool) -> Result<()> {
     let stop = Arc::new(AtomicBool::new(false));
     stop_on_interrupt(Arc::clone(&stop));
     let settings = options.settings();
-    settings.validate()?;
+    settings.validate_for(options.env.is_some())?;
     result_folder::prepare(&options.output)?;
     let files = ObjectFiles {
         photos: options.photos.clone(),
@@ -180,10 +181,14 @@ pub fn object(options: &ObjectOptions, json: bool) -> Result<()> {
         let line = serde_json::json!({
             "event": "finished", "run": options.output, "start": found.start, "seconds": found.seconds,
             "picture_log_rmse": found.picture_log_rmse, "findings": found.findings,
+            "light_bands": found.light_bands,
         });
         println!("{line}");
     } else {
         found.findings.iter().for_each(|finding| println!("{finding}"));
+        if let Some(bands) = &found.light_bands {
+            println!("environment: {}", bands.sentence());
+        }
         let spread = split::SplitSpread::of(&found.candidates);
         println!(
             "began as {}; picture within {:.3} in logarithms; as well by {}; {:.1} s: {}",

@@ -13,6 +13,7 @@
 //! | [`nightly`] | what takes too long to be asked on every change |
 //! | [`proof`] | exports, opened and rendered by other programs |
 //! | [`consistency`], [`object_study`] | the figures of the two papers |
+//! | [`study`] | studies as lists of cases that several sittings work off |
 //! | [`rivals`], [`neural`] | reflectance models on measured tables; training of the neural one |
 //! | [`scenes`] | scenes made in code with their truth |
 //! | [`study_table`], [`bar_picture`] | tables over seeds, bars without a browser |
@@ -33,6 +34,7 @@ pub mod proof;
 pub mod rivals;
 pub mod scale;
 pub mod scenes;
+pub mod study;
 pub mod study_table;
 pub mod tracer_speed;
 #[cfg(feature = "studio")]

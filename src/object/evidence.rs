@@ -43,6 +43,17 @@ pub fn negative_log_evidence(matrix: &LightMatrix, likelihood: &Likelihood, ligh
     let energy: f64 = light.channels.iter().map(|channel| prior.energy(channel)).sum();
     // The channels see the same geometry: one stands for all three.
     let channel = 1;
+    let texels = matrix.texels();
+    let mut square = information(matrix, likelihood, light, channel);
+    prior.add_to(&light.channels[channel], &mut square);
+    let volume = cholesky(&mut square, texels).map_or(f64::INFINITY, |logarithm| 1.5 * logarithm);
+    residuals + energy + volume
+}
+
+/// What the photo tells of the logarithm of one channel of a light, texel by texel: `J J / s^2`.
+pub(super) fn information(matrix: &LightMatrix, likelihood: &Likelihood, light: &LogLight, channel: usize) -> Vec<f64> {
+    let radiance = light.radiance();
+    let picture = matrix.forward(&radiance);
     let mut rows = matrix.dense(channel);
     let texels = matrix.texels();
     for (index, (row, pixel)) in rows.chunks_exact_mut(texels).zip(&picture).enumerate() {
@@ -59,10 +70,15 @@ pub fn negative_log_evidence(matrix: &LightMatrix, likelihood: &Likelihood, ligh
     let mut gram = vec![0.0f32; texels * texels];
     let left = Rows::new(&rows, matrix.pixels(), texels);
     multiply(left.transpose(), left, &mut gram, false);
-    let mut square: Vec<f64> = gram.into_iter().map(f64::from).collect();
-    prior.add_to(&light.channels[channel], &mut square);
-    let volume = log_determinant(square, texels).map_or(f64::INFINITY, |logarithm| 1.5 * logarithm);
-    residuals + energy + volume
+    gram.into_iter().map(f64::from).collect()
+}
+
+/// What is believed of one channel of a light before any photo: the matrix `Q` of the quadratic that touches the belief.
+pub(super) fn belief(light: &LogLight, channel: usize) -> Vec<f64> {
+    let texels = light.width * light.height;
+    let mut square = vec![0.0; texels * texels];
+    LightBelief::new(light.width, light.height, TAIL).add_to(&light.channels[channel], &mut square);
+    square
 }
 
 /// The same figure of an objective whose light is known: residuals alone, on the scale of nats.
@@ -125,8 +141,9 @@ impl LightBelief {
     }
 }
 
-/// Logarithm of the determinant of a symmetric matrix by Cholesky's method; `None` when it is not positive definite.
-fn log_determinant(mut square: Vec<f64>, size: usize) -> Option<f64> {
+/// Factors a symmetric matrix by Cholesky's method and returns the logarithm of its determinant; `None` when it is not
+/// positive definite. Row `k` then holds column `k` of the factor, from its diagonal on.
+pub(super) fn cholesky(square: &mut [f64], size: usize) -> Option<f64> {
     let mut sum = 0.0;
     for column in 0..size {
         let (above, below) = square.split_at_mut(column * size);
@@ -185,8 +202,8 @@ mod tests {
                 square[(i + 1) * size + i] = -1.0;
             }
         }
-        assert!((log_determinant(square.clone(), size).unwrap() - 31f64.ln()).abs() < 1e-10);
+        assert!((cholesky(&mut square.clone(), size).unwrap() - 31f64.ln()).abs() < 1e-10);
         square[0] = -1.0;
-        assert!(log_determinant(square, size).is_none());
+        assert!(cholesky(&mut square, size).is_none());
     }
 }

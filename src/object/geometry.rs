@@ -31,6 +31,13 @@ pub struct ObjectPixel {
     pub geometric_normal: Vec3,
 }
 
+impl ObjectPixel {
+    /// Whether it sees the surface steeply enough for a fit.
+    fn is_for_fits(&self) -> bool {
+        self.normal.dot(self.to_eye) >= LEAST_EYE_COSINE
+    }
+}
+
 /// The pixels of one photo that show the object, and the mesh that shadows them.
 #[derive(Clone, Debug)]
 pub struct ObjectGeometry {
@@ -40,6 +47,8 @@ pub struct ObjectGeometry {
     pub height: usize,
     /// The pixels, in row-major order.
     pub pixels: Vec<ObjectPixel>,
+    /// Pixels that see the surface more obliquely than [`LEAST_EYE_COSINE`]: no fit uses them, pictures show them.
+    pub grazing: Vec<ObjectPixel>,
     /// The mesh for shadow rays; `None` for a convex object, which shadows nothing but its own back.
     pub bvh: Option<Arc<Bvh>>,
 }
@@ -49,7 +58,11 @@ impl ObjectGeometry {
     ///
     /// The centre lies in the middle of the photo; `radius_pixels` is usually half its shorter side.
     pub fn sphere(width: usize, height: usize, radius_pixels: f32) -> Self {
-        let centre = Vec2::new(0.5 * width as f32, 0.5 * height as f32);
+        Self::sphere_at(width, height, Vec2::new(0.5 * width as f32, 0.5 * height as f32), radius_pixels)
+    }
+
+    /// [`ObjectGeometry::sphere`] with its centre anywhere, in pixels from the upper left corner.
+    pub fn sphere_at(width: usize, height: usize, centre: Vec2, radius_pixels: f32) -> Self {
         let mut pixels = Vec::new();
         for row in 0..height {
             for column in 0..width {
@@ -59,19 +72,12 @@ impl ObjectGeometry {
                     continue;
                 }
                 let normal = Vec3::new(place.x, -place.y, (1.0 - squared).sqrt());
-                if normal.z >= LEAST_EYE_COSINE {
-                    pixels.push(ObjectPixel {
-                        row: row as u32,
-                        column: column as u32,
-                        normal,
-                        to_eye: Vec3::Z,
-                        origin: normal,
-                        geometric_normal: normal,
-                    });
-                }
+                let (row, column) = (row as u32, column as u32);
+                let to_eye = Vec3::Z;
+                pixels.push(ObjectPixel { row, column, normal, to_eye, origin: normal, geometric_normal: normal });
             }
         }
-        ObjectGeometry { width, height, pixels, bvh: None }
+        Self::of_pixels(width, height, pixels, None)
     }
 
     /// The pixels of a camera whose centre and four corners all meet the mesh: a pixel across the outline mixes.
@@ -102,12 +108,20 @@ impl ObjectGeometry {
             .into_par_iter()
             .map(|row| (0..camera.width).filter_map(|column| seen(mesh, &bvh, camera, row, column)).collect())
             .collect();
-        ObjectGeometry {
-            width: camera.width,
-            height: camera.height,
-            pixels: rows.into_iter().flatten().collect(),
-            bvh: Some(bvh),
-        }
+        Self::of_pixels(camera.width, camera.height, rows.into_iter().flatten().collect(), Some(bvh))
+    }
+
+    /// Keeps apart what is seen too obliquely.
+    fn of_pixels(width: usize, height: usize, pixels: Vec<ObjectPixel>, bvh: Option<Arc<Bvh>>) -> Self {
+        let (pixels, grazing) = pixels.into_iter().partition(ObjectPixel::is_for_fits);
+        ObjectGeometry { width, height, pixels, grazing, bvh }
+    }
+
+    /// The same with the pixels that no fit uses among the others: for pictures, which would be black there.
+    pub fn with_grazing(&self) -> Self {
+        let mut pixels = [self.pixels.as_slice(), &self.grazing].concat();
+        pixels.sort_by_key(|pixel| (pixel.row, pixel.column));
+        ObjectGeometry { pixels, grazing: Vec::new(), ..self.clone() }
     }
 
     /// Pixels of given normals (unit length or zero for none, in the world), all seen along one direction.
@@ -125,13 +139,13 @@ impl ObjectGeometry {
                     return Err(Error::new(ErrorKind::NonFinite, message).remedy("export the normals again"));
                 }
                 let Some(normal) = normal.try_normalize() else { continue };
-                if normal.dot(to_eye) >= LEAST_EYE_COSINE {
+                if normal.dot(to_eye) > 0.0 {
                     let (row, column) = (row as u32, column as u32);
                     pixels.push(ObjectPixel { row, column, normal, to_eye, origin: normal, geometric_normal: normal });
                 }
             }
         }
-        Ok(ObjectGeometry { width: normals.width(), height: normals.height(), pixels, bvh: None })
+        Ok(Self::of_pixels(normals.width(), normals.height(), pixels, None))
     }
 
     /// Which texels of a `width x height` environment are seen from each of `pixels`; `None` when nothing shadows.
@@ -174,14 +188,24 @@ fn seen(mesh: &Mesh, bvh: &Bvh, camera: &Camera, row: usize, column: usize) -> O
     let geometric_normal = facing(mesh.area_vector(hit.triangle as usize).try_normalize()?);
     let shading = blend(&mesh.normals).try_normalize().unwrap_or(geometric_normal);
     let normal = if shading.dot(geometric_normal) < 0.0 { -shading } else { shading };
-    (normal.dot(to_eye) >= LEAST_EYE_COSINE).then(|| ObjectPixel {
+    Some(ObjectPixel {
         row: row as u32,
         column: column as u32,
-        normal,
+        normal: towards(normal, to_eye),
         to_eye,
         origin: blend(&mesh.positions),
         geometric_normal,
     })
+}
+
+/// A shading normal that turns away from the eye, at the rim of a smoothed mesh, is bent back until it just faces it: a
+/// pixel that is seen has a picture.
+fn towards(normal: Vec3, to_eye: Vec3) -> Vec3 {
+    const JUST_FACING: f32 = 0.01;
+    match JUST_FACING - normal.dot(to_eye) {
+        short if short > 0.0 => (normal + short * to_eye).normalize_or(to_eye),
+        _ => normal,
+    }
 }
 
 /// One bit a pixel and texel: whether light arrives.
@@ -262,6 +286,36 @@ mod tests {
             counts[usize::from(expected)] += 1;
         }
         assert!(counts[0] > 20 && counts[1] > 100, "{counts:?}");
+    }
+
+    #[test]
+    fn grazing_pixels_are_kept_from_fits_and_shown_in_pictures() {
+        let sphere = ObjectGeometry::sphere_at(80, 64, Vec2::new(45.0, 30.0), 25.0);
+        assert!(!sphere.grazing.is_empty());
+        let whole = sphere.with_grazing();
+        assert_eq!(whole.pixels.len(), sphere.pixels.len() + sphere.grazing.len());
+        assert!(whole.pixels.windows(2).all(|pair| (pair[0].row, pair[0].column) < (pair[1].row, pair[1].column)));
+        let inside = |pixel: &ObjectPixel| {
+            Vec2::new(pixel.column as f32 + 0.5 - 45.0, pixel.row as f32 + 0.5 - 30.0).length() < 25.0
+        };
+        assert!(whole.pixels.iter().all(inside));
+        // A floor seen at four degrees: no fit may use it, and no picture of it is black.
+        let floor = Mesh {
+            positions: vec![
+                Vec3::new(-40.0, 0.0, -40.0),
+                Vec3::new(40.0, 0.0, -40.0),
+                Vec3::new(40.0, 0.0, 40.0),
+                Vec3::new(-40.0, 0.0, 40.0),
+            ],
+            triangles: vec![[0, 2, 1], [0, 3, 2]],
+            ..Default::default()
+        };
+        let camera = Camera::looking_at(Vec3::new(0.0, 0.7, 10.0), Vec3::ZERO, 9, 9, 0.02);
+        let geometry = ObjectGeometry::of_mesh(&floor, &camera).unwrap();
+        assert_eq!((geometry.pixels.len(), geometry.grazing.len()), (0, 81));
+        // A shading normal beyond the rim is bent until it faces the eye.
+        let bent = towards(Vec3::new(0.99, 0.0, -0.14).normalize(), Vec3::Z);
+        assert!(bent.z > 0.0 && bent.z < LEAST_EYE_COSINE && (bent.length() - 1.0).abs() < 1e-5, "{bent}");
     }
 
     #[test]

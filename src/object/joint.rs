@@ -5,12 +5,12 @@
 //! reflectance. What is new here: starts from a whole library, tried at low resolution; the light by Newton; matrices
 //! that make each step a walk through memory.
 
+use super::bands::LightBands;
 use super::light_step::{DeepTie, LightOutcome, LightTerms, NewtonBudget, first_order, newton, objective};
 use super::matrices::{LightMatrix, NodeMatrix};
 use super::nodes::{NodeGrid, NodeTable};
 use super::observations::ObjectView;
 use super::prior::deep::DeepPrior;
-use super::prior::entropy::EntropyPrior;
 use super::prior::gradient::GradientPrior;
 use super::prior::{LightPriorKind, LogLight};
 use super::problem::ObjectProblem;
@@ -61,6 +61,8 @@ pub struct Estimate {
     pub rows: Vec<ObjectiveRow>,
     /// What the photos see of the light; `None` for a result that does not say, or of an estimation that was ended early.
     pub light_seen: Option<LightSeen>,
+    /// Which of its details they tell; `None` likewise, and for a light that was given.
+    pub light_bands: Option<LightBands>,
     /// Root mean square of the logarithm of picture over photo, over the pixels of the fit.
     pub picture_log_rmse: f64,
     /// What was noticed.
@@ -101,6 +103,7 @@ pub fn estimate(
         return Err(Error::new(ErrorKind::InvalidSetting, "light and reflectance are both given: nothing is unknown")
             .remedy("leave one of them out"));
     }
+    settings.validate_for(known.light.is_some())?;
     watch(ObjectEvent::Stage("tracing what each pixel sees"));
     let (problem, mut findings) = ObjectProblem::new(views, settings)?;
     let mut run =
@@ -169,6 +172,15 @@ pub fn estimate(
             .push(Finding::new(Severity::Warning, "object-not-finite", message).remedy("try another start or model"));
     }
     let light_seen = Some(LightSeen::of(&run.problem.transport, &table, &light));
+    let mut light_bands = None;
+    if given.is_none() {
+        watch(ObjectEvent::Stage("asking which details of the light the photos tell"));
+        let small = ObjectProblem::for_bands(views, settings)?;
+        let directions = small.transport.directions();
+        let resampled = light.environment().resampled(directions.width, directions.height);
+        let table = small.transport.grid().tabulate(model.model.as_ref(), &parameters);
+        light_bands = LightBands::of(&small, &table, &LogLight::of(&resampled, 1e-12));
+    }
     Ok(Estimate {
         parameters,
         table,
@@ -177,6 +189,7 @@ pub fn estimate(
         candidates,
         rows: run.rows,
         light_seen,
+        light_bands,
         picture_log_rmse,
         findings,
         seconds: began.elapsed().as_secs_f64(),
@@ -204,10 +217,6 @@ impl LightHolder {
         match settings.prior {
             LightPriorKind::None => {}
             LightPriorKind::Gradient => terms.gradient = gradient(settings.gradient_weight),
-            LightPriorKind::Entropy => {
-                terms.gradient = gradient(settings.gradient_weight);
-                terms.entropy = Some(EntropyPrior::new(width, height, settings.entropy_weight));
-            }
             LightPriorKind::Deep => {
                 let mut prior = DeepPrior::new(width, height, settings.net_channels, settings.seed)?;
                 prior.offset = light.mean().map(|mean| mean as f32);
@@ -216,8 +225,7 @@ impl LightHolder {
                     true => settings.net_weight,
                     false => settings.net_weight_of_both,
                 };
-                let carry = settings.net_carry;
-                deep = Some(DeepTie::new(prior, width * height, weight, steps, rate, carry));
+                deep = Some(DeepTie { prior, weight, net_steps: steps, rate });
             }
         }
         Ok(LightHolder { terms, deep })
@@ -258,6 +266,13 @@ impl Run<'_> {
         let steps = if round == 1 { 3 * self.settings.light_steps } else { self.settings.light_steps };
         let budget = NewtonBudget { steps: 1, products: self.settings.light_products };
         let mut outcome = LightOutcome::default();
+        // In the grey rounds another thing is asked of the light than what is told; and first-order steps are as released.
+        let may_rise = grey || self.settings.method == LightMethod::FirstOrder;
+        let total = |light: &LogLight, holder: &LightHolder| {
+            let reached = objective(&matrix, likelihood, &holder.terms, light);
+            reached.total() + holder.deep.as_ref().map_or(0.0, |deep| deep.energy(light))
+        };
+        let before = (!may_rise).then(|| (total(light, holder), light.clone(), holder.deep.clone()));
         match (&mut holder.deep, self.settings.method) {
             (Some(deep), LightMethod::FirstOrder) => {
                 let (mut best, mut since) = (f64::INFINITY, 0);
@@ -292,6 +307,20 @@ impl Run<'_> {
             light.level_colours();
         }
         self.check_stop()?;
+        if let Some((least, before, deep)) = before
+            && !(total(light, holder) <= least)
+        {
+            // The net moves under the steps of the light: where both together made it worse the round is taken back, and
+            // the net alone comes nearer to the light, unless that is worse, too.
+            *light = before;
+            holder.deep = deep.clone();
+            if let Some(own) = &mut holder.deep {
+                own.follow(light);
+            }
+            if !(total(light, holder) <= least) {
+                holder.deep = deep;
+            }
+        }
         // What is told is a function of light, net and reflectance as they are now. The steps above each lower another
         // one: the net moves under them, and so does what is carried along.
         let reached = objective(&matrix, likelihood, &holder.terms, light);

@@ -7,7 +7,7 @@
 //! * [`first_order`]: Adam through the net of the deep prior, as released.
 //!
 //! The deep prior joins the first way by alternation: the light is pulled to what the net says, the net is fitted to the
-//! light. Of their difference a share may be carried along ([`DeepTie::carry`]); all of it is ADMM.
+//! light. Both lower one objective; to carry their difference along (ADMM) found worse lights in the few steps there are.
 
 mod deep_tie;
 mod newton;

@@ -6,12 +6,13 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`photo`], [`geometry`], [`observations`] | radiance with its bounds; normals, eyes, shadows; the pixels of a fit |
+//! | [`outline`] | the circle that a mask lies on |
 //! | [`directions`], [`nodes`], [`transport`], [`matrices`] | the image as a linear function of the light and of the reflectance |
 //! | [`likelihood`] | Laplace on log radiance |
 //! | [`prior`] | what is known of light: the deep prior and its rivals |
 //! | [`light_step`], [`reflectance_step`] | one unknown while the other is held |
 //! | [`starts`], [`screen`], [`evidence`] | where to begin, tried at low resolution and ranked |
-//! | [`split`], [`seen`] | what the photo leaves open; which directions of the light it sees |
+//! | [`split`], [`seen`], [`bands`] | what the photo leaves open; which directions and which details of the light it sees |
 //! | [`picture`] | re-renders and relit pictures |
 //! | [`settings`], [`progress`] | what is asked, what is told |
 //! | [`read`](mod@read), [`result_folder`], [`result_read`], [`page`] | files that are read, what is left on disk, that read again |
@@ -21,6 +22,7 @@
 //! varying reflectance (that is `fit`), and anything that needs a window or a thread of its own.
 
 pub mod angles;
+pub mod bands;
 pub mod directions;
 pub mod evidence;
 pub mod geometry;
@@ -30,6 +32,7 @@ pub mod likelihood;
 pub mod matrices;
 pub mod nodes;
 pub mod observations;
+pub mod outline;
 pub mod page;
 pub mod photo;
 pub mod picture;

@@ -35,7 +35,9 @@ impl ObjectView {
                 .at(Place::View(photo.name.clone()))
                 .remedy("use the photo that they were made for"));
         }
-        geometry.pixels.retain(|pixel| photo.is_object[(pixel.row as usize, pixel.column as usize)]);
+        let is_shown = |pixel: &ObjectPixel| photo.is_object[(pixel.row as usize, pixel.column as usize)];
+        geometry.pixels.retain(is_shown);
+        geometry.grazing.retain(is_shown);
         if geometry.pixels.is_empty() {
             return Err(Error::new(ErrorKind::InvalidScene, "no pixel of the photo shows the object")
                 .at(Place::View(photo.name.clone()))

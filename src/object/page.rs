@@ -130,6 +130,13 @@ pub fn facts(estimate: &Estimate, model: &str, gauge: &Gauge, spread: &SplitSpre
     if let Some(seen) = &estimate.light_seen {
         rows.push(("directions the photos tell next to nothing of", format!("{:.0} %", 100.0 * seen.unseen_share)));
     }
+    if let Some(bands) = &estimate.light_bands {
+        let shares = bands.degrees.iter().zip(&bands.known);
+        let shares: Vec<String> =
+            shares.map(|(degrees, known)| format!("{degrees:.0}°: {:.0} %", 100.0 * known)).collect();
+        rows.push(("the light", bands.sentence()));
+        rows.push(("what the photos tell of it after a blur", shares.join(" · ")));
+    }
     let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_string(), value]).collect();
     table(&["", ""], &rows)
         + "<p class=note>No photo tells the level of the light: reflectance times a factor and light over it, channel by \

@@ -56,6 +56,21 @@ impl ObjectProblem {
         ObjectProblem::new(views, &coarse).map(|(problem, _)| problem)
     }
 
+    /// The same photos with few pixels and a light of [`bands::ROWS`](super::bands::ROWS) rows at most, to ask which of its
+    /// details they tell.
+    ///
+    /// # Errors
+    /// As [`ObjectProblem::new`].
+    pub fn for_bands(views: &[ObjectView], settings: &ObjectSettings) -> Result<Self> {
+        let (rows, pixels) = (super::bands::ROWS, COARSE_PIXELS);
+        let small = ObjectSettings {
+            light_height: settings.light_height.min(rows),
+            pixels: settings.pixels.min(pixels),
+            ..settings.clone()
+        };
+        ObjectProblem::new(views, &small).map(|(problem, _)| problem)
+    }
+
     /// The even light under which pictures of a reflectance are as bright as the photos: the median of the ratios, per
     /// channel.
     pub fn even_light(&self, table: &NodeTable) -> LogLight {

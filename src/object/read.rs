@@ -2,8 +2,9 @@
 
 use super::geometry::ObjectGeometry;
 use super::observations::ObjectView;
+use super::outline::{OutlineCircle, circle_of};
 use super::photo::ObjectPhoto;
-use crate::error::{Error, ErrorKind, Finding, Place, Result};
+use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::file;
 use crate::scene::read::source::SourceCamera;
 use crate::scene::read::world::{up_in_source, world_from_source};
@@ -68,17 +69,82 @@ pub fn read_views(files: &ObjectFiles) -> Result<(Vec<ObjectView>, Vec<Finding>)
             };
             files.normals.iter().map(of).collect::<Result<Vec<_>>>()?
         }
-        None => photos
-            .iter()
-            .map(|photo| {
-                let (width, height) = (photo.radiance.width(), photo.radiance.height());
-                ObjectGeometry::sphere(width, height, 0.5 * width.min(height) as f32)
-            })
-            .collect(),
+        None => photos.iter().map(|photo| sphere_in(photo, !files.masks.is_empty(), &mut findings)).collect(),
         Some(mesh) => geometries_of_mesh(files, mesh, &photos, &mut findings)?,
     };
     let views = photos.into_iter().zip(geometries).map(|(photo, geometry)| ObjectView::new(photo, geometry));
     Ok((views.collect::<Result<Vec<_>>>()?, findings))
+}
+
+/// Less of an outline on its circle than this is no ball's.
+const ROUND_SHARE: f64 = 0.75;
+/// A ball is told to be elsewhere than where it is taken to be from so many radii on.
+const OFF: f64 = 0.03;
+/// Darker than this share of the median is what surrounds an object that was cut out or rendered alone.
+const SURROUND: f32 = 1e-3;
+
+/// The ball in a photo: where its mask says, else the one that fills the photo. What does not look like it is told.
+fn sphere_in(photo: &ObjectPhoto, has_mask: bool, findings: &mut Vec<Finding>) -> ObjectGeometry {
+    let (width, height) = (photo.radiance.width(), photo.radiance.height());
+    let filling = OutlineCircle::filling(width, height);
+    let place = || Place::View(photo.name.clone());
+    let mut circle = filling;
+    if has_mask {
+        match circle_of(&photo.is_object) {
+            Some(found) if found.share >= ROUND_SHARE => {
+                circle = found;
+                if filling.distance(&found) > OFF {
+                    let message = format!("the ball is taken to be where its mask is: {}", in_words(&found));
+                    findings.push(Finding::new(Severity::Note, "sphere-from-mask", message).at(place()));
+                }
+            }
+            found => {
+                let on = found.map_or(0.0, |found| 100.0 * found.share);
+                let message = format!(
+                    "the mask is not that of a ball: {on:.0} % of its outline lie on a circle; the ball is taken to fill \
+                     the photo"
+                );
+                findings.push(
+                    Finding::new(Severity::Warning, "sphere-mask-not-round", message)
+                        .at(place())
+                        .remedy("mask the whole ball and nothing else, or give the shape with --mesh or --normals"),
+                );
+            }
+        }
+    } else if let Some(found) = bright_disc(photo, &filling)
+        && filling.distance(&found) > OFF
+    {
+        let message = format!(
+            "the ball is taken to fill the photo, but what is not black lies on another circle: {}",
+            in_words(&found)
+        );
+        findings.push(
+            Finding::new(Severity::Warning, "sphere-off-centre", message)
+                .at(place())
+                .remedy("give its silhouette with --mask, or crop the photo to the ball"),
+        );
+    }
+    ObjectGeometry::sphere_at(width, height, circle.centre.as_vec2(), circle.radius as f32)
+}
+
+fn in_words(circle: &OutlineCircle) -> String {
+    format!("centre at {:.1}, {:.1}, radius {:.1} pixels", circle.centre.x, circle.centre.y, circle.radius)
+}
+
+/// The circle around all that is not black, where the corners of the photo are: only then does the photo itself show
+/// where the object ends.
+fn bright_disc(photo: &ObjectPhoto, filling: &OutlineCircle) -> Option<OutlineCircle> {
+    let levels = photo.radiance.map(|pixel| pixel.max_element());
+    let mut sorted: Vec<f32> = levels.pixels().iter().copied().filter(|level| *level > 0.0).collect();
+    sorted.sort_by(f32::total_cmp);
+    let threshold = SURROUND * sorted.get(sorted.len() / 2)?;
+    let is_bright = levels.map(|level| *level > threshold);
+    let (width, height) = (levels.width(), levels.height());
+    let corners = [(0, 0), (0, width - 1), (height - 1, 0), (height - 1, width - 1)];
+    if filling.radius < 4.0 || corners.iter().any(|corner| is_bright[*corner]) {
+        return None;
+    }
+    circle_of(&is_bright).filter(|found| found.share >= ROUND_SHARE)
 }
 
 fn geometries_of_mesh(

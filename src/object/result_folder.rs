@@ -83,6 +83,7 @@ pub fn write(
         "parameters": estimate.parameters,
         "start": estimate.start,
         "light_unseen_share": estimate.light_seen.as_ref().map(|seen| seen.unseen_share),
+        "light_bands": estimate.light_bands,
         "picture_log_rmse": estimate.picture_log_rmse,
         "seconds": estimate.seconds,
         "gauge": gauge,
@@ -101,9 +102,10 @@ pub fn write(
     let mut sections = vec![("Found", page::facts(estimate, model.model.name(), &gauge, &spread))];
     let mut galleries = String::new();
     for (index, view) in views.iter().enumerate() {
+        let geometry = view.geometry.with_grazing();
         let visibility: Option<Visibility> =
-            view.geometry.visibility(&view.geometry.pixels, width, height).filter(|_| settings.shadows);
-        let pictures = render(&view.geometry, visibility.as_ref(), &directions, &grid, &estimate.table, &lights);
+            geometry.visibility(&geometry.pixels, width, height).filter(|_| settings.shadows);
+        let pictures = render(&geometry, visibility.as_ref(), &directions, &grid, &estimate.table, &lights);
         let stops = page::stops_of(&view.photo.radiance);
         let mut shown = vec![
             Shown { caption: format!("photo {}", view.photo.name), picture: &view.photo.radiance, stops },

@@ -1,5 +1,6 @@
 //! A result folder read again: what was estimated, from what, and how it went.
 
+use super::bands::LightBands;
 use super::joint::Estimate;
 use super::nodes::NodeGrid;
 use super::prior::LogLight;
@@ -91,6 +92,8 @@ struct Written {
     picture_log_rmse: f64,
     seconds: f64,
     split: SplitSpread,
+    #[serde(default)]
+    light_bands: Option<LightBands>,
     followed: Vec<FollowedStart>,
     #[serde(default)]
     findings: Vec<WrittenFinding>,
@@ -148,6 +151,7 @@ pub fn read(folder: &Path) -> Result<ObjectResult> {
         candidates: Vec::new(),
         rows: read_rows(&folder.join("loss.csv"))?,
         light_seen,
+        light_bands: written.light_bands,
         picture_log_rmse: written.picture_log_rmse,
         findings: written.findings.into_iter().map(finding).collect(),
         seconds: written.seconds,

@@ -1,6 +1,8 @@
 //! What an estimation is asked to do, and three sets of answers.
 
+use super::observations::FEWEST_PIXELS;
 use super::prior::LightPriorKind;
+use super::prior::deep::net::levels_of;
 use crate::error::{Error, ErrorKind, Place, Result};
 
 /// Most rows of the light: texels are counted by 16 bits, and 360 x 180 is what the paper's own lights have.
@@ -53,13 +55,8 @@ pub struct ObjectSettings {
     /// The same where reflectance is estimated as well. What a model of it cannot follow is left to the light, which takes
     /// it up the more the looser it is held; held too fast, it cannot follow the net, which takes few steps a round.
     pub net_weight_of_both: f64,
-    /// Share of the difference between light and net that is carried from step to step: 1 is ADMM, 0 a plain pull. In
-    /// the few steps there are the plain pull found the better light and lowers one objective; ADMM chases what moves.
-    pub net_carry: f32,
     /// Weight of the mean absolute step of the gradient prior.
     pub gradient_weight: f64,
-    /// Weight of the entropy prior.
-    pub entropy_weight: f64,
     /// Steps on the reflectance a round, at most.
     pub reflectance_steps: usize,
     /// Weight of the squared codes of a model that has codes.
@@ -92,9 +89,7 @@ impl Default for ObjectSettings {
             net_rate: 0.01,
             net_weight: 0.05,
             net_weight_of_both: 0.5,
-            net_carry: 0.0,
             gradient_weight: 0.01,
-            entropy_weight: 0.01,
             reflectance_steps: 8,
             code_weight: 1e-5,
             epsilon_share: 1e-3,
@@ -144,16 +139,19 @@ impl ObjectSettings {
     /// `InvalidSetting` with the name of the setting.
     pub fn validate(&self) -> Result<()> {
         let wrong = |name: &str, message: &str| {
-            Err(Error::new(ErrorKind::InvalidSetting, message).at(Place::Setting(name.into())))
+            let remedy = match name {
+                "light-height" => "give --light-height 64, or leave it out",
+                "pixels" => "give --pixels 2048, or leave it out",
+                "epsilon-share" => "give --epsilon-share 0.001, or leave it out",
+                _ => "take what the program takes by itself",
+            };
+            Err(Error::new(ErrorKind::InvalidSetting, message).at(Place::Setting(name.into())).remedy(remedy))
         };
         if !(8..=MOST_ROWS).contains(&self.light_height) {
             return wrong("light-height", &format!("the light needs 8 to {MOST_ROWS} rows"));
         }
-        if self.pixels == 0 {
-            return wrong("pixels", "at least one pixel is needed");
-        }
-        if !(0.0..=1.0).contains(&self.net_carry) {
-            return wrong("net-carry", "this must be a number from 0 to 1");
+        if self.pixels < FEWEST_PIXELS {
+            return wrong("pixels", &format!("at least {FEWEST_PIXELS} pixels are needed"));
         }
         let positive = [
             ("epsilon-share", self.epsilon_share),
@@ -169,7 +167,6 @@ impl ObjectSettings {
             ("net-weight", self.net_weight),
             ("net-weight-of-both", self.net_weight_of_both),
             ("gradient-weight", self.gradient_weight),
-            ("entropy-weight", self.entropy_weight),
             ("code-weight", self.code_weight),
         ];
         for (name, value) in weights {
@@ -178,5 +175,50 @@ impl ObjectSettings {
             }
         }
         Ok(())
+    }
+
+    /// [`ObjectSettings::validate`], and that an environment that is estimated has a size for which its prior is made.
+    ///
+    /// # Errors
+    /// As [`ObjectSettings::validate`].
+    pub fn validate_for(&self, has_known_light: bool) -> Result<()> {
+        self.validate()?;
+        if self.prior == LightPriorKind::Deep && !has_known_light {
+            let (width, height) = self.light_size();
+            levels_of(width, height)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_that_cannot_be_are_told_before_any_work_with_an_option_that_exists() {
+        let of = |change: &dyn Fn(&mut ObjectSettings)| {
+            let mut settings = ObjectSettings::default();
+            change(&mut settings);
+            settings
+        };
+        for (name, settings) in [
+            ("--light-height", of(&|own| own.light_height = 33)),
+            ("--light-height", of(&|own| own.light_height = 8)),
+            ("--light-height", of(&|own| own.light_height = 181)),
+            ("--pixels", of(&|own| own.pixels = 3)),
+            ("--epsilon-share", of(&|own| own.epsilon_share = f64::NAN)),
+        ] {
+            let error = settings.validate_for(false).unwrap_err();
+            assert_eq!(error.kind(), ErrorKind::InvalidSetting);
+            assert!(error.to_string().contains(name) && error.remedy_text().contains(name), "{error}");
+        }
+        // A light that is given, or held otherwise, may have any number of rows.
+        let odd = of(&|own| own.light_height = 33);
+        assert!(odd.validate_for(true).is_ok());
+        assert!(ObjectSettings { prior: LightPriorKind::Gradient, ..odd }.validate_for(false).is_ok());
+        for settings in [ObjectSettings::default(), ObjectSettings::quick(), ObjectSettings::released()] {
+            settings.validate_for(false).unwrap();
+        }
     }
 }

@@ -7,11 +7,11 @@ use glam::Vec3;
 use patina::ErrorKind;
 use patina::files::write_bytes;
 use patina::image::{Image, file};
-use patina::lab::object_study::case::{HEADER, MEASURES};
-use patina::lab::object_study::{Part, StudyOptions, run};
+use patina::lab::object_study::case::MEASURES;
+use patina::lab::object_study::{StudyOptions, VERSION, run};
+use patina::lab::study::{Results, Sitting, Tally};
 use patina::light::Environment;
 use patina::measured::fits::neural::{NAMES_FILE, WEIGHT_COUNT, WEIGHTS_FILE};
-use patina::object::starts::ModelKind;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -72,161 +72,151 @@ fn inputs() -> tempfile::TempDir {
     folder
 }
 
-/// A quick study of one light.
-fn options(folder: &Path, output: &str, materials: usize, parts: &[Part]) -> StudyOptions {
+/// A quick study.
+fn options(folder: &Path) -> StudyOptions {
     StudyOptions {
         library: folder.join("library"),
         envmaps: folder.join("lights"),
         mesh: None,
         weights: None,
         leave_out_weights: Vec::new(),
-        models: vec![ModelKind::CookTorrance],
         quick: true,
-        materials: Some(materials),
-        lights: Some(1),
-        parts: parts.to_vec(),
-        dsbrdf_minutes: 0.0,
-        seed: 1,
-        output: folder.join(output),
+        pictures: Some(folder.join("pictures")),
     }
 }
 
-fn run_whole(options: &StudyOptions) -> String {
-    run(options, &AtomicBool::new(false), &|_| {}).unwrap()
+fn sit(options: &StudyOptions, results: &Path, pattern: &str, stop: &AtomicBool) -> patina::Result<Tally> {
+    let pattern = pattern.parse().unwrap();
+    run(options, results, &Sitting { budget: None, pattern, stop, tell: &|_| {} })
 }
 
-/// The rows of `results.csv`, each as its key and its measures.
-fn rows(folder: &Path) -> Vec<(String, Vec<f64>)> {
-    let text = std::fs::read_to_string(folder.join("results.csv")).unwrap();
-    assert_eq!(text.lines().next(), Some(HEADER));
-    let row = |line: &str| {
-        let fields: Vec<&str> = line.split(',').collect();
-        assert_eq!(fields.len(), 4 + MEASURES.len(), "{line}");
-        let values: Vec<f64> = fields[4..].iter().map(|field| field.parse().unwrap()).collect();
-        (fields[..4].join(","), values)
+/// The lines of a results file, each as its case and its measures.
+fn rows(results: &Path) -> Vec<(String, Vec<f64>)> {
+    let results = Results::read(results).unwrap();
+    let row = |line: &&patina::lab::study::CaseLine| {
+        (line.case.clone(), MEASURES.iter().map(|(key, ..)| line.figure(key)).collect())
     };
-    text.lines().skip(1).map(row).collect()
+    results.valid(VERSION).iter().map(row).collect()
 }
 
-/// The rows without their last measure, the seconds, which no two sittings share.
-fn rows_without_seconds(folder: &Path) -> Vec<String> {
-    let text = std::fs::read_to_string(folder.join("results.csv")).unwrap();
-    text.lines().skip(1).map(|line| line.rsplit_once(',').unwrap().0.to_string()).collect()
+/// The same without the seconds, which no two sittings share.
+fn rows_without_seconds(results: &Path) -> Vec<String> {
+    rows(results).iter().map(|(key, values)| format!("{key} {:?}", &values[..values.len() - 1])).collect()
 }
 
 /// Whether a figure measures a column: what is known beforehand has no error.
 fn is_measured(key: &str, column: usize) -> bool {
-    match key.split(',').next() {
-        Some("fig3") => !(2..=4).contains(&column),
-        Some("fig4") => matches!(column, 2..=6 | 10),
-        Some("fig5" | "schedules") => column != 9,
+    let (light, lamps) = ((2..=8).contains(&column), column == 13);
+    match key.split(' ').next() {
+        Some("fig3") => !light,
+        Some("fig4") => light || matches!(column, 9 | 10 | 14),
+        Some("fig5" | "schedules") => !lamps,
         _ => false,
     }
 }
+
+/// Cases of the first material by the rival that is quick to fit, and those without a model.
+const PATTERN: &str = "made-up-red cook-torrance,fig4 made-up-red,schedules made-up-red cook-torrance";
 
 #[test]
 #[ignore = "slow: cargo test -- --ignored"]
 fn every_case_is_measured_and_a_second_sitting_adds_nothing() {
     let folder = inputs();
-    let options = options(folder.path(), "study", 1, &[Part::Fig3, Part::Fig4, Part::Fig5, Part::Schedules]);
-    let text = run_whole(&options);
-    let found = rows(&options.output);
-    let keys: Vec<&str> = found.iter().map(|(key, _)| key.as_str()).collect();
-    assert_eq!(
-        keys,
-        [
-            "fig3,made-up-red,meadow,cook-torrance (clean)",
-            "fig4,made-up-red,meadow,known + no prior (clean)",
-            "fig4,made-up-red,meadow,known + gradient (clean)",
-            "fig4,made-up-red,meadow,known + entropy (clean)",
-            "fig4,made-up-red,meadow,known + deep (clean)",
-            "fig5,made-up-red,meadow,cook-torrance + deep (clean)",
-            "fig5,made-up-red,meadow,cook-torrance + deep (noise)",
-            "fig5,made-up-red,meadow,cook-torrance + deep (8bit)",
-            "schedules,made-up-red,meadow,cook-torrance + deep + own schedule (clean)",
-            "schedules,made-up-red,meadow,cook-torrance + deep + three times the rounds (clean)",
-            "schedules,made-up-red,meadow,cook-torrance + deep + epsilon share 0.0001 (clean)",
-            "schedules,made-up-red,meadow,cook-torrance + deep + epsilon share 0.01 (clean)",
-            "schedules,made-up-red,meadow,cook-torrance + deep + released schedule (clean)",
-        ]
-    );
+    let (options, stop) = (options(folder.path()), AtomicBool::new(false));
+    let path = folder.path().join("results/ibrdf.jsonl");
+    let tally = sit(&options, &path, PATTERN, &stop).unwrap();
+    assert_eq!((tally.taken, tally.failed), (16, 0));
+    let found = rows(&path);
+    let mut keys: Vec<&str> = found.iter().map(|(key, _)| key.as_str()).collect();
+    keys.sort_unstable();
+    let mut expected = vec!["fig3 quick/development/made-up-red/meadow/cook-torrance (clean)/seed 1".to_string()];
+    for prior in ["no prior", "gradient", "deep"] {
+        expected.push(format!("fig4 quick/development/made-up-red/meadow/known + {prior} (clean)/seed 1"));
+    }
+    for (spoilt, seeds) in [("clean", 1), ("noise", 3), ("8bit", 3)] {
+        for seed in 1..=seeds {
+            expected
+                .push(format!("fig5 quick/development/made-up-red/meadow/cook-torrance + deep ({spoilt})/seed {seed}"));
+        }
+    }
+    let ways =
+        ["own schedule", "three times the rounds", "epsilon share 0.0001", "epsilon share 0.01", "released schedule"];
+    for way in ways {
+        expected.push(format!(
+            "schedules quick/development/made-up-red/meadow/cook-torrance + deep + {way} (clean)/seed 1"
+        ));
+    }
+    expected.sort();
+    assert_eq!(keys, expected);
     for (key, values) in &found {
         for (column, value) in values.iter().enumerate() {
-            // A case that failed is NaN in all columns.
             match is_measured(key, column) {
                 true => assert!(value.is_finite() && *value >= 0.0, "{key}, {}: {value}", MEASURES[column].0),
                 false => assert!(value.is_nan(), "{key}, {}: {value}", MEASURES[column].0),
             }
         }
         // The object under the light that was found looks like the photo, give or take a factor per channel.
-        assert!(!key.ends_with("(clean)") || values[6] < 0.5, "{key}: {}", values[6]);
+        assert!(!key.contains("(clean)") || values[10] < 0.5, "{key}: {}", values[10]);
     }
-    for figure in ["fig3", "fig4", "fig5"] {
-        for end in [".md", ".csv", "-samples.csv", "_by_light.md"] {
-            let path = options.output.join(format!("{figure}{end}"));
+    assert_eq!(std::fs::read_dir(folder.path().join("pictures")).unwrap().count(), 16);
+
+    // What stands there is not done again, whether the library or the command line is asked.
+    let results = std::fs::read(&path).unwrap();
+    assert_eq!(sit(&options, &path, PATTERN, &stop).unwrap().done_before, 16);
+    let text = |path: &Path| path.to_str().unwrap().to_string();
+    let (library, lights) = (text(&options.library), text(&options.envmaps));
+    let (kept, tables) = (text(&folder.path().join("results")), text(&folder.path().join("tables")));
+    let line = ["patina-lab", "study", "ibrdf", &library, &lights, "--quick", "--cases", PATTERN, "--results", &kept];
+    assert_eq!(patina::lab::cli::run(line.into_iter().map(Into::into)), ExitCode::SUCCESS);
+    assert_eq!(std::fs::read(&path).unwrap(), results);
+    let line = ["patina-lab", "study", "tables", "--results", &kept, "-o", &tables];
+    assert_eq!(patina::lab::cli::run(line.into_iter().map(Into::into)), ExitCode::SUCCESS);
+    for figure in ["fig3-quick", "fig4-quick", "fig5-quick"] {
+        for end in [".md", ".csv", "-samples.csv", "_by_light.md", "_by_half.md"] {
+            let path = folder.path().join("tables").join(format!("{figure}{end}"));
             assert!(path.metadata().unwrap().len() > 50, "{}", path.display());
         }
     }
-    let read = |name: &str| std::fs::read(options.output.join(name)).unwrap();
-    let page = String::from_utf8(read("report.html")).unwrap();
-    assert!(page.contains("Figure 5") && page.contains("under single lamps") && page.contains("<img"));
-
-    // What stands there is not done again, whether the library or the command line is asked.
-    let results = read("results.csv");
-    assert_eq!(run_whole(&options), text);
-    assert_eq!(read("results.csv"), results);
-    let text = |path: &Path| path.to_str().unwrap().to_string();
-    let line = ["patina-lab", "study", "ibrdf", &text(&options.library), &text(&options.envmaps)];
-    let line = line.into_iter().chain(["--quick", "--models", "cook-torrance", "--materials", "1", "--lights", "1"]);
-    let output = text(&options.output);
-    let line = line.chain(["--parts", "fig3,fig4,fig5,schedules", "-o", &output]).map(Into::into);
-    assert_eq!(patina::lab::cli::run(line), ExitCode::SUCCESS);
-    assert_eq!(read("results.csv"), results);
+    let all = std::fs::read_to_string(folder.path().join("tables/studies.md")).unwrap();
+    assert!(all.contains("Figure 5") && all.contains("1 of 4 cases are done"), "{all}");
 }
 
 #[test]
 #[ignore = "slow: cargo test -- --ignored"]
-fn a_study_that_was_stopped_goes_on_to_the_same_rows() {
+fn a_study_that_was_stopped_goes_on_to_the_same_lines() {
     let folder = inputs();
-    let whole = options(folder.path(), "whole", 2, &[Part::Fig3]);
-    run_whole(&whole);
-    let expected = rows_without_seconds(&whole.output);
+    let (options, stop) = (options(folder.path()), AtomicBool::new(false));
+    let (whole, broken) = (folder.path().join("whole.jsonl"), folder.path().join("broken.jsonl"));
+    sit(&options, &whole, "fig3 cook-torrance", &stop).unwrap();
+    let expected = rows_without_seconds(&whole);
     assert_eq!(expected.len(), 2);
 
-    let broken = options(folder.path(), "broken", 2, &[Part::Fig3]);
-    let error = run(&broken, &AtomicBool::new(true), &|_| {}).unwrap_err();
+    let error = sit(&options, &broken, "fig3 cook-torrance", &AtomicBool::new(true)).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Stopped);
-    assert!(!broken.output.join("results.csv").exists());
-
-    // A stop in the midst of the second case: it is no row at all, least of all one that failed.
-    let stop = AtomicBool::new(false);
-    let tell = |text: &str| {
-        if text.starts_with("photographing made-up-blue") {
-            stop.store(true, Ordering::Relaxed);
-        }
-    };
-    let error = run(&broken, &stop, &tell).unwrap_err();
-    assert_eq!(error.kind(), ErrorKind::Stopped);
-    assert_eq!(rows_without_seconds(&broken.output), expected[..1]);
-
-    run_whole(&broken);
-    assert_eq!(rows_without_seconds(&broken.output), expected);
-    assert!(rows(&broken.output).iter().all(|(_, values)| values[0].is_finite() && values[9].is_finite()));
+    assert!(rows(&broken).is_empty());
+    // A stop as the first case ends: the second is no line at all, least of all one that failed.
+    let tell = |text: &str| stop.store(text.starts_with("1 of 2"), Ordering::Relaxed);
+    let sitting = Sitting { budget: None, pattern: "fig3 cook-torrance".parse().unwrap(), stop: &stop, tell: &tell };
+    assert_eq!(run(&options, &broken, &sitting).unwrap_err().kind(), ErrorKind::Stopped);
+    assert_eq!(rows_without_seconds(&broken), expected[..1]);
+    stop.store(false, Ordering::Relaxed);
+    sit(&options, &broken, "fig3 cook-torrance", &stop).unwrap();
+    assert_eq!(rows_without_seconds(&broken), expected);
 }
 
 #[test]
-fn results_of_another_study_and_missing_inputs_are_refused() {
+fn damaged_results_and_missing_inputs_are_refused() {
     let folder = inputs();
-    let asked = options(folder.path(), "study", 1, &[Part::Fig3]);
-    let refused = |options: &StudyOptions| run(options, &AtomicBool::new(false), &|_| {}).unwrap_err();
+    let asked = options(folder.path());
+    let results = folder.path().join("results.jsonl");
+    let refused = |options: &StudyOptions| sit(options, &results, "fig3", &AtomicBool::new(false)).unwrap_err();
 
-    let results = asked.output.join("results.csv");
-    std::fs::create_dir_all(&asked.output).unwrap();
     write_bytes(&results, b"name,value\na,1\n").unwrap();
     let error = refused(&asked);
     assert_eq!(error.kind(), ErrorKind::Malformed);
-    assert!(error.remedy_text().contains("-o"), "{error}");
+    assert!(error.to_string().contains("line 1") && !error.remedy_text().is_empty(), "{error}");
     assert_eq!(std::fs::read(&results).unwrap(), b"name,value\na,1\n");
+    std::fs::remove_file(&results).unwrap();
 
     let error = refused(&StudyOptions { library: folder.path().join("lights"), ..asked.clone() });
     assert_eq!(error.kind(), ErrorKind::Missing);

@@ -176,5 +176,5 @@ fn thinned(view: &ObjectView, most_pixels: usize) -> (ObjectGeometry, RgbImage) 
     }
     let photo =
         Image::from_fn(width, height, |row, column| view.photo.radiance[(row * every + first, column * every + first)]);
-    (ObjectGeometry { width, height, pixels, bvh: view.geometry.bvh.clone() }, photo)
+    (ObjectGeometry { width, height, pixels, grazing: Vec::new(), bvh: view.geometry.bvh.clone() }, photo)
 }

@@ -90,6 +90,7 @@ fn partial(
         candidates: Vec::new(),
         rows,
         light_seen: None,
+        light_bands: None,
         picture_log_rmse: look.log_rmse,
         findings: vec![
             Finding::new(Severity::Warning, "object-ended-early", message)

@@ -33,7 +33,7 @@ impl Worker {
     /// Does all of it. An error means that nothing was reached.
     pub fn run(self) -> Result<()> {
         let settings = &self.request.settings;
-        settings.validate()?;
+        settings.validate_for(self.request.light.is_some())?;
         result_folder::prepare(&self.request.output)?;
         self.stage("reading photos and shape");
         let (views, mut findings) = read_views(&self.request.files)?;

@@ -204,6 +204,8 @@ pub enum StudyTask {
     Mvcl(MvclOptions),
     /// What one photo tells of light and reflectance: figures 2 to 5 of the paper, and shadows.
     Ibrdf(crate::lab::cli::object_study::StudyIbrdfOptions),
+    /// Make the tables and plots of all studies from the results that are kept.
+    Tables(crate::lab::cli::study::TablesOptions),
 }
 
 /// Options of `patina-lab study mvcl`.
@@ -217,16 +219,13 @@ pub struct MvclOptions {
     /// Halved photographs, few steps and few paths.
     #[arg(long)]
     pub quick: bool,
-    /// Settings to run; `none` always runs, since changes are against it.
-    #[arg(long, value_enum, value_delimiter = ',')]
-    pub cases: Vec<crate::lab::consistency::Case>,
     /// Optimiser steps of the first step; 60 when quick, else the default of a fit.
     #[arg(long)]
     pub steps_diffuse: Option<usize>,
     /// Optimiser steps of the second step; 90 when quick, else the default of a fit.
     #[arg(long)]
     pub steps_all: Option<usize>,
-    /// Folder of the tables and plots.
-    #[arg(short, long)]
-    pub output: PathBuf,
+    /// Which cases, for how long, and where they are kept.
+    #[command(flatten)]
+    pub sitting: super::study::SittingOptions,
 }

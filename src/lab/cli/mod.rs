@@ -44,6 +44,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Task::Bench(BenchTask::Studio(options)) => measure::bench_studio(&options, json),
         Task::Study(StudyTask::Ibrdf(options)) => object_study::study(&options, json),
         Task::Study(StudyTask::Mvcl(options)) => study::mvcl(&options, json),
+        Task::Study(StudyTask::Tables(options)) => study::tables(&options, json),
         Task::Fuzz(options) => measure::fuzz(&options, json),
         Task::Proof(options) => proof::prove(&options, json),
         Task::Nightly(options) => measure::nightly(&options, json),

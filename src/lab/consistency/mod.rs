@@ -3,12 +3,12 @@
 //! [`mvcl`] asks what consistency between views changes (Joy and Poullis 2023). [`Case`] names what is compared,
 //! `measure` scores one fit, `tables` puts scores side by side with the figures of the paper.
 //!
-//! A study keeps no run folders: it fits in memory and writes tables, anew after each seed, so that a study that is
-//! stopped leaves what it has. It judges nothing itself: it prints figures and what each setting does by construction.
+//! A case is one fit, a line of the results file ([`crate::lab::study`]); it keeps no run folder. A study judges nothing
+//! itself: it prints figures and what each setting does by construction.
 
 mod case;
 mod measure;
-mod tables;
+pub mod tables;
 
 pub use case::Case;
 
@@ -19,7 +19,7 @@ use crate::job::demo::photograph;
 use crate::job::open::read_scene;
 use crate::job::prepare::{Prepared, RunSettings, prepare};
 use crate::lab::scenes::study::{StudyKind, StudySettings, build};
-use crate::lab::study_table::StudyTable;
+use crate::lab::study::{Results, Sitting, StudyCase, Tally};
 use crate::scene::{ReadSettings, Scene};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -28,13 +28,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Paths a pixel in photographs of the built-in scene.
 const PHOTO_SAMPLES: usize = 64;
 
+/// Version of the method: results of another one are void. Raise it with every change that moves them.
+pub const VERSION: u32 = 1;
+
 /// What a study runs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StudyOptions {
     /// Exchange folders with their truth; when empty, the vase of [`crate::lab::scenes::study`], photographed here.
     pub scenes: Vec<PathBuf>,
-    /// What is compared, in this order; all when empty. [`Case::None`] is always run, first.
-    pub cases: Vec<Case>,
     /// Seeds 1 to this number; at least 1.
     pub seeds: usize,
     /// Halved photographs, few steps and few paths.
@@ -43,18 +44,41 @@ pub struct StudyOptions {
     pub steps_diffuse: Option<usize>,
     /// Optimiser steps of the second step; `None` takes 90 when quick, else the default of a fit.
     pub steps_all: Option<usize>,
-    /// Folder of the tables and plots.
-    pub output: PathBuf,
+}
+
+/// One fit of the study.
+#[derive(Clone, Debug, PartialEq)]
+struct FitCase {
+    scene: usize,
+    case: Case,
+    seed: u64,
 }
 
 impl StudyOptions {
-    /// The cases to run.
-    fn cases(&self) -> Vec<Case> {
-        let chosen = if self.cases.is_empty() { Case::ALL.to_vec() } else { self.cases.clone() };
-        let mut cases = vec![Case::None];
-        for case in chosen {
-            if !cases.contains(&case) {
-                cases.push(case);
+    /// Names of the scenes, each only once, with the folders they are read from.
+    fn sources(&self) -> Vec<(String, Option<&Path>)> {
+        if self.scenes.is_empty() {
+            return vec![("vase".into(), None)];
+        }
+        let stem = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().replace('/', "-");
+        let names = crate::files::unrepeated(&self.scenes.iter().map(stem).collect::<Vec<_>>());
+        names.into_iter().zip(self.scenes.iter().map(|path| Some(path.as_path()))).collect()
+    }
+
+    /// All fits, and the cases they are.
+    fn cases(&self) -> Vec<(FitCase, StudyCase)> {
+        let fit = self.fit_settings(64);
+        let steps = format!("{} + {}", fit.steps_diffuse, fit.steps_all);
+        let size = if self.quick { " quick" } else { "" };
+        let mut cases = Vec::new();
+        for (scene, (name, _)) in self.sources().iter().enumerate() {
+            for seed in 1..=self.seeds as u64 {
+                for case in Case::ALL {
+                    let key = format!("{name}{size}/{}/seed {seed}", case.name());
+                    let mut study_case = StudyCase::new(key, format!("{name}/{seed}"), seed);
+                    study_case.inputs.insert("steps".into(), steps.clone());
+                    cases.push((FitCase { scene, case, seed }, study_case));
+                }
             }
         }
         cases
@@ -80,66 +104,36 @@ impl StudyOptions {
             ..base
         }
     }
-
-    /// What was run, in a sentence.
-    fn described(&self, prepared: &Prepared, fit: &FitSettings) -> String {
-        let views = &prepared.scene.views;
-        let held_out = views.iter().filter(|view| view.held_out).count();
-        let size = views.first().map_or((0, 0), |view| (view.camera.width, view.camera.height));
-        format!(
-            "{} views of {} x {} pixels to fit, {held_out} held out; maps of {} x {}; {} + {} optimiser steps (one-step: {}), \
-             {} views a step with every pixel, {} paths a pixel, {} surface hits.",
-            views.len() - held_out,
-            size.0,
-            size.1,
-            fit.map_size,
-            fit.map_size,
-            fit.steps_diffuse,
-            fit.steps_all,
-            fit.steps_diffuse + fit.steps_all,
-            fit.views_per_step,
-            fit.samples,
-            fit.bounces
-        )
-    }
 }
 
-/// Fits each scene with each case and seed, and writes tables and plots into the output folder: `mvcl-SCENE`, with
-/// errors, `mvcl-change`, with changes against no consistency, and `mvcl.md`, which holds them all. Returns the tables
-/// in that order. `tell` gets a line for each fit.
+/// Does the fits that `results` does not have yet, with every setting of consistency on every scene and seed.
 ///
 /// # Errors
-/// `InvalidSetting` for no seeds or steps out of range, `InvalidScene` for a scene without truth, `Stopped` when `stop`
-/// is raised; tables of what was done are then written already.
-pub fn mvcl(options: &StudyOptions, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Result<Vec<StudyTable>> {
+/// `InvalidSetting` for no seeds or steps out of range, `Stopped` when the sitting is stopped, a file that cannot be
+/// written. A scene that cannot be read is a failure of its cases.
+pub fn mvcl(options: &StudyOptions, results: &Path, sitting: &Sitting) -> Result<Tally> {
     if options.seeds == 0 {
-        return Err(Error::new(ErrorKind::InvalidSetting, "must be at least 1").at(Place::Setting("seeds".into())));
+        return Err(Error::new(ErrorKind::InvalidSetting, "must be at least 1")
+            .at(Place::Setting("seeds".into()))
+            .remedy("give a number of seeds, such as --seeds 5"));
     }
-    let cases = options.cases();
-    let sources: Vec<Option<&Path>> = match options.scenes.is_empty() {
-        true => vec![None],
-        false => options.scenes.iter().map(|path| Some(path.as_path())).collect(),
+    options.fit_settings(64).validate()?;
+    let mut results = Results::read(results)?;
+    let sources = options.sources();
+    let (fits, cases): (Vec<FitCase>, Vec<StudyCase>) = options.cases().into_iter().unzip();
+    let mut at_hand: Option<(usize, Prepared, FitSettings)> = None;
+    let mut work = |place: usize| {
+        let FitCase { scene, case, seed } = fits[place];
+        let (prepared, fit) = match at_hand.take() {
+            Some((own, prepared, fit)) if own == scene => (prepared, fit),
+            _ => prepared(options, sources[scene].1, sitting.stop, sitting.tell)?,
+        };
+        let outcome = run(&prepared, case.settings(&fit, seed), sitting.stop);
+        at_hand = Some((scene, prepared, fit));
+        let values = outcome?;
+        Ok(measure::COLUMNS.iter().map(|(name, _)| *name).zip(values).collect())
     };
-    let mut scenes: Vec<tables::SceneTable> = Vec::new();
-    for source in sources {
-        let (prepared, fit) = prepared(options, source, stop, tell)?;
-        let mut name = prepared.scene.name.clone();
-        if scenes.iter().any(|other| other.name == name) {
-            name = format!("{name}-{}", scenes.len() + 1);
-        }
-        scenes.push(tables::SceneTable::new(name, options.described(&prepared, &fit), &prepared.scene));
-        for seed in 1..=options.seeds as u64 {
-            for &case in &cases {
-                let values = run(&prepared, case.settings(&fit, seed), stop)?;
-                if let Some(scene) = scenes.last_mut() {
-                    scene.add(case, &values);
-                    tell(&format!("{}, seed {seed}, {}: {}", scene.name, case.name(), measure::line(&values)));
-                }
-            }
-            tables::write(&scenes, &cases, &options.output)?;
-        }
-    }
-    tables::write(&scenes, &cases, &options.output)
+    sitting.run(&mut results, VERSION, &cases, &mut work)
 }
 
 /// One fit and its scores, one a column of [`measure::COLUMNS`].
@@ -153,7 +147,7 @@ fn run(prepared: &Prepared, fit: FitSettings, stop: &AtomicBool) -> Result<Vec<f
 }
 
 fn stopped() -> Error {
-    Error::new(ErrorKind::Stopped, "the study was stopped").remedy("tables of the seeds that were done are written")
+    Error::new(ErrorKind::Stopped, "the study was stopped")
 }
 
 /// A scene on the texture coordinates of its truth, and the settings of its fits.
@@ -206,18 +200,29 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_baseline_always_runs_first_and_once() {
-        let options = StudyOptions { cases: vec![Case::Exact, Case::None, Case::Exact], ..Default::default() };
-        assert_eq!(options.cases(), [Case::None, Case::Exact]);
-        assert_eq!(StudyOptions::default().cases(), Case::ALL);
+    fn every_setting_meets_every_seed_and_rivals_share_a_block() {
+        let scenes: Vec<PathBuf> = vec!["a/cow".into(), "b/cow".into()];
+        let options = StudyOptions { seeds: 2, scenes, quick: true, ..Default::default() };
+        let cases = options.cases();
+        assert_eq!(cases.len(), 2 * 2 * Case::ALL.len());
+        let keys: std::collections::HashSet<&str> = cases.iter().map(|(_, case)| case.key.as_str()).collect();
+        assert!(keys.len() == cases.len() && keys.contains("cow_2 quick/none/seed 2"), "{keys:?}");
+        assert!(cases[..Case::ALL.len()].iter().all(|(_, case)| case.block == cases[0].1.block));
+        let longer = StudyOptions { steps_all: Some(7), ..options.clone() };
+        assert_ne!(longer.cases()[0].1.inputs, cases[0].1.inputs, "other steps are another case");
     }
 
     #[test]
-    fn no_seed_and_no_truth_are_errors() {
+    fn no_seed_is_an_error_and_a_scene_that_is_not_there_a_failure() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mvcl.jsonl");
         let stop = AtomicBool::new(false);
-        let error = mvcl(&StudyOptions::default(), &stop, &|_| {}).unwrap_err();
+        let pattern = "/none/".parse().unwrap();
+        let sitting = Sitting { budget: None, pattern, stop: &stop, tell: &|_| {} };
+        let error = mvcl(&StudyOptions::default(), &path, &sitting).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::InvalidSetting);
         let options = StudyOptions { seeds: 1, scenes: vec!["no such folder".into()], ..Default::default() };
-        assert!(mvcl(&options, &stop, &|_| {}).is_err());
+        let tally = mvcl(&options, &path, &sitting).unwrap();
+        assert_eq!((tally.done_now, tally.failed), (1, 1));
     }
 }

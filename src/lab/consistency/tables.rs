@@ -1,12 +1,14 @@
 //! Scores side by side, with the figures of the paper.
 
+use super::VERSION;
 use super::case::Case;
 use super::measure::{COLUMNS, DIFFUSE, EXPONENT, IMAGE, LIGHT_ALIGNED, RELIT, RISE};
 use crate::error::Result;
 use crate::insight::report::number::short;
+use crate::lab::study::{CaseLine, Results};
 use crate::lab::study_table::StudyTable;
 use crate::math::statistics::quantile;
-use crate::scene::Scene;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// Change of the image error in percent that the paper gives for scenes of these names (Joy and Poullis 2023, fig. 3).
@@ -28,57 +30,57 @@ pub struct SceneTable {
     pub name: String,
     table: StudyTable,
     cases: Vec<Case>,
+    /// Of each case and seed, the values of [`COLUMNS`].
+    scores: BTreeMap<(usize, u64), Vec<f64>>,
 }
 
 impl SceneTable {
-    /// An empty table of a scene; `described` says what is run.
-    pub fn new(name: String, described: String, scene: &Scene) -> Self {
+    /// The table of a scene from its lines.
+    pub fn new(name: &str, share: &str, lines: &[&CaseLine]) -> Self {
+        let mut scores = BTreeMap::new();
+        for line in lines {
+            let setting = line.case.split('/').nth(1).unwrap_or_default();
+            let Some(place) = Case::ALL.iter().position(|case| case.name() == setting) else { continue };
+            scores.insert((place, line.seed), COLUMNS.iter().map(|(name, _)| line.figure(name)).collect::<Vec<f64>>());
+        }
         let title = format!("Consistency between views: {name}");
         let mut table = StudyTable::new(&title, "setting", &COLUMNS);
-        table.notes.push(described);
+        let mut cases = Vec::new();
+        for ((place, _), values) in &scores {
+            let case = Case::ALL[*place];
+            if !cases.contains(&case) {
+                cases.push(case);
+            }
+            table.add(case.name(), values);
+        }
+        let steps: BTreeSet<&str> = lines.iter().filter_map(|line| Some(line.inputs.get("steps")?.as_str())).collect();
+        let steps: Vec<&str> = steps.into_iter().collect();
+        table.notes.push(format!("{share} Optimiser steps of the first and the second step: {}.", steps.join("; ")));
         table.notes.push(
             "Image and relit errors: linear, over surface pixels of held-out views, with the noise of our own pictures \
              taken off; `aligned` after the best factor per channel. Maps over texels that the views see. `rise when \
              relit` is relit RMSE over image RMSE, minus 1; at equal brightness both are first divided by the root mean \
              square of the true pictures. `exponent` is the mean over the steps of the logarithm of the factor on the \
-             loss."
+             loss. Where the truth has no specular reflectance every setting still frees a lobe, F0 = 0 keeps the \
+             grazing part of Schlick's formula, and roughness says nothing."
                 .into(),
         );
-        if let Some(truth) = &scene.truth
-            && truth.maps.specular.pixels().iter().all(|specular| *specular == glam::Vec3::ZERO)
-        {
-            table.notes.push(
-                "The truth has no specular reflectance, but every setting frees a lobe, and F0 = 0 keeps the grazing part \
-                 of Schlick's formula; roughness says nothing here. With --steps-all 0 the two-step settings fit no \
-                 lobe."
-                    .into(),
-            );
-        }
-        SceneTable { name, table, cases: Vec::new() }
+        SceneTable { name: name.into(), table, cases, scores }
     }
 
-    /// Adds the scores of a fit.
-    pub fn add(&mut self, case: Case, values: &[f64]) {
-        if !self.cases.contains(&case) {
-            self.cases.push(case);
-        }
-        self.table.add(case.name(), values);
-    }
-
-    /// The table, with a note of how many seeds it holds: fewer than asked for when the study was stopped.
-    fn with_seeds(&self) -> StudyTable {
-        let mut table = self.table.clone();
-        table.notes.push(format!("Seeds 1 to {}.", table.values(0, IMAGE).len()));
-        table
+    /// Values of a case and of no consistency by the same seed, for each seed that has both.
+    fn pairs(&self, case: Case, column: usize) -> Vec<(f64, f64)> {
+        let place = |case: Case| Case::ALL.iter().position(|own| *own == case).unwrap_or(usize::MAX);
+        let (own, base) = (place(case), place(Case::None));
+        let of_case = self.scores.iter().filter(|((place, _), _)| *place == own);
+        of_case
+            .filter_map(|((_, seed), values)| Some((values[column], self.scores.get(&(base, *seed))?[column])))
+            .collect()
     }
 
     /// Change of a score against no consistency in percent, one a seed.
     fn changes(&self, case: Case, column: usize) -> Vec<f64> {
-        let values = |case: Case| {
-            let row = self.cases.iter().position(|other| *other == case).unwrap_or(usize::MAX);
-            self.table.values(row, column)
-        };
-        values(case).iter().zip(values(Case::None)).map(|(value, base)| 100.0 * (value / base - 1.0)).collect()
+        self.pairs(case, column).into_iter().map(|(value, base)| 100.0 * (value / base - 1.0)).collect()
     }
 
     /// Half the distance between the quartiles of a score without consistency, in percent of its median: what a change
@@ -95,7 +97,7 @@ impl SceneTable {
         for &case in self.cases.iter().filter(|case| **case != Case::None) {
             words.push(format!("`{}` {}", case.name(), percent(quantile(&self.changes(case, IMAGE), 0.5))));
         }
-        let paper = PAPER_CHANGES.iter().find(|(name, _)| *name == self.name);
+        let paper = PAPER_CHANGES.iter().find(|(name, _)| self.name.split(' ').next() == Some(*name));
         let paper = paper.map_or("none".to_string(), |(_, change)| percent(*change));
         format!(
             "{}: image RMSE against `none`, median over seeds: {}; the paper's figure for a scene of this name: {paper}. \
@@ -109,30 +111,37 @@ impl SceneTable {
     }
 }
 
-/// The tables of all scenes and that of the changes, written into a folder.
-pub fn write(scenes: &[SceneTable], cases: &[Case], folder: &Path) -> Result<Vec<StudyTable>> {
-    let mut tables: Vec<StudyTable> = scenes.iter().map(SceneTable::with_seeds).collect();
-    tables.push(changes(scenes, cases));
+/// Writes the tables of all scenes and that of the changes, as Markdown, CSV and SVG: `mvcl-SCENE` and `mvcl-change`.
+/// Returns them as Markdown.
+///
+/// # Errors
+/// Files that cannot be written.
+pub fn write(results: &Results, folder: &Path) -> Result<String> {
+    let lines = results.valid(VERSION);
+    let mut scenes = Vec::new();
+    for (part, done, planned) in results.shares(VERSION) {
+        let own: Vec<&CaseLine> = lines.iter().copied().filter(|line| line.part() == part).collect();
+        scenes.push(SceneTable::new(&part, &format!("{done} of {planned} cases are done."), &own));
+    }
+    let mut tables: Vec<StudyTable> = scenes.iter().map(|scene| scene.table.clone()).collect();
+    tables.push(changes(&scenes));
     let names = scenes.iter().map(|scene| scene.name.as_str()).chain(["change"]);
     for (table, name) in tables.iter().zip(names) {
         let plain: String = name.chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect();
         table.write(folder, &format!("mvcl-{plain}"))?;
     }
-    let all: Vec<String> = tables.iter().map(StudyTable::to_markdown).collect();
-    crate::files::write_bytes(&folder.join("mvcl.md"), all.join("\n").as_bytes())?;
-    Ok(tables)
+    Ok(tables.iter().map(StudyTable::to_markdown).collect::<Vec<_>>().join("\n"))
 }
 
 /// Changes against no consistency, in percent: one row a scene and case.
-fn changes(scenes: &[SceneTable], cases: &[Case]) -> StudyTable {
+fn changes(scenes: &[SceneTable]) -> StudyTable {
     let mut columns: Vec<(&str, &str)> = COMPARED.iter().map(|(name, _)| (*name, "%")).collect();
     columns.push(("rise when relit", "%"));
     let mut table = StudyTable::new("Change against `none`, same seed", "scene: setting", &columns);
     for scene in scenes {
-        for &case in cases.iter().filter(|case| scene.cases.contains(case)) {
+        for &case in &scene.cases {
             let compared: Vec<Vec<f64>> = COMPARED.iter().map(|&(_, column)| scene.changes(case, column)).collect();
-            let row = scene.cases.iter().position(|other| *other == case).unwrap_or(usize::MAX);
-            let rises = scene.table.values(row, RISE);
+            let rises: Vec<f64> = scene.pairs(case, RISE).into_iter().map(|(rise, _)| rise).collect();
             for seed in 0..compared[0].len() {
                 let mut values: Vec<f64> = compared.iter().map(|changes| changes[seed]).collect();
                 values.push(rises.get(seed).copied().unwrap_or(f64::NAN));
@@ -148,7 +157,7 @@ fn changes(scenes: &[SceneTable], cases: &[Case]) -> StudyTable {
             .into(),
     );
     table.notes.extend(scenes.iter().map(SceneTable::beside_the_paper));
-    for &case in cases {
+    for case in Case::ALL {
         let mut sentence = case.sentence().to_string();
         let exponents = scenes.iter().filter_map(|scene| {
             let row = scene.cases.iter().position(|other| *other == case)?;
@@ -171,19 +180,36 @@ fn percent(change: f64) -> String {
 mod tests {
     use super::*;
 
-    fn scene() -> SceneTable {
-        let mut scene =
-            SceneTable { name: "cow".into(), table: StudyTable::new("cow", "setting", &COLUMNS), cases: Vec::new() };
-        for (image, changed) in [(1.0, 0.5), (2.0, 1.8), (4.0, 4.4)] {
-            scene.add(Case::None, &[image; COLUMNS.len()]);
-            scene.add(Case::Exact, &[changed; COLUMNS.len()]);
+    fn line(case: Case, seed: u64, value: f64) -> CaseLine {
+        CaseLine {
+            case: format!("cow/{}/seed {seed}", case.name()),
+            version: VERSION,
+            seed,
+            inputs: [("steps".to_string(), "60 + 90".to_string())].into(),
+            figures: COLUMNS.iter().map(|(name, _)| (name.to_string(), Some(value))).collect(),
+            failed: None,
+            seconds: 1.0,
         }
-        scene
+    }
+
+    /// Three seeds of two settings; those of `exact` stand in another order, and one more has no rival yet.
+    fn lines() -> Vec<CaseLine> {
+        let mut lines: Vec<CaseLine> =
+            [1.0, 2.0, 4.0].into_iter().zip(1..).map(|(image, seed)| line(Case::None, seed, image)).collect();
+        for (seed, image) in [(3, 4.4), (1, 0.5), (2, 1.8), (4, 9.0)] {
+            lines.push(line(Case::Exact, seed, image));
+        }
+        lines
+    }
+
+    fn scene() -> SceneTable {
+        SceneTable::new("cow", "7 of 30 cases are done.", &lines().iter().collect::<Vec<_>>())
     }
 
     #[test]
     fn changes_are_taken_seed_by_seed() {
         let changes = scene().changes(Case::Exact, IMAGE);
+        assert_eq!(changes.len(), 3);
         for (change, expected) in changes.iter().zip([-50.0, -10.0, 10.0]) {
             assert!((change - expected).abs() < 1e-9);
         }
@@ -197,12 +223,13 @@ mod tests {
     #[test]
     fn tables_and_plots_are_written() {
         let folder = tempfile::tempdir().unwrap();
-        let tables = write(&[scene()], &[Case::None, Case::Exact], folder.path()).unwrap();
-        assert_eq!(tables.len(), 2);
-        for file in ["mvcl-cow.csv", "mvcl-cow.svg", "mvcl-change.md", "mvcl.md"] {
+        let mut results = Results::read(&folder.path().join("mvcl.jsonl")).unwrap();
+        results.plan(&[("cow".to_string(), 30)].into()).unwrap();
+        lines().into_iter().for_each(|line| results.append(line).unwrap());
+        let text = write(&results, folder.path()).unwrap();
+        assert!(text.contains("cow: exact") && text.contains("230 %") && text.contains("7 of 30 cases"), "{text}");
+        for file in ["mvcl-cow.csv", "mvcl-cow.svg", "mvcl-change.md"] {
             assert!(folder.path().join(file).is_file(), "{file}");
         }
-        let text = std::fs::read_to_string(folder.path().join("mvcl.md")).unwrap();
-        assert!(text.contains("cow: exact") && text.contains("230 %"), "{text}");
     }
 }

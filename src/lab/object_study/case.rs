@@ -1,11 +1,12 @@
 //! One case: estimate, then measure against the truth.
 
-use super::StudyOptions;
 use super::inputs::{Inputs, Photographed};
 use super::plan::{Case, Figure};
 use crate::error::Result;
 use crate::image::RgbImage;
 use crate::insight::truth::environment_errors;
+use crate::lab::study::sitting::Figures;
+use crate::light::blur::BANDS;
 use crate::measured::coordinates::HalfDifference;
 use crate::measured::fits::NeuralFit;
 use crate::measured::grid;
@@ -22,61 +23,36 @@ use crate::object::settings::ObjectSettings;
 use crate::object::starts::{Start, StartedModel};
 use crate::object::transport::TexelDirections;
 use glam::{DVec3, Vec3};
-use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// First line of `results.csv`.
-pub const HEADER: &str = "figure,material,light,variant,reflectance_log_rmse,reflectance_aligned,light_log_rmse,\
-light_aligned,light_angle_degrees,rerender_log_rmse,rerender_aligned,relit_log_rmse,relit_aligned,lamps_psnr_db,seconds";
-
-/// Names and units of the measures, in the order of a line.
-pub const MEASURES: [(&str, &str); 11] = [
-    ("reflectance, raw", "ln"),
-    ("reflectance, aligned", "ln"),
-    ("light, raw", "ln"),
-    ("light, aligned", "ln"),
-    ("brightest light", "degrees"),
-    ("re-render, raw", "ln"),
-    ("re-render, aligned", "ln"),
-    ("relit, raw", "ln"),
-    ("relit, aligned", "ln"),
-    ("under single lamps, PSNR", "dB"),
-    ("time", "s"),
+/// Key in the results file, name in tables and unit of each measure.
+pub const MEASURES: [(&str, &str, &str); 15] = [
+    ("reflectance_log_rmse", "reflectance, raw", "ln"),
+    ("reflectance_aligned", "reflectance, aligned", "ln"),
+    ("light_log_rmse", "light, raw", "ln"),
+    ("light_aligned", "light, aligned", "ln"),
+    ("light_5_degrees", "light blurred by 5 degrees", "ln"),
+    ("light_15_degrees", "light blurred by 15 degrees", "ln"),
+    ("light_30_degrees", "light blurred by 30 degrees", "ln"),
+    ("light_60_degrees", "light blurred by 60 degrees", "ln"),
+    ("light_angle_degrees", "brightest light", "degrees"),
+    ("rerender_log_rmse", "re-render, raw", "ln"),
+    ("rerender_aligned", "re-render, aligned", "ln"),
+    ("relit_log_rmse", "relit, raw", "ln"),
+    ("relit_aligned", "relit, aligned", "ln"),
+    ("lamps_psnr_db", "under single lamps, PSNR", "dB"),
+    ("estimation_seconds", "time", "s"),
 ];
+
+/// Keys of the errors of the light by the angle both lights are blurred by.
+const BLURRED: [&str; 4] = ["light_5_degrees", "light_15_degrees", "light_30_degrees", "light_60_degrees"];
 
 /// Side of the pictures under single lamps, in pixels.
 const LAMP_PICTURE_SIZE: usize = 64;
 
-/// The measures of a case; NaN where there is nothing to measure.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CaseResult(pub [f64; 11]);
-
-impl CaseResult {
-    /// A case that failed.
-    pub fn failed() -> Self {
-        CaseResult([f64::NAN; 11])
-    }
-
-    /// The columns behind the key.
-    pub fn csv(&self) -> String {
-        self.0.map(|value| format!("{value:.6}")).join(",")
-    }
-
-    /// The finite ones in words.
-    pub fn text(&self) -> String {
-        let parts = MEASURES.iter().zip(self.0).filter(|(_, value)| value.is_finite());
-        parts.map(|((name, unit), value)| format!("  {name} {value:.3} {unit}")).collect()
-    }
-}
-
-/// Pictures of a case, for the page.
-pub struct CasePictures {
-    /// The case in words.
-    pub title: String,
-    /// Caption and linear picture.
-    pub pictures: Vec<(String, RgbImage)>,
-}
+/// Pictures of a case, each with its caption.
+pub type CasePictures = Vec<(String, RgbImage)>;
 
 /// A measured reflectance as a model without parameters: for cases in which it is known.
 struct Measured(NeuralFit);
@@ -101,21 +77,13 @@ impl ReflectanceModel for Measured {
 ///
 /// # Errors
 /// What the estimation fails for.
-pub fn run(
-    case: &Case,
-    inputs: &Inputs,
-    photos: &HashMap<String, Photographed>,
-    options: &StudyOptions,
-    stop: &AtomicBool,
-) -> Result<(CaseResult, Option<CasePictures>)> {
-    let settings = ObjectSettings { prior: case.prior, shadows: case.shadows, ..case.way.settings(&inputs.settings) };
+pub fn run(case: &Case, inputs: &Inputs, photos: &Photographed, stop: &AtomicBool) -> Result<(Figures, CasePictures)> {
+    let (prior, shadows, seed) = (case.prior, case.shadows, case.seed);
+    let settings = ObjectSettings { prior, shadows, seed, ..case.way.settings(&inputs.settings) };
     let geometry = inputs.geometry(case);
     let fit = inputs.fits.find(&case.material)?;
     let light = inputs.light(&case.light)?;
-    let missing = || crate::Error::new(crate::ErrorKind::Internal, "a light was not photographed under");
-    let photographed = photos.get(&case.light).ok_or_else(missing)?;
-    let relit_truth = photos.get(&inputs.held_out.0).ok_or_else(missing)?;
-    let photo = photographed.photo(geometry, case.spoilt, options.seed)?;
+    let photo = photos.photo(geometry, case.spoilt, case.seed)?;
     let views = [ObjectView::new(photo, geometry.clone())?];
     let (model, known) = match (case.figure, case.model) {
         (figure, Some(kind)) => {
@@ -137,7 +105,7 @@ pub fn run(
         }
     };
     let found = estimate(&views, &model, &known, &settings, stop, &|_| {})?;
-    measure(case, inputs, &settings, &model, &found, photographed, relit_truth)
+    measure(case, inputs, &settings, &model, &found, photos)
 }
 
 fn measure(
@@ -146,24 +114,28 @@ fn measure(
     settings: &ObjectSettings,
     model: &StartedModel,
     found: &Estimate,
-    photographed: &Photographed,
-    relit_truth: &Photographed,
-) -> Result<(CaseResult, Option<CasePictures>)> {
-    let mut result = CaseResult::failed();
+    photos: &Photographed,
+) -> Result<(Figures, CasePictures)> {
+    let mut figures = Figures::new();
     let geometry = inputs.geometry(case);
     if case.model.is_some() {
         let truth = inputs.fits.find(&case.material)?.table();
-        result.0[0] = model_error(model.model.as_ref(), &found.parameters, &truth)?.log_rmse;
-        result.0[1] = aligned_error(model.model.as_ref(), &found.parameters, &truth);
+        let error = model_error(model.model.as_ref(), &found.parameters, &truth)?.log_rmse;
+        figures.push(("reflectance_log_rmse", error));
+        figures.push(("reflectance_aligned", aligned_error(model.model.as_ref(), &found.parameters, &truth)));
     }
     let (width, height) = settings.light_size();
     let true_light = inputs.light(&case.light)?.resampled(width, height);
     let light = found.light.environment();
     if case.figure != Figure::Reflectance {
         let errors = environment_errors(&light, &true_light)?;
-        result.0[2] = errors.log_rmse.raw;
-        result.0[3] = errors.log_rmse.aligned;
-        result.0[4] = errors.brightest_angle_degrees.unwrap_or(f64::NAN);
+        figures.push(("light_log_rmse", errors.log_rmse.raw));
+        figures.push(("light_aligned", errors.log_rmse.aligned));
+        for (key, degrees) in BLURRED.into_iter().zip(BANDS) {
+            let (own, truth) = (light.blurred(degrees), true_light.blurred(degrees));
+            figures.push((key, environment_errors(&own, &truth)?.log_rmse.aligned));
+        }
+        figures.push(("light_angle_degrees", errors.brightest_angle_degrees.unwrap_or(f64::NAN)));
     }
     let grid = NodeGrid::new(settings.nodes);
     let directions = TexelDirections::new(width, height)?;
@@ -173,33 +145,37 @@ fn measure(
     let render =
         |light| render(geometry, visibility.as_ref(), &directions, &grid, &found.table, &[light]).swap_remove(0);
     let (own, relit) = (render(&light), render(&held_out));
-    let epsilon = |truth: &RgbImage| 1e-3 * mean(truth, geometry.pixels.len());
-    (result.0[5], result.0[6]) = log_errors(geometry, &own, &photographed.truth, epsilon(&photographed.truth));
+    let errors = |picture: &RgbImage, truth: &RgbImage| {
+        log_errors(geometry, picture, truth, 1e-3 * mean(truth, geometry.pixels.len()))
+    };
+    let (raw, aligned) = errors(&own, &photos.truth);
+    figures.extend([("rerender_log_rmse", raw), ("rerender_aligned", aligned)]);
     if case.model.is_some() {
-        (result.0[7], result.0[8]) = log_errors(geometry, &relit, &relit_truth.truth, epsilon(&relit_truth.truth));
+        let (raw, aligned) = errors(&relit, &photos.held_out);
+        figures.extend([("relit_log_rmse", raw), ("relit_aligned", aligned)]);
     }
-    result.0[10] = found.seconds;
     let mut pictures = vec![
-        ("photo".to_string(), photographed.truth.clone()),
+        ("photo".to_string(), photos.truth.clone()),
         ("re-render".to_string(), own),
         ("true light".to_string(), true_light.radiance),
         ("light".to_string(), light.radiance),
-        (format!("truth under {}", inputs.held_out.0), relit_truth.truth.clone()),
+        (format!("truth under {}", inputs.held_out.0), photos.held_out.clone()),
         (format!("found under {}", inputs.held_out.0), relit),
     ];
     if let (Figure::Reflectance, true) = (case.figure, case.model.is_some()) {
         let fit = inputs.fits.find(&case.material)?;
         let truths = under_single_lamps(|at, values| fit.evaluate(at, values));
         let estimates = under_single_lamps(|at, values| model.model.evaluate(&found.parameters, at, values));
-        result.0[9] = 0.0;
+        let mut psnr = 0.0;
         for (number, (truth, estimate)) in truths.iter().zip(&estimates).enumerate() {
-            result.0[9] += sphere::displayed_scores(estimate, truth)?.psnr / truths.len() as f64;
+            psnr += sphere::displayed_scores(estimate, truth)?.psnr / truths.len() as f64;
             pictures.push((format!("truth under lamp {}", number + 1), truth.clone()));
             pictures.push((format!("found under lamp {}", number + 1), estimate.clone()));
         }
+        figures.push(("lamps_psnr_db", psnr));
     }
-    let title = format!("{} · {} · {} · {}", case.figure.key(), case.material, case.light, case.variant());
-    Ok((result, Some(CasePictures { title, pictures })))
+    figures.push(("estimation_seconds", found.seconds));
+    Ok((figures, pictures))
 }
 
 /// A sphere under each of the lamps by itself that materials are shown under (figure 3 b of the paper). `evaluate` fills

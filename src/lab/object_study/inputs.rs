@@ -15,7 +15,6 @@ use crate::object::settings::ObjectSettings;
 use crate::object::transport::TexelDirections;
 use crate::scene::Camera;
 use glam::Vec3;
-use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -58,11 +57,13 @@ pub struct Inputs {
     pub trained: Arc<Trained>,
 }
 
-/// One photo with what it was taken of.
+/// One material under two lights, without noise, as rendered.
 #[derive(Clone, Debug)]
 pub struct Photographed {
-    /// Without noise, as rendered.
+    /// Under the light of the case.
     pub truth: RgbImage,
+    /// Under the held-out light.
+    pub held_out: RgbImage,
 }
 
 impl Inputs {
@@ -75,7 +76,6 @@ impl Inputs {
         let trained = Arc::new(options.trained()?);
         let base = if options.quick { ObjectSettings::quick() } else { ObjectSettings::default() };
         let settings = ObjectSettings {
-            seed: options.seed,
             light_height: if options.quick { 32 } else { 64 },
             pixels: if options.quick { 768 } else { base.pixels },
             ..base
@@ -84,10 +84,8 @@ impl Inputs {
         let finer = if options.quick { FINER_WHEN_QUICK } else { FINER };
         let held_out_path = file_of(&options.envmaps, HELD_OUT);
         // Without a file for it the last of one more is held out.
-        let most = options.lights.unwrap_or(if options.quick { 2 } else { usize::MAX });
-        let most = most.saturating_add(usize::from(held_out_path.is_none()));
         let mut lights = Vec::new();
-        for path in light_files(&options.envmaps)?.iter().take(most) {
+        for path in &light_files(&options.envmaps)? {
             lights.push(read_light(path, (finer * width, finer * height))?);
         }
         let held_out = match held_out_path {
@@ -142,21 +140,21 @@ impl Inputs {
             .ok_or_else(|| Error::new(ErrorKind::Missing, format!("there is no light {name}")))
     }
 
-    /// Photographs a case's material under all lights, the held-out one among them.
+    /// Photographs a case's material under its light and under the held-out one.
     ///
     /// # Errors
-    /// A material that the library does not have.
-    pub fn photograph(&self, case: &Case) -> Result<HashMap<String, Photographed>> {
+    /// A material or a light that is not there.
+    pub fn photograph(&self, case: &Case) -> Result<Photographed> {
         let fit = self.fits.find(&case.material)?;
         let geometry = self.geometry(case);
         let fine = &self.held_out.1;
         let directions = TexelDirections::of_any_size(fine.width(), fine.height());
         let visibility = geometry.visibility(&geometry.pixels, fine.width(), fine.height());
-        let named: Vec<&(String, Environment)> = self.lights.iter().chain(std::iter::once(&self.held_out)).collect();
-        let lights: Vec<&Environment> = named.iter().map(|(_, light)| light).collect();
+        let lights = [self.light(&case.light)?, fine];
         let evaluate = |at: &[crate::measured::HalfDifference], values: &mut [[f64; 3]]| fit.evaluate(at, values);
-        let pictures = render_exact(geometry, visibility.as_ref(), &directions, &evaluate, &lights);
-        Ok(named.into_iter().zip(pictures).map(|((name, _), truth)| (name.clone(), Photographed { truth })).collect())
+        let mut pictures = render_exact(geometry, visibility.as_ref(), &directions, &evaluate, &lights);
+        let held_out = pictures.swap_remove(1);
+        Ok(Photographed { truth: pictures.swap_remove(0), held_out })
     }
 }
 

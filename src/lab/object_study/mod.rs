@@ -2,11 +2,10 @@
 //!
 //! [`representation`] is figure 2: models against tables, which `contender` fits. For the others [`inputs`] photographs:
 //! the measured reflectance itself, asked at every part of a light that is finer than any that is fitted. [`case`]
-//! estimates and measures one case. [`mod@plan`] says which cases there are. Results go to `results.csv` (`fig2.csv`) line
-//! by line, and what stands there is not done again: a study that was stopped goes on.
+//! estimates and measures one case. [`mod@plan`] says which cases there are, [`crate::lab::study`] takes them and keeps
+//! what came of them, [`tables`] makes the tables of it.
 //!
-//! What this folder refuses to do: fit anything to the truth, or leave out a case that failed. A case that fails is a
-//! line of NaN.
+//! What this folder refuses to do: fit anything to the truth, or leave out a case that failed.
 
 pub mod case;
 mod contender;
@@ -15,32 +14,20 @@ pub mod plan;
 pub mod representation;
 pub mod tables;
 
-use crate::error::{Error, ErrorKind, Place, Result};
+use crate::error::Result;
+use crate::image::{Image, file};
+use crate::insight::material_pictures::sheet;
+use crate::lab::study::line::CaseInputs;
+use crate::lab::study::{Results, Sitting, StudyCase, Tally};
 use crate::neural::Trained;
-use crate::object::starts::ModelKind;
-use case::{CaseResult, HEADER};
-use inputs::Inputs;
+use crate::object::page::{Shown, enlarged, stops_of};
+use inputs::{Inputs, Photographed};
 use plan::{Case, plan};
-use std::collections::HashMap;
-use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use representation::Representation;
+use std::path::{Path, PathBuf};
 
-/// A part of the study that can be asked for alone.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Part {
-    /// Figure 2: how closely models represent measured materials.
-    Fig2,
-    /// Figure 3: reflectance under a known light.
-    Fig3,
-    /// Figure 4: light with known reflectance.
-    Fig4,
-    /// Figure 5: both.
-    Fig5,
-    /// An object that shadows itself.
-    Shadows,
-    /// The schedule released with the paper, and other epsilons, beside the program's own.
-    Schedules,
-}
+/// Version of the method: results of another one are void. Raise it with every change that moves them.
+pub const VERSION: u32 = 1;
 
 /// What is studied.
 #[derive(Clone, Debug)]
@@ -56,31 +43,13 @@ pub struct StudyOptions {
     pub weights: Option<PathBuf>,
     /// Further weights for figure 2, each fitted to the materials it was trained without.
     pub leave_out_weights: Vec<PathBuf>,
-    /// Models of the reflectance.
-    pub models: Vec<ModelKind>,
-    /// A few small cases.
+    /// Small photos and lights.
     pub quick: bool,
-    /// Materials of each figure, at most; those of the paper, or few when `quick`, when not given.
-    pub materials: Option<usize>,
-    /// Lights of each figure, at most; likewise.
-    pub lights: Option<usize>,
-    /// Only these parts; all but the schedules when empty.
-    pub parts: Vec<Part>,
-    /// Minutes after which figure 2 begins no further fit of DSBRDF, which takes a hundred times as long as the others.
-    pub dsbrdf_minutes: f64,
-    /// Seed of pixels, noise and nets.
-    pub seed: u64,
-    /// Where results go.
-    pub output: PathBuf,
+    /// Folder of the pictures of the cases that are done; none are kept without it.
+    pub pictures: Option<PathBuf>,
 }
 
 impl StudyOptions {
-    /// Whether a part was asked for.
-    pub fn wants(&self, part: Part) -> bool {
-        // Schedules are no figure of the paper, and the released one is slow: only who asks for them gets them.
-        self.parts.contains(&part) || self.parts.is_empty() && part != Part::Schedules
-    }
-
     /// The neural model of the study.
     ///
     /// # Errors
@@ -88,104 +57,64 @@ impl StudyOptions {
     pub fn trained(&self) -> Result<Trained> {
         self.weights.as_deref().map_or_else(crate::neural::shipped_leave_out, Trained::read)
     }
+
+    /// What a case that takes photos is made from, beside what its name says.
+    fn case_inputs(&self) -> CaseInputs {
+        let stem = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let weights = self.weights.as_ref().map_or_else(|| "shipped, left out".into(), stem);
+        [("weights".to_string(), weights)].into()
+    }
 }
 
-/// Runs what is not done yet and writes tables and page. Returns the tables as text.
+/// Does the cases that `results` does not have yet.
 ///
 /// # Errors
 /// Inputs that are missing, files that cannot be written, a stop. Cases that fail are results.
-pub fn run(options: &StudyOptions, stop: &AtomicBool, tell: &dyn Fn(&str)) -> Result<String> {
-    std::fs::create_dir_all(&options.output).map_err(|source| Error::writing(&options.output, source))?;
-    check_facts(options)?;
-    let mut text = String::new();
-    let mut first = Vec::new();
-    if options.wants(Part::Fig2) {
-        let (markdown, section) = representation::run(options, stop, tell)?;
-        text += &markdown;
-        first.push((representation::TITLE, section));
-    }
-    if options.parts == [Part::Fig2] {
-        tables::write_page(options, &first)?;
-        return Ok(text);
-    }
-    let inputs = Inputs::read(options, tell)?;
-    let cases = plan(&inputs, options);
-    let path = options.output.join("results.csv");
-    let mut lines = read_results(&path)?;
-    // Photos of one material under all lights are taken at once: cases are grouped by what is photographed.
-    let mut photographed: Option<(String, HashMap<String, inputs::Photographed>)> = None;
-    let mut pictures = Vec::new();
-    for (index, case) in cases.iter().enumerate() {
-        if stop.load(Ordering::Relaxed) {
-            return Err(Error::new(ErrorKind::Stopped, "the study was stopped; started again it goes on"));
-        }
-        if lines.iter().any(|line| line.starts_with(&case.key())) {
-            continue;
-        }
-        let subject = case.subject();
-        if photographed.as_ref().is_none_or(|(name, _)| *name != subject) {
-            tell(&format!("photographing {subject}"));
-            photographed = Some((subject, inputs.photograph(case)?));
-        }
-        let Some((_, photos)) = &photographed else { continue };
-        let result = match case::run(case, &inputs, photos, options, stop) {
-            Ok((result, shown)) => {
-                pictures.extend(shown);
-                result
-            }
-            Err(error) if error.kind() == ErrorKind::Stopped => return Err(error),
-            Err(error) => {
-                tell(&format!("{}: {error}", case.key()));
-                CaseResult::failed()
-            }
+pub fn run(options: &StudyOptions, results: &Path, sitting: &Sitting) -> Result<Tally> {
+    let mut results = Results::read(results)?;
+    let mut representation = Representation::read(options)?;
+    let inputs = Inputs::read(options, sitting.tell)?;
+    let photos = plan(&inputs, &sitting.pattern);
+    let mut cases = representation.cases();
+    let first_photo = cases.len();
+    let of_photo = |case: &Case| StudyCase {
+        key: case.key(options.quick),
+        block: case.block(),
+        seed: case.seed,
+        inputs: options.case_inputs(),
+    };
+    cases.extend(photos.iter().map(of_photo));
+    // Rivals on one photo follow each other: it is taken once.
+    let mut photographed: Option<(String, Photographed)> = None;
+    let mut work = |place: usize| {
+        let Some(case) = place.checked_sub(first_photo).map(|place| &photos[place]) else {
+            return representation.fit(place);
         };
-        lines.push(format!("{}{}", case.key(), result.csv()));
-        tell(&format!("{} of {}  {}{}", index + 1, cases.len(), case.key(), result.text()));
-        let text = format!("{HEADER}\n{}\n", lines.join("\n"));
-        crate::files::write_bytes(&path, text.as_bytes())?;
-    }
-    Ok(text + &tables::write(options, &inputs, &cases, &lines, &pictures, first)?)
+        let taken = match photographed.take() {
+            Some((block, taken)) if block == case.block() => taken,
+            _ => inputs.photograph(case)?,
+        };
+        let outcome = case::run(case, &inputs, &taken, sitting.stop);
+        photographed = Some((case.block(), taken));
+        let (figures, pictures) = outcome?;
+        if let Some(folder) = &options.pictures {
+            write_pictures(folder, &case.key(options.quick), &pictures)?;
+        }
+        Ok(figures)
+    };
+    sitting.run(&mut results, VERSION, &cases, &mut work)
 }
 
-/// Results that stand in a folder are not made again: they must be of the same seed, size and weights. The first sitting
-/// writes these down, later ones are held against them.
-fn check_facts(options: &StudyOptions) -> Result<()> {
-    let name = |path: &std::path::PathBuf| path.to_string_lossy().into_owned();
-    let facts = serde_json::json!({
-        "quick": options.quick,
-        "seed": options.seed,
-        "weights": options.weights.as_ref().map(name),
-        "leave_out_weights": options.leave_out_weights.iter().map(name).collect::<Vec<_>>(),
-    });
-    let path = options.output.join("study.json");
-    if !path.is_file() {
-        return crate::files::write_bytes(&path, format!("{facts:#}\n").as_bytes());
-    }
-    let text = std::fs::read_to_string(&path).map_err(|source| Error::reading(&path, source))?;
-    if serde_json::from_str::<serde_json::Value>(&text).is_ok_and(|known| known == facts) {
-        return Ok(());
-    }
-    Err(Error::new(ErrorKind::InvalidSetting, format!("the results in the folder were made with {}", text.trim()))
-        .at(Place::File(path))
-        .remedy("name another folder with -o, or give the options it began with"))
-}
-
-/// The lines of an earlier sitting.
-fn read_results(path: &std::path::Path) -> Result<Vec<String>> {
-    if !path.is_file() {
-        return Ok(Vec::new());
-    }
-    let text = crate::scene::read::camera_file::read_text(path)?;
-    let mut lines = text.lines();
-    if lines.next() != Some(HEADER) {
-        return Err(Error::new(ErrorKind::Malformed, "these are results of another study")
-            .at(Place::File(path.into()))
-            .remedy("name another folder with -o"));
-    }
-    Ok(lines.filter(|line| !line.is_empty()).map(str::to_string).collect())
-}
-
-/// Key of a case as text, for tables.
-pub(super) fn fields_of<'a>(line: &'a str, case: &Case) -> Option<Vec<&'a str>> {
-    line.strip_prefix(&case.key()).map(|rest| rest.split(',').collect())
+/// Writes the pictures of a case on one sheet. A light that was found is shown at the exposure of its own mean: levels
+/// are not known.
+fn write_pictures(folder: &Path, key: &str, pictures: &case::CasePictures) -> Result<()> {
+    let tile = |(caption, picture): &(String, _)| -> (String, Image<[u8; 3]>) {
+        let stops = stops_of(picture);
+        (caption.clone(), enlarged(&Shown { caption: caption.clone(), picture, stops }, 160))
+    };
+    let plain: String = key.chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect();
+    file::write_png_srgb8(
+        &folder.join(format!("{plain}.png")),
+        &sheet(&pictures.iter().map(tile).collect::<Vec<_>>(), None),
+    )
 }

@@ -1,7 +1,7 @@
 //! Which cases a study has.
 
 use super::inputs::Inputs;
-use super::{Part, StudyOptions};
+use crate::lab::study::CasePattern;
 use crate::object::prior::LightPriorKind;
 use crate::object::settings::ObjectSettings;
 use crate::object::starts::ModelKind;
@@ -35,22 +35,14 @@ impl Figure {
         ),
     ];
 
-    /// The part of the study it belongs to.
-    pub fn part(self) -> Part {
-        match self {
-            Figure::Reflectance => Part::Fig3,
-            Figure::Light => Part::Fig4,
-            Figure::Both => Part::Fig5,
-            Figure::Shadows => Part::Shadows,
-            Figure::Schedules => Part::Schedules,
-        }
-    }
-
-    /// The key in `results.csv`.
+    /// Its word in names of cases.
     pub fn key(self) -> &'static str {
         Self::NAMED.iter().find(|(figure, _, _)| *figure == self).map_or("", |(_, key, _)| key)
     }
 }
+
+/// Models of the reflectance that are held against each other.
+const MODELS: [ModelKind; 2] = [ModelKind::Ibrdf, ModelKind::CookTorrance];
 
 /// How an estimation goes about it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -139,12 +131,23 @@ pub struct Case {
     /// Whether the weights of the neural model were trained on the material. Said of rivals too, so that rows of a
     /// table speak of the same materials.
     pub seen: bool,
+    /// Seed of pixels, noise and net.
+    pub seed: u64,
+    /// Whether constants may be chosen on it.
+    pub half: Half,
 }
 
 impl Case {
-    /// The first columns of its line, with a comma behind them.
-    pub fn key(&self) -> String {
-        format!("{},{},{},{},", self.figure.key(), self.material, self.light, self.variant())
+    /// Its name in the results file; `quick` is for small photos and lights.
+    pub fn key(&self, quick: bool) -> String {
+        let part = format!("{}{}", self.figure.key(), if quick { " quick" } else { "" });
+        let (material, light, half) = (&self.material, &self.light, self.half.word());
+        format!("{part}/{half}/{material}/{light}/{}/seed {}", self.variant(), self.seed)
+    }
+
+    /// What is photographed: cases of one such block are rivals.
+    pub fn block(&self) -> String {
+        format!("{}/{}/{}", self.figure.key(), self.material, self.light)
     }
 
     /// What tells it from other cases of the same photo.
@@ -160,7 +163,6 @@ impl Case {
             (Figure::Reflectance, _) => "",
             (_, LightPriorKind::Deep) => " + deep",
             (_, LightPriorKind::Gradient) => " + gradient",
-            (_, LightPriorKind::Entropy) => " + entropy",
             (_, LightPriorKind::None) => " + no prior",
         };
         let shadows = match (self.figure, self.shadows) {
@@ -172,12 +174,35 @@ impl Case {
         let seen = if self.seen && self.model.is_some() { " of seen materials" } else { "" };
         format!("{model}{prior}{shadows}{way} ({}){seen}", self.spoilt.key())
     }
+}
 
-    /// What is photographed.
-    pub fn subject(&self) -> String {
-        match self.figure {
-            Figure::Shadows => format!("{} on the mesh", self.material),
-            _ => format!("{} on a sphere", self.material),
+/// Constants of the method are chosen on one half of the materials and lights and judged on the other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Half {
+    /// Material and light are of the half on which constants are chosen.
+    Development,
+    /// Material and light are of the half that judges.
+    Judging,
+    /// One of each: good for neither.
+    Mixed,
+}
+
+impl Half {
+    /// Of the places of material and light in their lists: every other one is for development.
+    fn of(material: usize, light: usize) -> Self {
+        match (material % 2, light % 2) {
+            (0, 0) => Half::Development,
+            (1, 1) => Half::Judging,
+            _ => Half::Mixed,
+        }
+    }
+
+    /// Its word in names of cases.
+    pub fn word(self) -> &'static str {
+        match self {
+            Half::Development => "development",
+            Half::Judging => "judging",
+            Half::Mixed => "mixed",
         }
     }
 }
@@ -206,92 +231,91 @@ const MATERIALS: [&str; 20] = [
     "dark-blue-paint",
 ];
 
-/// All cases, grouped by what is photographed. Materials that the neural model has not seen come first: where a figure
-/// takes only some, it takes them.
-pub fn plan(inputs: &Inputs, options: &StudyOptions) -> Vec<Case> {
-    let mut known: Vec<String> = inputs.fits.materials.iter().map(|fit| fit.name.clone()).collect();
-    let mut some: Vec<String> =
-        MATERIALS.iter().map(|name| name.to_string()).filter(|name| known.contains(name)).collect();
+/// Seeds of photos with noise or of 8 bits: what came of one of them alone says little.
+const SPOILT_SEEDS: u64 = 3;
+
+/// All cases in full. Materials that the neural model has not seen come first: where a figure takes only some, it takes
+/// them. Schedules are no figure of the paper, and the released one is slow: they are there when the pattern names them.
+pub fn plan(inputs: &Inputs, pattern: &CasePattern) -> Vec<Case> {
+    let all: Vec<String> = inputs.fits.materials.iter().map(|fit| fit.name.clone()).collect();
+    let known = |name: &&str| all.iter().any(|own| own == name);
+    let mut some: Vec<String> = MATERIALS.iter().filter(|name| known(name)).map(|name| name.to_string()).collect();
     if some.is_empty() {
-        some = known.clone();
+        some = all.clone();
     }
-    known.sort_by_key(|name| inputs.has_seen(name));
+    for name in all.iter().filter(|name| !inputs.has_seen(name)) {
+        if !some.contains(name) {
+            some.push(name.clone());
+        }
+    }
     some.sort_by_key(|name| inputs.has_seen(name));
-    let quick = options.quick;
     let lights: Vec<String> = inputs.lights.iter().map(|(name, _)| name.clone()).collect();
     let take = |from: &[String], count: usize| from.iter().take(count).cloned().collect::<Vec<_>>();
-    // How many of each a figure takes, when quick and in full.
-    let materials = |few: usize, full: usize| options.materials.unwrap_or(if quick { few } else { full });
-    let lit = |few: usize, full: usize| options.lights.unwrap_or(if quick { few } else { full });
-    let base = Case {
-        figure: Figure::Both,
-        material: String::new(),
-        light: String::new(),
+    // Each material under each light, as many of them as a figure has.
+    let pairs = |materials: Vec<String>, count: usize| {
+        let lights = take(&lights, count);
+        materials.into_iter().flat_map(move |material| {
+            lights.clone().into_iter().map(move |light| (material.clone(), light)).collect::<Vec<_>>()
+        })
+    };
+    let base = |figure: Figure, (material, light): (String, String)| Case {
+        figure,
+        material,
+        light,
         model: None,
         prior: LightPriorKind::Deep,
         spoilt: Spoilt::Clean,
         shadows: false,
         way: Way::Own,
         seen: false,
+        seed: 1,
+        half: Half::Mixed,
     };
     let mut cases = Vec::new();
-    let all = take(if quick { &some } else { &known }, materials(2, usize::MAX));
-    for material in &all {
-        for light in take(&lights, lit(2, 5)) {
-            for &model in &options.models {
-                let (material, light) = (material.clone(), light.clone());
-                cases.push(Case { figure: Figure::Reflectance, material, light, model: Some(model), ..base.clone() });
-            }
+    for pair in pairs(all.clone(), 5) {
+        for model in MODELS {
+            cases.push(Case { model: Some(model), ..base(Figure::Reflectance, pair.clone()) });
         }
     }
-    let priors = [LightPriorKind::None, LightPriorKind::Gradient, LightPriorKind::Entropy, LightPriorKind::Deep];
-    for material in take(&some, materials(1, 5)) {
-        for light in take(&lights, lit(2, 10)) {
-            for prior in priors {
-                let (material, light) = (material.clone(), light.clone());
-                cases.push(Case { figure: Figure::Light, material, light, prior, ..base.clone() });
-            }
+    for pair in pairs(take(&some, 5), 10) {
+        for prior in [LightPriorKind::None, LightPriorKind::Gradient, LightPriorKind::Deep] {
+            cases.push(Case { prior, ..base(Figure::Light, pair.clone()) });
         }
     }
-    for (index, material) in take(&some, materials(2, 20)).into_iter().enumerate() {
-        for light in take(&lights, lit(1, 5)) {
-            for &model in &options.models {
-                let mut spoils = vec![Spoilt::Clean];
-                // Noise and bytes on a quarter of the materials.
-                if index % 4 == 0 {
-                    spoils.extend([Spoilt::Noise, Spoilt::Bytes]);
-                }
-                for spoilt in spoils {
-                    let (material, light) = (material.clone(), light.clone());
-                    cases.push(Case { material, light, model: Some(model), spoilt, ..base.clone() });
+    for (index, pair) in pairs(take(&some, 20), 5).enumerate() {
+        for model in MODELS {
+            let clean = Case { model: Some(model), ..base(Figure::Both, pair.clone()) };
+            cases.push(clean.clone());
+            // Noise and bytes on a quarter of the photos.
+            if index % 4 == 0 {
+                for (spoilt, seed) in [Spoilt::Noise, Spoilt::Bytes]
+                    .into_iter()
+                    .flat_map(|spoilt| (1..=SPOILT_SEEDS).map(move |seed| (spoilt, seed)))
+                {
+                    cases.push(Case { spoilt, seed, ..clean.clone() });
                 }
             }
         }
     }
     if inputs.mesh.is_some() {
-        for material in take(&some, materials(1, 4)) {
-            for light in take(&lights, lit(1, 3)) {
-                for shadows in [true, false] {
-                    let (material, light, figure) = (material.clone(), light.clone(), Figure::Shadows);
-                    cases.push(Case { figure, material, light, shadows, ..base.clone() });
-                }
+        for pair in pairs(take(&some, 4), 3) {
+            for shadows in [true, false] {
+                cases.push(Case { shadows, ..base(Figure::Shadows, pair.clone()) });
             }
         }
     }
-    for material in take(&some, materials(2, 4)) {
-        for light in take(&lights, lit(1, 3)) {
-            for (&model, way) in options.models.iter().flat_map(|model| Way::COMPARED.map(|way| (model, way))) {
-                let (material, light, figure) = (material.clone(), light.clone(), Figure::Schedules);
-                cases.push(Case { figure, material, light, way, model: Some(model), ..base.clone() });
+    if pattern.names(Figure::Schedules.key()) {
+        for pair in pairs(take(&some, 4), 3) {
+            for (model, way) in MODELS.into_iter().flat_map(|model| Way::COMPARED.map(|way| (model, way))) {
+                cases.push(Case { way, model: Some(model), ..base(Figure::Schedules, pair.clone()) });
             }
         }
     }
-    cases.retain(|case| options.wants(case.figure.part()));
-    cases.iter_mut().for_each(|case| case.seen = inputs.has_seen(&case.material));
-    // A stable order by subject: photos are taken once.
-    let subjects: Vec<String> = cases.iter().map(Case::subject).collect();
-    let first = |case: &Case| subjects.iter().position(|subject| *subject == case.subject());
-    cases.sort_by_key(first);
+    let place = |list: &[String], name: &str| list.iter().position(|own| own == name).unwrap_or(0);
+    for case in &mut cases {
+        case.seen = inputs.has_seen(&case.material);
+        case.half = Half::of(place(&all, &case.material), place(&lights, &case.light));
+    }
     cases
 }
 

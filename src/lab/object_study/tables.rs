@@ -1,120 +1,106 @@
-//! The tables and the page of a study, out of the lines of `results.csv`.
+//! The tables of a study of object mode, out of the lines of its results file.
 
-use super::case::{CasePictures, MEASURES};
-use super::inputs::Inputs;
-use super::plan::{Case, Figure};
-use super::{StudyOptions, fields_of};
+use super::case::MEASURES;
+use super::plan::Figure;
+use super::{VERSION, representation};
 use crate::error::Result;
-use crate::insight::report::number::escaped;
+use crate::lab::study::{CaseLine, Results};
 use crate::lab::study_table::StudyTable;
-use crate::object::page::{Shown, gallery, page, stops_of};
+use std::path::Path;
 
-/// Most cases that are shown in pictures.
-const MOST_SHOWN: usize = 24;
-
-/// Writes `report.html` of these sections.
-///
-/// # Errors
-/// A file that cannot be written.
-pub fn write_page(options: &StudyOptions, sections: &[(&str, String)]) -> Result<()> {
-    crate::files::write_bytes(&options.output.join("report.html"), page("Study of object mode", sections).as_bytes())
-}
-
-/// Writes a table a figure as CSV, Markdown and SVG, and `report.html`, which begins with the sections of `first`;
-/// returns the tables as Markdown.
+/// Writes the tables of every part as Markdown, CSV and SVG; returns them as Markdown.
 ///
 /// # Errors
 /// Files that cannot be written.
-pub fn write(
-    options: &StudyOptions,
-    inputs: &Inputs,
-    cases: &[Case],
-    lines: &[String],
-    pictures: &[CasePictures],
-    first: Vec<(&'static str, String)>,
-) -> Result<String> {
+pub fn write(results: &Results, folder: &Path) -> Result<String> {
+    let lines = results.valid(VERSION);
     let mut text = String::new();
-    let mut sections = first;
-    sections.push(("What was done with photos", what_was_done(options, inputs)));
-    for (figure, key, title) in Figure::NAMED {
-        let mut done: Vec<(&Case, Vec<f64>)> = Vec::new();
-        for case in cases.iter().filter(|case| case.figure == figure) {
-            let Some(fields) = lines.iter().find_map(|line| fields_of(line, case)) else { continue };
-            done.push((case, fields.iter().map(|field| field.parse().unwrap_or(f64::NAN)).collect()));
-        }
-        if done.is_empty() {
-            continue;
-        }
-        // What a figure does not measure has no column: a case that failed is NaN in all that are left.
-        let is_measured =
-            |column: &usize| done.iter().any(|(_, values)| values.get(*column).is_some_and(|v| v.is_finite()));
-        let columns: Vec<usize> = (0..MEASURES.len()).filter(is_measured).collect();
-        let measures: Vec<(&str, &str)> = columns.iter().map(|&column| MEASURES[column]).collect();
-        let table_of = |title: &str, rows: &str, name: &dyn Fn(&Case) -> String| {
-            let mut table = StudyTable::new(title, rows, &measures);
-            for (case, values) in &done {
-                let kept: Vec<f64> = columns.iter().map(|&c| values.get(c).copied().unwrap_or(f64::NAN)).collect();
-                table.add(&name(case), &kept);
-            }
-            table.notes.push(format!("Seed {}; a sample is one material under one light.", options.seed));
-            table
+    for (part, done, planned) in results.shares(VERSION) {
+        let share = format!("{done} of {planned} cases are done.");
+        let own: Vec<&CaseLine> = lines.iter().copied().filter(|line| line.part() == part).collect();
+        let stem = part.replace(' ', "-");
+        let (figure, size) = part.split_once(' ').map_or((part.as_str(), ""), |(figure, size)| (figure, size));
+        text += &match figure {
+            _ if own.is_empty() => format!("## {part}\n\n{share}\n"),
+            representation::PART => representation::write(&own, &share, folder, &stem)?,
+            _ => photo_tables(figure, size, &own, &share, folder, &stem)?,
         };
-        let table = table_of(title, "variant", &|case| case.variant());
-        table.write(&options.output, key)?;
-        text += &table.to_markdown();
         text.push('\n');
-        let by_light = table_of(&format!("{title}, light by light"), "light, variant", &|case| {
-            format!("{}, {}", case.light, case.variant())
-        });
-        by_light.write(&options.output, &format!("{key}_by_light"))?;
-        let places = [1, 3, 6, 8].iter().filter_map(|own| columns.iter().position(|column| column == own));
-        let bars: String = places.filter_map(|place| table.bar_svg(place)).collect();
-        let (all, lights) = (escaped(&table.to_markdown()), escaped(&by_light.to_markdown()));
-        sections.push((
-            title,
-            format!("<pre>{all}</pre>{bars}<details><summary>Light by light</summary><pre>{lights}</pre></details>"),
-        ));
     }
-    let mut shown = String::new();
-    for case in pictures.iter().take(MOST_SHOWN) {
-        shown += &format!("<h3>{}</h3>", escaped(&case.title));
-        // A fitted light is shown at the exposure of the true one, after the same mean: levels are not known.
-        let mut beside = Vec::new();
-        let mut stops = 0.0;
-        for (index, (caption, picture)) in case.pictures.iter().enumerate() {
-            if index % 2 == 0 || index == 3 || index == 5 {
-                stops = stops_of(picture);
-            }
-            beside.push(Shown { caption: caption.clone(), picture, stops });
-        }
-        shown += &gallery(&beside, 160)?;
-    }
-    if shown.is_empty() {
-        shown = "<p class=note>All cases were done in an earlier sitting: no picture was made in this one.</p>".into();
-    }
-    sections.push(("Pictures", shown));
-    write_page(options, &sections)?;
     Ok(text)
 }
 
-fn what_was_done(options: &StudyOptions, inputs: &Inputs) -> String {
-    let (width, height) = inputs.settings.light_size();
-    let fine = &inputs.held_out.1;
-    let text = format!(
-        "Photos show the measured reflectance itself (MERL via neural fits), asked at every part of a light of {} x {} \
-         texels and summed without noise, which is what the path tracer comes to as well; what is fitted is a light of {width} x {height} texels and a model at {} nodes, by {} pixels. Errors of \
-         light are over the sphere by solid angle, those of reflectance over all cells of the table (aligned ones over every \
-         eleventh), those of pictures \
-         over the object; all are root mean squares of natural logarithms. Aligned: after the best factor per channel. \
-         The material that is estimated is never among the starts. The neural model was trained on {} materials; rows of \
-         materials that are among them say so. Held-out light: {}. Seed {}.",
-        fine.width(),
-        fine.height(),
-        inputs.settings.nodes.iter().product::<usize>(),
-        inputs.settings.pixels,
-        inputs.trained.account.materials.len(),
-        inputs.held_out.0,
-        options.seed
-    );
-    format!("<p>{}</p>", escaped(&text))
+/// The tables of a figure whose cases are photos: over all, by halves and by lights.
+fn photo_tables(
+    figure: &str,
+    size: &str,
+    lines: &[&CaseLine],
+    share: &str,
+    folder: &Path,
+    stem: &str,
+) -> Result<String> {
+    let known = Figure::NAMED.iter().find(|(_, key, _)| *key == figure);
+    let title = known.map_or_else(|| figure.to_string(), |(_, _, title)| title.to_string());
+    let title = if size.is_empty() { title } else { format!("{title} ({size}: small photos and lights)") };
+    // What a figure does not measure has no column: a case that failed is NaN in all that are left.
+    let measured: Vec<&(&str, &str, &str)> =
+        MEASURES.iter().filter(|(key, ..)| lines.iter().any(|line| line.figure(key).is_finite())).collect();
+    let columns: Vec<(&str, &str)> = measured.iter().map(|(_, name, unit)| (*name, *unit)).collect();
+    let table_of = |title: &str, rows: &str, name: &dyn Fn(&[&str; 6]) -> String| {
+        let mut table = StudyTable::new(title, rows, &columns)
+            .with_caption("Median over cases (one material under one light, one seed), in brackets the quartiles.");
+        for line in lines {
+            let Ok(words) = <[&str; 6]>::try_from(line.case.splitn(6, '/').collect::<Vec<_>>()) else { continue };
+            let values: Vec<f64> = measured.iter().map(|(key, ..)| line.figure(key)).collect();
+            table.add(&name(&words), &values);
+        }
+        table.notes.push(share.into());
+        table
+    };
+    let table = table_of(&title, "variant", &|words| words[4].into());
+    let by_half =
+        table_of(&format!("{title}, half by half"), "half, variant", &|words| format!("{}, {}", words[1], words[4]));
+    let by_light =
+        table_of(&format!("{title}, light by light"), "light, variant", &|words| format!("{}, {}", words[3], words[4]));
+    table.write(folder, stem)?;
+    by_half.write(folder, &format!("{stem}_by_half"))?;
+    by_light.write(folder, &format!("{stem}_by_light"))?;
+    let mut text = table.to_markdown();
+    text += "\nPhotos show the measured reflectance itself (MERL via neural fits), asked at every part of a light that is \
+             finer than the one that is fitted. Errors of light are over the sphere by solid angle, those of reflectance \
+             over the cells of the table, those of pictures over the object, all root mean squares of natural logarithms. \
+             Aligned, and after a blur: after the best factor per channel. The material that is estimated is never among \
+             the starts.\n\n";
+    Ok(text + &by_half.to_markdown())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_says_what_share_of_its_cases_is_done() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut results = Results::read(&folder.path().join("ibrdf.jsonl")).unwrap();
+        results.plan(&[("fig5".to_string(), 40), ("fig4 quick".to_string(), 9)].into()).unwrap();
+        for (half, light, error) in [("judging", "lebombo", 0.5), ("mixed", "meadow", 0.7)] {
+            results
+                .append(CaseLine {
+                    case: format!("fig5/{half}/nickel/{light}/ibrdf + deep (clean)/seed 1"),
+                    version: VERSION,
+                    seed: 1,
+                    inputs: Default::default(),
+                    figures: [("light_15_degrees".to_string(), Some(error))].into(),
+                    failed: None,
+                    seconds: 1.0,
+                })
+                .unwrap();
+        }
+        let text = write(&results, folder.path()).unwrap();
+        assert!(text.contains("2 of 40 cases are done") && text.contains("0 of 9 cases are done"), "{text}");
+        assert!(text.contains("| ibrdf + deep (clean) | 0.6 (") && text.contains("| judging, ibrdf"), "{text}");
+        assert!(!text.contains("single lamps"), "what was not measured has no column: {text}");
+        let by_light = std::fs::read_to_string(folder.path().join("fig5_by_light.md")).unwrap();
+        assert!(by_light.contains("| lebombo, ibrdf + deep (clean) | 0.5 |"), "{by_light}");
+    }
 }

@@ -7,7 +7,7 @@ use crate::object::matrices::LightMatrix;
 use crate::object::prior::deep::DeepPrior;
 use crate::object::prior::{LogLight, shares};
 
-/// The deep prior's part in alternation with Newton: its net, and the difference that is carried along.
+/// The deep prior's part in alternation with Newton: its net, and the pull between it and the light.
 #[derive(Clone, Debug)]
 pub struct DeepTie {
     /// The net.
@@ -18,25 +18,19 @@ pub struct DeepTie {
     pub net_steps: usize,
     /// Rate of Adam.
     pub rate: f32,
-    /// Share of the difference that is carried along: 1 is ADMM, 0 is descent on one objective, that of
-    /// [`DeepTie::energy`].
-    pub carry: f32,
-    carried: [Vec<f32>; 3],
 }
 
 impl DeepTie {
-    /// A tie to a fresh net.
-    pub fn new(prior: DeepPrior, texels: usize, weight: f64, net_steps: usize, rate: f32, carry: f32) -> Self {
-        DeepTie { prior, weight, net_steps, rate, carry, carried: [0; 3].map(|_| vec![0.0; texels]) }
+    fn terms(&self, terms: &LightTerms) -> LightTerms {
+        LightTerms { tie: Some((self.weight, self.prior.log_light())), ..terms.clone() }
     }
 
-    /// The pull between a light and the net as it is now: a function of both, whatever is carried along.
+    /// The pull between a light and the net as it is now.
     pub fn energy(&self, light: &LogLight) -> f64 {
-        let terms = LightTerms { tie: Some((self.weight, self.prior.log_light())), ..LightTerms::default() };
-        terms.energy(light)
+        self.terms(&LightTerms::default()).energy(light)
     }
 
-    /// One round: light by Newton, net by Adam, difference carried along.
+    /// One round: light by Newton, net by Adam.
     pub fn round(
         &mut self,
         matrix: &LightMatrix,
@@ -45,25 +39,14 @@ impl DeepTie {
         light: &mut LogLight,
         budget: NewtonBudget,
     ) -> LightOutcome {
-        let net = self.prior.log_light();
-        let pulled = |own: &[Vec<f32>; 3], sign: f32, carried: &[Vec<f32>; 3]| {
-            [0, 1, 2].map(|channel| {
-                own[channel].iter().zip(&carried[channel]).map(|(log, rest)| log + sign * rest).collect::<Vec<f32>>()
-            })
-        };
-        let terms = LightTerms { tie: Some((self.weight, pulled(&net, -1.0, &self.carried))), ..terms.clone() };
-        let outcome = newton(matrix, likelihood, &terms, light, budget);
-        let target = pulled(&light.channels, 1.0, &self.carried);
-        self.prior.fit(&target, &shares(light.width, light.height), self.net_steps, self.rate);
-        let net = self.prior.log_light();
-        for channel in 0..3 {
-            for texel in 0..net[channel].len() {
-                let apart = light.channels[channel][texel] - net[channel][texel];
-                // What neither side can give up must not pile up.
-                self.carried[channel][texel] = (self.carried[channel][texel] + self.carry * apart).clamp(-2.0, 2.0);
-            }
-        }
+        let outcome = newton(matrix, likelihood, &self.terms(terms), light, budget);
+        self.follow(light);
         outcome
+    }
+
+    /// Fits the net to a light.
+    pub fn follow(&mut self, light: &LogLight) {
+        self.prior.fit(&light.channels, &shares(light.width, light.height), self.net_steps, self.rate);
     }
 
     /// The light as the net has it.

@@ -49,12 +49,6 @@ impl<'a> Quadratic<'a> {
             }
             weights
         });
-        if let Some(entropy) = &terms.entropy {
-            let (_, by_log) = entropy.energy_and_slopes(light);
-            for channel in &mut slopes {
-                channel.iter_mut().zip(&by_log).for_each(|(slope, value)| *slope += value);
-            }
-        }
         let mut ridge: Vec<f32> = shares.iter().map(|share| 1e-5 * share).collect();
         if let Some((weight, target)) = &terms.tie {
             for (texel, share) in shares.iter().enumerate() {

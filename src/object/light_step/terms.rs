@@ -2,7 +2,6 @@
 
 use crate::object::likelihood::Likelihood;
 use crate::object::matrices::LightMatrix;
-use crate::object::prior::entropy::EntropyPrior;
 use crate::object::prior::gradient::GradientPrior;
 use crate::object::prior::{LogLight, shares};
 
@@ -11,8 +10,6 @@ use crate::object::prior::{LogLight, shares};
 pub struct LightTerms {
     /// The gradient prior.
     pub gradient: Option<GradientPrior>,
-    /// The entropy prior.
-    pub entropy: Option<EntropyPrior>,
     /// A quadratic pull: weight of the mean square over the sphere, and where to.
     pub tie: Option<(f64, [Vec<f32>; 3])>,
     /// All channels are one: a grey light.
@@ -41,9 +38,6 @@ impl LightTerms {
         let mut sum = 0.0;
         if let Some(gradient) = &self.gradient {
             sum += light.channels.iter().map(|channel| gradient.energy(channel)).sum::<f64>() / 3.0;
-        }
-        if let Some(entropy) = &self.entropy {
-            sum += entropy.energy_and_slopes(light).0;
         }
         if let Some((weight, target)) = &self.tie {
             let shares = shares(light.width, light.height);

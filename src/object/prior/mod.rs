@@ -1,10 +1,9 @@
 //! What is known of light before any photo: priors on the logarithm of an environment.
 //!
-//! [`deep`] is the paper's, an untrained net; [`gradient`] and [`entropy`] are those of the work before it (Lombardi and
-//! Nishino 2016), kept as rivals. All act on the natural logarithm of radiance, texel by texel, weighted by solid angle.
+//! [`deep`] is the paper's, an untrained net; [`gradient`] is that of the work before it (Lombardi and Nishino
+//! 2016), kept as its rival. Both act on the natural logarithm of radiance, texel by texel, weighted by solid angle.
 
 pub mod deep;
-pub mod entropy;
 pub mod gradient;
 
 use crate::image::Image;
@@ -20,10 +19,11 @@ pub enum LightPriorKind {
     /// An untrained net (Chen, Nobuhara and Nishino 2020).
     #[default]
     Deep,
-    /// Steps between neighbours are few and sparse.
+    /// Steps between neighbours are few and sparse (Lombardi and Nishino 2016). Results that were held by few radiances
+    /// beside, which bought nothing, are read as of this one.
+    #[serde(alias = "entropy")]
+    #[cfg_attr(feature = "cli", value(alias = "entropy"))]
     Gradient,
-    /// Steps are sparse, and few radiances occur (Lombardi and Nishino 2016).
-    Entropy,
     /// Nothing: texels that light no pixel stay where they began.
     None,
 }

@@ -52,26 +52,35 @@ pub struct NetTape {
     last_input: Arc<Planes>,
 }
 
+/// How often a map is halved: while at least four rows are left and both sides stay whole, with even columns for the
+/// poles.
+///
+/// # Errors
+/// As [`Net::new`].
+pub fn levels_of(width: usize, height: usize) -> Result<usize> {
+    let invalid = |message: String| {
+        Err(Error::new(ErrorKind::InvalidSetting, message)
+            .at(Place::Setting("light-height".into()))
+            .remedy("give an even number of rows from 16 on, such as --light-height 32, or take --prior gradient"))
+    };
+    if height < 16 || width < 32 {
+        return invalid(format!("an environment of {height} rows is too small for the deep prior"));
+    }
+    let most = height.ilog2() as usize - 2;
+    let divides = |levels: usize| height.is_multiple_of(1 << levels) && width.is_multiple_of(2 << levels);
+    match (1..=most).rev().find(|&levels| divides(levels)) {
+        Some(levels) => Ok(levels),
+        None => invalid(format!("an environment of {height} rows cannot be halved, as the deep prior has to")),
+    }
+}
+
 impl Net {
     /// A net for maps of `width x height` texels with this many channels inside (128 as released).
     ///
     /// # Errors
     /// `InvalidSetting` below 32 x 16 texels, or for a width that is not even.
     pub fn new(width: usize, height: usize, channels: usize) -> Result<Self> {
-        let invalid = |message: String| {
-            Err(Error::new(ErrorKind::InvalidSetting, message)
-                .at(Place::Setting("light-height".into()))
-                .remedy("ask for a map of 16, 32, 64 or 128 rows and twice as many columns, or for another prior"))
-        };
-        if height < 16 || width < 32 {
-            return invalid(format!("a map of {width} x {height} is too small for the deep prior"));
-        }
-        // Halve while at least four rows are left and both sides stay whole, with even columns for the poles.
-        let most = height.ilog2() as usize - 2;
-        let divides = |levels: usize| height.is_multiple_of(1 << levels) && width.is_multiple_of(2 << levels);
-        let Some(levels) = (1..=most).rev().find(|&levels| divides(levels)) else {
-            return invalid(format!("a map of {width} x {height} cannot be halved"));
-        };
+        let levels = levels_of(width, height)?;
         let mut weight_count = 0;
         let mut take = |count: usize| {
             weight_count += count;

@@ -33,6 +33,11 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ObjectLightMemory) {
     let Some(environment) = model.object.light() else {
         return empty(ui, "No environment yet", "It appears after the first round");
     };
+    if let Some(bands) = model.object.outcome.as_ref().and_then(|outcome| outcome.parts.estimate.light_bands.as_ref()) {
+        ui.label(RichText::new(bands.sentence()).weak()).on_hover_text(
+            "Blurred by this angle, at least half of the environment's variance is what the photos tell",
+        );
+    }
     if model.object.outcome.as_ref().is_some_and(|outcome| outcome.parts.estimate.light_seen.is_some()) {
         ui.horizontal(|ui| {
             ui.selectable_value(&mut memory.shows_seen, false, "Radiance").on_hover_text("The estimated environment");

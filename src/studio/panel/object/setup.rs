@@ -27,10 +27,9 @@ const MODELS: [(ModelKind, &str, &str); 4] = [
     (ModelKind::Ward, "Ward", "Lambert and Ward's lobe"),
 ];
 
-const PRIORS: [(LightPriorKind, &str, &str); 4] = [
+const PRIORS: [(LightPriorKind, &str, &str); 3] = [
     (LightPriorKind::Deep, "Deep", "An untrained net: Chen, Nobuhara and Nishino 2020"),
-    (LightPriorKind::Gradient, "Gradient", "Steps between neighbours are few and sparse"),
-    (LightPriorKind::Entropy, "Entropy", "Steps are sparse, and few radiances occur: Lombardi and Nishino 2016"),
+    (LightPriorKind::Gradient, "Gradient", "Steps between neighbours are few and sparse: Lombardi and Nishino 2016"),
     (LightPriorKind::None, "None", "Nothing but a weak pull to the mean where no pixel is lit"),
 ];
 
