@@ -1,9 +1,7 @@
 //! Bars as a picture, for where an SVG cannot be shown.
 
-use crate::error::Result;
-use crate::image::{Image, file};
+use crate::image::Image;
 use crate::insight::label::{self, ADVANCE, HEIGHT};
-use base64::Engine;
 
 /// Each pixel of labels and bars becomes so many a side.
 const ENLARGED: usize = 2;
@@ -63,16 +61,6 @@ pub fn bars(title: &str, bars: &[PictureBar]) -> Image<[u8; 3]> {
     Image::from_fn(picture.width() * ENLARGED, picture.height() * ENLARGED, |row, column| {
         picture[(row / ENLARGED, column / ENLARGED)]
     })
-}
-
-/// A picture inside a page.
-///
-/// # Errors
-/// None but of the encoder.
-pub fn embedded(picture: &Image<[u8; 3]>, description: &str) -> Result<String> {
-    let data = base64::engine::general_purpose::STANDARD.encode(file::encode_png_srgb8(picture)?);
-    let description = crate::insight::report::number::escaped(description);
-    Ok(format!("<img alt='{description}' src='data:image/png;base64,{data}'>"))
 }
 
 #[cfg(test)]

@@ -2,15 +2,14 @@
 //!
 //! Read [`environment`] first: a latitude-longitude map of radiance, looked up bilinearly, and what can be asked of it.
 //! [`sampler`] draws directions for next-event estimation, [`resample`] turns and resizes a map without losing
-//! energy, [`sky`] makes a daylight when there is no photograph of one, [`day`] that of an hour and a latitude, [`ball`] shows a light on two balls.
-//! energy, [`sky`] makes a daylight when there is no photograph of one, [`ball`] shows a light on two balls, [`blur`] takes its
-//! details away.
+//! energy, [`sky`] makes a daylight when there is no photograph of one, [`day`] that of an hour and a latitude, [`ball`]
+//! shows a light on two balls, [`blur`] takes its details away.
 //!
 //! What is not here: lamps, area lights and anything near; and no visibility, that is the tracer's.
 
 pub mod ball;
-pub mod day;
 pub mod blur;
+pub mod day;
 pub mod environment;
 mod inversion;
 pub mod resample;

@@ -56,7 +56,7 @@ pub fn neighbours(blocks: &[&Block]) -> Vec<(usize, usize, f64)> {
         near.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
         pairs.extend(near.into_iter().take(NEIGHBOURS).map(|(square, b)| (a.min(b), a.max(b), square.sqrt())));
     }
-    pairs.sort_by(|x, y| (x.0, x.1).cmp(&(y.0, y.1)));
+    pairs.sort_by_key(|pair| (pair.0, pair.1));
     pairs.dedup_by_key(|pair| (pair.0, pair.1));
     let mut distances: Vec<f32> = pairs.iter().map(|pair| pair.2).collect();
     let usual = median(&mut distances).max(f64::MIN_POSITIVE);

@@ -31,7 +31,7 @@ const RESULTS: &str = "tests/results";
 
 fn seconds(text: &str) -> std::result::Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(seconds) if seconds >= 0.0 && seconds < 1e9 => Ok(seconds),
+        Ok(seconds) if (0.0..1e9).contains(&seconds) => Ok(seconds),
         _ => Err("give a number of seconds, 0 or more".into()),
     }
 }

@@ -3,7 +3,6 @@
 use crate::error::Result;
 use crate::fit::Fitter;
 use crate::image::{Image, RgbImage};
-use crate::insight::report::number::short;
 use crate::insight::scores::{AlignmentSums, counted_pixels};
 use crate::job::against_truth::truth_errors;
 use crate::light::Environment;
@@ -44,26 +43,10 @@ pub const RELIT: usize = 10;
 pub const RISE: usize = 12;
 /// Column of the mean exponent of the factor.
 pub const EXPONENT: usize = 14;
-/// Column of the seconds of the fit.
-pub const SECONDS: usize = 15;
-
 /// Groups of paths a pixel in pictures that are scored: they give the variance that is taken off the squared error.
 const GROUPS: usize = 4;
 /// Paths a pixel in each group.
 const SAMPLES: usize = 8;
-
-/// A line for progress.
-pub fn line(values: &[f64]) -> String {
-    let value = |column: usize| short(values.get(column).copied().unwrap_or(f64::NAN));
-    format!(
-        "image RMSE {}, diffuse {}, light {} (aligned), relit {}, {} s",
-        value(IMAGE),
-        value(DIFFUSE),
-        value(LIGHT_ALIGNED),
-        value(RELIT),
-        value(SECONDS)
-    )
-}
 
 /// The scores of a finished fit, one a column of [`COLUMNS`]; NaN where the truth lacks what a score needs.
 pub fn measure(fitter: &Fitter, stop: &AtomicBool) -> Result<Vec<f64>> {

@@ -56,11 +56,6 @@ impl Results {
         &self.lines
     }
 
-    /// Where it is.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// The last line of each case that a version of the method made, in the order of the file.
     pub fn valid(&self, version: u32) -> Vec<&CaseLine> {
         let mut kept: Vec<&CaseLine> = Vec::new();
@@ -69,11 +64,6 @@ impl Results {
             kept.push(line);
         }
         kept
-    }
-
-    /// How many cases a part has in all; `None` when no sitting said so.
-    pub fn planned(&self, part: &str) -> Option<usize> {
-        self.plan.get(part).copied()
     }
 
     /// Parts with the cases that are done by this version, and how many there are in all.
