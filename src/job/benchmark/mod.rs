@@ -116,4 +116,5 @@ fn absent(path: &Path, what: &str) -> Error {
 
 #[cfg(test)]
 #[allow(clippy::disallowed_methods)]
+#[path = "../../../tests/core/benchmark_protocols.rs"]
 mod tests;

@@ -24,6 +24,10 @@ fn left(ui: &mut Ui, model: &mut Model) {
     }
     let tasks = model.tasks.progress();
     if let Some((kind, what, share)) = tasks.into_iter().find(|(kind, ..)| *kind != TaskKind::Choosing) {
+        // Work beside a scene that is ready does not hide what is to be said of it.
+        if !matches!(phase, Phase::Closed | Phase::Opening | Phase::Preparing | Phase::Queued | Phase::Starting) {
+            ui.label(phase.words());
+        }
         let text = if what.is_empty() { kind.words() } else { format!("{}: {what}", kind.words()) };
         ui.label(text);
         // A bar that moves by itself would be drawn anew all the time, and take from the work it tells of.
