@@ -20,10 +20,10 @@ fn open_menu(studio: &mut TestStudio, title: &str) {
     studio.click_first(title);
 }
 
-/// Opens the list of panels within an open menu, where an act shows a panel.
-fn open_panels(studio: &mut TestStudio, info: &ActInfo) {
-    if Panel::of(info.act).is_some() && studio.controls("Panels").len() == 1 {
-        studio.click("Panels");
+/// Opens the list within an open menu in which an act stands.
+fn open_list(studio: &mut TestStudio, info: &ActInfo) {
+    if let Some(list) = info.act.list().filter(|list| studio.controls(list).len() == 1) {
+        studio.click(list);
     }
 }
 
@@ -97,7 +97,7 @@ fn ask_for(studio: &mut TestStudio, info: &ActInfo, way: Way) {
     match way {
         Way::Menu => {
             open_menu(studio, menu_of(info));
-            open_panels(studio, info);
+            open_list(studio, info);
             studio.line(info.name).click();
         }
         Way::Palette => {
@@ -217,12 +217,12 @@ fn grey_ones_say_why(studio: &mut TestStudio) -> usize {
     let mut grey = 0;
     for (group, title) in Group::ALL {
         open_menu(studio, title);
-        // Panels stand in a list of their own, which is opened last.
+        // Those of a list within the menu come last, list by list.
         let mut of_group: Vec<&ActInfo> = LIST.iter().filter(|info| info.group == group).collect();
-        of_group.sort_by_key(|info| Panel::of(info.act).is_some());
+        of_group.sort_by_key(|info| info.act.list());
         for info in of_group {
-            if Panel::of(info.act).is_some() && !studio.has_line(info.name) {
-                open_panels(studio, info);
+            if info.act.list().is_some() && !studio.has_line(info.name) {
+                open_list(studio, info);
             }
             let refused = availability(info.act, studio.model()).err();
             assert_eq!(

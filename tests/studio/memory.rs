@@ -64,7 +64,7 @@ fn a_remembered_light_that_vanished_is_told_and_the_others_are_there() {
     let mut studio = TestStudio::in_folder(folder, None);
     studio.wait("the error", |model| model.log.banner().is_some());
     assert!(studio.says("gone.hdr") && studio.says("Fix: "), "{}", studio.log());
-    assert_eq!(studio.model().shelf.lights().len(), 3);
+    assert_eq!(studio.model().shelf.lights().len(), 4, "the skies and that of an hour");
     // Told once: the next start does without it.
     assert!(studio.log().contains("no longer remembered") && studio.model().preferences.lights.is_empty());
     let mut again = TestStudio::in_folder(studio.close(), None);

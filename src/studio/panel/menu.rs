@@ -16,20 +16,14 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
             for (group, title) in Group::ALL {
                 ui.menu_button(title, |ui| {
                     ui.set_min_width(230.0);
-                    let (panels, own): (Vec<&ActInfo>, Vec<&ActInfo>) =
-                        LIST.iter().filter(|info| info.group == group).partition(|info| Panel::of(info.act).is_some());
-                    for info in own {
-                        let is_on = info.act.navigation() == Some(model.preferences.navigation);
-                        line(ui, model, info, is_on);
-                    }
-                    if !panels.is_empty() {
-                        let list = ui.menu_button("Panels", |ui| {
-                            for info in panels {
-                                let is_on = Panel::of(info.act).is_some_and(|own| model.visible_panels.contains(&own));
-                                line(ui, model, info, is_on);
-                            }
-                        });
-                        list.response.accessible_name("Panels");
+                    let (mut listed, own): (Vec<&ActInfo>, Vec<&ActInfo>) =
+                        LIST.iter().filter(|info| info.group == group).partition(|info| info.act.list().is_some());
+                    own.into_iter().for_each(|info| line(ui, model, info));
+                    listed.sort_by_key(|info| info.act.list());
+                    for part in listed.chunk_by(|a, b| a.act.list() == b.act.list()) {
+                        let name = part[0].act.list().unwrap_or_default();
+                        let list = ui.menu_button(name, |ui| part.iter().for_each(|info| line(ui, model, info)));
+                        list.response.accessible_name(name);
                     }
                 });
             }
@@ -52,8 +46,10 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
     });
 }
 
-/// A line of a menu; `is_on` where it shows a panel that is in front, or the hand movements in force.
-fn line(ui: &mut Ui, model: &mut Model, info: &ActInfo, is_on: bool) {
+/// A line of a menu, marked where it shows a panel that is in front, or the hand movements in force.
+fn line(ui: &mut Ui, model: &mut Model, info: &ActInfo) {
+    let is_on = Panel::of(info.act).is_some_and(|own| model.visible_panels.contains(&own))
+        || info.act.navigation() == Some(model.preferences.navigation);
     if act_line(ui, model, info, |button| button.selected(is_on)).clicked() {
         model.act(info.act);
         ui.close();
