@@ -4,7 +4,7 @@
 //! more than the edges of shadows, and reflectance explains those too. What tells the sun's side from the other, and light
 //! from shadow, is that the same stuff lies on both sides. So the reflectance of a block is not eliminated with the rest,
 //! but together with those of all others, with two beliefs: differences between neighbours are small, with heavy tails
-//! (Cauchy), since materials change at few places; and all lie around their common mean.
+//! (Cauchy), since materials change at few places; and all lie somewhere around their median.
 //!
 //! With `g` the row over the light that goes along with a block's reflectance, `y` its right side, `r` the length of the
 //! reflectance's column, and `K = R^2 + W` (`W` the precision of the beliefs), what is left of all blocks is
@@ -19,15 +19,15 @@ use glam::Vec3;
 
 /// Neighbours of a block.
 const NEIGHBOURS: usize = 6;
-/// By how much reflectances of neighbours differ where it is one material, relative (one standard deviation); its square
+/// By how much logarithms of neighbours' reflectances differ where it is one material (one standard deviation); its square
 /// grows with their distance, as that of a random walk.
 const DIFFER: f64 = 0.15;
-/// By how much reflectances differ from their common mean, relative: hardly a belief, since what lies flat may be one dark
+/// By how much logarithms of reflectances differ from that of their median: hardly a belief, since what lies flat may be one dark
 /// material and what stands on it one bright one.
 const SPREAD: f64 = 3.0;
-/// Share of the mean below which differences are no longer relative.
+/// Share of the median below which all is equally dark.
 const DARK: f64 = 0.1;
-/// The common mean is at least this: black photos have none.
+/// The median is at least this: black photos have none.
 const LEAST_MEAN: f64 = 1e-3;
 
 /// A block's reflectance in one channel, with what it has to do with the light.
@@ -102,22 +102,23 @@ fn beliefs(kept: &[KeptUnknown], pairs: &[(usize, usize, f64)]) -> (Vec<f64>, Ve
     let blocks = kept.len();
     let mut values: Vec<f32> = kept.iter().map(|own| own.value as f32).collect();
     let mean = median(&mut values).max(LEAST_MEAN);
+    // By logarithms: what all have in common is left to the light and the surface, and nothing is pulled towards black.
+    let held: Vec<f64> = kept.iter().map(|own| own.value.max(DARK * mean)).collect();
     let (mut precision, mut pull) = (vec![0.0f64; blocks * blocks], vec![0.0f64; blocks]);
-    for (index, own) in kept.iter().enumerate() {
-        let weight = (SPREAD * mean).powi(-2);
+    for (index, own) in held.iter().enumerate() {
+        let weight = (SPREAD * own).powi(-2);
         precision[index * blocks + index] += weight;
-        pull[index] += weight * (mean - own.value);
+        pull[index] -= weight * own * (own / mean).ln();
     }
     for &(a, b, distance) in pairs {
-        let scale = 0.5 * (kept[a].value + kept[b].value) + DARK * mean;
-        let difference = kept[a].value - kept[b].value;
-        let weight = 1.0 / ((DIFFER * scale).powi(2) * distance + difference * difference);
+        let difference = (held[a] / held[b]).ln();
+        let weight = 1.0 / (DIFFER * DIFFER * distance + difference * difference);
         for (own, other) in [(a, b), (b, a)] {
-            precision[own * blocks + own] += weight;
-            precision[own * blocks + other] -= weight;
+            precision[own * blocks + own] += weight / (held[own] * held[own]);
+            precision[own * blocks + other] -= weight / (held[own] * held[other]);
         }
-        pull[a] -= weight * difference;
-        pull[b] += weight * difference;
+        pull[a] -= weight * difference / held[a];
+        pull[b] += weight * difference / held[b];
     }
     (precision, pull)
 }
