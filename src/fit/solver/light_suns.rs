@@ -9,8 +9,8 @@ use glam::Vec3;
 /// How many times its excess over the usual radiance a narrow hat may be (one standard deviation), see [`narrow_scales`], in
 /// one solution after the other. To be weighed by what was found is a prior with heavy tails (reweighted least squares): few
 /// suns, each as bright as it likes. It has many minima, so it begins wide, where all narrow hats are free to share what is
-/// bright, and narrows down (graduated non-convexity; Blake and Zisserman 1987). Cauchy's
-/// distribution would end at 0.7.
+/// bright, and narrows down (graduated non-convexity; Blake and Zisserman 1987). Cauchy's distribution
+/// would end at 0.7.
 pub const GROWTHS: [f64; 3] = [10.0, 3.0, 1.0];
 /// A sun, with what is bright around it, reaches so far from its brightest texel, in degrees.
 const SUN_RADIUS_DEGREES: f32 = 20.0;
