@@ -227,6 +227,7 @@ fn the_first_stop_of_tab_is_the_main_button_and_it_wears_a_ring() {
 fn hand_movements_are_chosen_in_the_menu_and_remembered() {
     let mut studio = TestStudio::with_finished_run();
     studio.click_first("View");
+    studio.click("Navigation as in");
     studio.line("Navigate as in Blender").click();
     studio.frames(3);
     assert_eq!(studio.model().preferences.navigation, Navigation::Blender);

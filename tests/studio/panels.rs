@@ -220,7 +220,8 @@ fn a_finding_with_a_place_is_a_link_that_goes_there() {
     let mut studio = TestStudio::with_small_scene();
     let name = studio.model().project.as_ref().unwrap().scene.as_ref().unwrap().views[3].name.clone();
     let finding = |place: Place, words: &str| Message::from(&Finding::new(Severity::Warning, "test", words).at(place));
-    // The check has something to say of so small photos, which brought its panel to the front.
+    // The check has something to say of so small photos, which brought its panel to the front; nothing comes after it.
+    studio.wait("what is found at the start", |model| !model.tasks.is_busy());
     studio.model().activate = Some(Panel::Curves);
     studio.frames(1);
     let log = &mut studio.model().log;

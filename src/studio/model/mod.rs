@@ -1,6 +1,6 @@
 //! What the window knows, without any widget.
 //!
-//! [`Model`] joins the parts: [`project`] is what is open, [`fit`] the job and [`advance`] how far it is, [`phase`] the one
+//! [`Model`] joins the parts: [`project`] is what is open, [`fit`] the job and [`advance`](crate::job::advance) how far it is, [`phase`] the one
 //! state that labels follow, [`known`] what the solver is sure of, [`laid`] photos on the mesh and the cache that relights,
 //! [`edits`] what undo covers, [`lights`] the shelf, [`tasks`] work beside the window and [`done`] what it brings, [`log`]
 //! what was noticed, [`store`] what is remembered. [`opening`] and [`starting`] are how a folder becomes a project and a
