@@ -34,6 +34,7 @@ pub mod gallery;
 pub mod gauge;
 pub mod handle;
 pub mod materials;
+mod newest;
 pub mod object;
 pub mod open;
 mod opened_scene;

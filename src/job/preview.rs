@@ -4,6 +4,7 @@
 //! it keeps its pace ([`Preview::set_share`]). Pictures come out through a [`Slot`]: a watcher that is slow misses steps
 //! of the refinement, never the last one. A panic in the tracer ends one request with a text; the thread lives on.
 
+use super::newest::Newest;
 use super::{Slot, background};
 use crate::error::{Error, ErrorKind, Result, text_of_panic};
 use crate::image::RgbImage;
@@ -12,8 +13,8 @@ use crate::render::progressive::{Accumulation, PictureTracer, samples_of_next_pa
 use crate::render::{Parameters, Surface};
 use crate::scene::Camera;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -84,29 +85,15 @@ pub struct Preview {
 
 #[derive(Default)]
 struct Shared {
-    inbox: Mutex<Inbox>,
-    arrived: Condvar,
-    /// Ends the request in progress.
-    stop: AtomicBool,
+    requests: Newest<PreviewRequest>,
     /// Bits of the share of one core.
     share: AtomicU32,
     tiles: AtomicUsize,
 }
 
-#[derive(Default)]
-struct Inbox {
-    request: Option<PreviewRequest>,
-    is_closed: bool,
-}
-
 impl Shared {
-    fn inbox(&self) -> MutexGuard<'_, Inbox> {
-        // Nothing panics while the inbox is held, and its parts are whole at any time.
-        self.inbox.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     fn is_stopped(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
+        self.requests.stop.load(Ordering::Relaxed)
     }
 }
 
@@ -143,17 +130,12 @@ impl Preview {
 
     /// Draws this next; what is drawn or waiting now is dropped.
     pub fn request(&self, request: PreviewRequest) {
-        let mut inbox = self.shared.inbox();
-        inbox.request = Some(request);
-        self.shared.stop.store(true, Ordering::Relaxed);
-        self.shared.arrived.notify_one();
+        self.shared.requests.put(request, true);
     }
 
     /// Drops what is drawn or waiting now. Pictures that are in the slot stay.
     pub fn cancel(&self) {
-        let mut inbox = self.shared.inbox();
-        inbox.request = None;
-        self.shared.stop.store(true, Ordering::Relaxed);
+        self.shared.requests.cancel();
     }
 
     /// How much of one core to use, from a small share to the number of threads (all of them, as at the start). NaN is
@@ -170,12 +152,7 @@ impl Preview {
 
 impl Drop for Preview {
     fn drop(&mut self) {
-        {
-            let mut inbox = self.shared.inbox();
-            *inbox = Inbox { request: None, is_closed: true };
-            self.shared.stop.store(true, Ordering::Relaxed);
-            self.shared.arrived.notify_one();
-        }
+        self.shared.requests.close();
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
@@ -193,7 +170,7 @@ struct Worker {
 
 impl Worker {
     fn run(&self) {
-        while let Some(request) = self.next_request() {
+        while let Some((request, _)) = self.shared.requests.next(&mut None) {
             let key = request.key;
             let Err(panic) = catch_unwind(AssertUnwindSafe(|| self.draw(&request))) else { continue };
             let message = text_of_panic(&*panic);
@@ -204,26 +181,10 @@ impl Worker {
         }
     }
 
-    /// Waits for a request; `None` at the end.
-    fn next_request(&self) -> Option<PreviewRequest> {
-        let mut inbox = self.shared.inbox();
-        loop {
-            if inbox.is_closed {
-                return None;
-            }
-            if let Some(request) = inbox.request.take() {
-                // Lowered while the inbox is held: a request that comes later raises it again.
-                self.shared.stop.store(false, Ordering::Relaxed);
-                return Some(request);
-            }
-            inbox = self.shared.arrived.wait(inbox).unwrap_or_else(PoisonError::into_inner);
-        }
-    }
-
     fn draw(&self, request: &PreviewRequest) {
         let began = Instant::now();
         let camera = &request.camera;
-        let stop = &self.shared.stop;
+        let stop = &self.shared.requests.stop;
         let tracer = PictureTracer::new(&request.surface, &request.parameters, request.settings);
         let after_tile = |worked: Duration| {
             self.shared.tiles.fetch_add(1, Ordering::Relaxed);

@@ -4,6 +4,7 @@
 //! from the last only in its light costs no ray. A view is traced with one ray a pixel first and shown, and once nothing
 //! else is asked for with as many as the fit takes. Work is done on a pool of its own, which gives way.
 
+use super::newest::Newest;
 use super::{Slot, Wake, background};
 use crate::error::{Error, ErrorKind, Result, text_of_panic};
 use crate::image::RgbImage;
@@ -16,8 +17,8 @@ use crate::render::cached::{CachedSettings, CachedTransport, FootprintSettings};
 use crate::render::relight::RelitView;
 use crate::scene::Camera;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::thread::JoinHandle;
 use std::time::Instant;
 
@@ -109,31 +110,8 @@ pub struct Relighter {
     pub pictures: Arc<Slot<RelitPictures>>,
     /// The newest failure, with the key of its request.
     pub failures: Arc<Slot<(u64, Error)>>,
-    shared: Arc<Shared>,
+    requests: Arc<Newest<RelitRequest>>,
     thread: Option<JoinHandle<()>>,
-}
-
-#[derive(Default)]
-struct Shared {
-    inbox: Mutex<Inbox>,
-    arrived: Condvar,
-    /// Ends what is in progress.
-    stop: AtomicBool,
-    /// A view is drawn finer meanwhile: whatever is asked for comes first.
-    is_refining: AtomicBool,
-}
-
-#[derive(Default)]
-struct Inbox {
-    request: Option<RelitRequest>,
-    is_closed: bool,
-}
-
-impl Shared {
-    fn inbox(&self) -> MutexGuard<'_, Inbox> {
-        // Nothing panics while the inbox is held, and its parts are whole at any time.
-        self.inbox.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 impl Relighter {
@@ -142,10 +120,10 @@ impl Relighter {
     /// # Errors
     /// `Internal` when the system gives no thread.
     pub fn start(wake: Option<Wake>) -> Result<Self> {
-        let shared = Arc::new(Shared::default());
+        let requests = Arc::new(Newest::default());
         let (pictures, failures) = (Arc::new(Slot::default()), Arc::new(Slot::default()));
         let worker = Worker {
-            shared: Arc::clone(&shared),
+            requests: Arc::clone(&requests),
             pool: background::pool("patina-relit"),
             pictures: Arc::clone(&pictures),
             failures: Arc::clone(&failures),
@@ -155,32 +133,24 @@ impl Relighter {
         let thread = std::thread::Builder::new().name("patina-relit".into()).spawn(move || worker.run());
         let thread =
             thread.map_err(|source| Error::new(ErrorKind::Internal, format!("cannot start a thread: {source}")))?;
-        Ok(Relighter { pictures, failures, shared, thread: Some(thread) })
+        Ok(Relighter { pictures, failures, requests, thread: Some(thread) })
     }
 
     /// Draws this next. A request for the same view waits for the one in progress, so that a light that turns is seen to
     /// turn; another view ends it.
     pub fn request(&self, request: RelitRequest, is_other_view: bool) {
-        let mut inbox = self.shared.inbox();
-        inbox.request = Some(request);
-        let comes_first = is_other_view || self.shared.is_refining.load(Ordering::Relaxed);
-        self.shared.stop.fetch_or(comes_first, Ordering::Relaxed);
-        self.shared.arrived.notify_one();
+        self.requests.put(request, is_other_view);
     }
 
     /// Drops what is waiting or in progress.
     pub fn cancel(&self) {
-        let mut inbox = self.shared.inbox();
-        inbox.request = None;
-        self.shared.stop.store(true, Ordering::Relaxed);
+        self.requests.cancel();
     }
 }
 
 impl Drop for Relighter {
     fn drop(&mut self) {
-        self.shared.inbox().is_closed = true;
-        self.shared.stop.store(true, Ordering::Relaxed);
-        self.shared.arrived.notify_one();
+        self.requests.close();
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
@@ -205,7 +175,7 @@ impl Seen {
 }
 
 struct Worker {
-    shared: Arc<Shared>,
+    requests: Arc<Newest<RelitRequest>>,
     pool: Option<rayon::ThreadPool>,
     pictures: Arc<Slot<RelitPictures>>,
     failures: Arc<Slot<(u64, Error)>>,
@@ -217,22 +187,7 @@ impl Worker {
     fn run(mut self) {
         // What could be drawn finer once nothing else is asked for.
         let mut to_refine: Option<RelitRequest> = None;
-        loop {
-            let (request, is_fine) = {
-                let mut inbox = self.shared.inbox();
-                loop {
-                    if inbox.is_closed {
-                        return;
-                    }
-                    self.shared.stop.store(false, Ordering::Relaxed);
-                    let next = inbox.request.take().map(|request| (request, false));
-                    if let Some((request, refines)) = next.or_else(|| to_refine.take().map(|request| (request, true))) {
-                        self.shared.is_refining.store(refines, Ordering::Relaxed);
-                        break (request, refines);
-                    }
-                    inbox = self.shared.arrived.wait(inbox).unwrap_or_else(PoisonError::into_inner);
-                }
-            };
+        while let Some((request, is_fine)) = self.requests.next(&mut to_refine) {
             let key = request.key;
             let pool = self.pool.take();
             let drawn = catch_unwind(AssertUnwindSafe(|| match &pool {
@@ -262,8 +217,8 @@ impl Worker {
 
     /// Draws a request; `None` when it was stopped.
     fn draw(&mut self, request: RelitRequest, wants_fine: bool) -> Option<RelitPictures> {
-        let shared = Arc::clone(&self.shared);
-        let stop = &shared.stop;
+        let requests = Arc::clone(&self.requests);
+        let stop = &requests.stop;
         let map_size = request.maps.diffuse.width();
         let texels = || -> Vec<Material<f32>> { texels_from_maps(&request.maps) };
         let is_kept =

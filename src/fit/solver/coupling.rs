@@ -22,13 +22,13 @@ const NEIGHBOURS: usize = 6;
 /// By how much logarithms of neighbours' reflectances differ where it is one material (one standard deviation); its square
 /// grows with their distance, as that of a random walk.
 const DIFFER: f64 = 0.15;
-/// By how much logarithms of reflectances differ from that of their median: hardly a belief, since what lies flat may be one dark
-/// material and what stands on it one bright one.
+/// By how much logarithms of reflectances differ from that of their median: hardly a belief, since what lies flat may be one
+/// dark material and what stands on it one bright one.
 const SPREAD: f64 = 3.0;
 /// Share of the median below which all is equally dark.
 const DARK: f64 = 0.1;
 /// The median is at least this: black photos have none.
-const LEAST_MEAN: f64 = 1e-3;
+const LEAST_MEDIAN: f64 = 1e-3;
 
 /// A block's reflectance in one channel, with what it has to do with the light.
 #[derive(Clone, Debug, Default)]
@@ -101,14 +101,14 @@ pub fn add_coupled(
 fn beliefs(kept: &[KeptUnknown], pairs: &[(usize, usize, f64)]) -> (Vec<f64>, Vec<f64>) {
     let blocks = kept.len();
     let mut values: Vec<f32> = kept.iter().map(|own| own.value as f32).collect();
-    let mean = median(&mut values).max(LEAST_MEAN);
+    let median = median(&mut values).max(LEAST_MEDIAN);
     // By logarithms: what all have in common is left to the light and the surface, and nothing is pulled towards black.
-    let held: Vec<f64> = kept.iter().map(|own| own.value.max(DARK * mean)).collect();
+    let held: Vec<f64> = kept.iter().map(|own| own.value.max(DARK * median)).collect();
     let (mut precision, mut pull) = (vec![0.0f64; blocks * blocks], vec![0.0f64; blocks]);
     for (index, own) in held.iter().enumerate() {
         let weight = (SPREAD * own).powi(-2);
         precision[index * blocks + index] += weight;
-        pull[index] -= weight * own * (own / mean).ln();
+        pull[index] -= weight * own * (own / median).ln();
     }
     for &(a, b, distance) in pairs {
         let difference = (held[a] / held[b]).ln();

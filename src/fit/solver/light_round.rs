@@ -7,7 +7,7 @@ use super::gains::gains_after;
 use super::light_colour::change_by_highlights;
 use super::light_evidence::{LightKnown, Precisions, evidence_shares};
 use super::light_shape::{LightShape, bright_texels};
-use super::light_step::{Gauge, LightPrior, solve_channel};
+use super::light_step::{ChannelKnown, Gauge, LightPrior, solve_channel};
 use super::light_suns::{GROWTHS, narrow_scales};
 use super::normal_equations::NormalEquations;
 use super::pixel_terms::BlockPrior;
@@ -141,7 +141,9 @@ impl SolverScene {
                         for (equations, rows) in equations.iter_mut().zip(&rows) {
                             equations.add(rows);
                         }
-                        kept.iter_mut().zip(&rows).for_each(|(kept, rows)| kept.push(rows.kept.clone()));
+                        kept.iter_mut()
+                            .zip(&mut rows)
+                            .for_each(|(kept, rows)| kept.push(std::mem::take(&mut rows.kept)));
                     }
                     done.push((index, work));
                 }
@@ -220,28 +222,32 @@ impl SolverScene {
             gauge_slack: if self.background.is_empty() { self.settings.gauge_slack } else { BACKGROUND_GAUGE_SLACK },
         };
         let mut light = estimate.light.clone();
-        let mut known = LightKnown::default();
+        let mut known: Vec<ChannelKnown> = Vec::new();
         for growth in GROWTHS {
             let before = shape.coefficients_of_channels(&light);
             let narrow = narrow_scales(shape, &light, &before, self.settings.suns, growth);
-            let channels: Vec<(Vec<f32>, Precisions, f64)> = (0..3usize)
+            let channels: Vec<(Vec<f32>, ChannelKnown)> = (0..3usize)
                 .into_par_iter()
                 .map(|c| {
                     let mut x = before[c].clone();
                     let gauge = Gauge { row: &self.gauge.0, mean: held[c] };
                     let known = solve_channel(&equations[c], shape, &prior, &gauge, &narrow, &mut x);
-                    let precisions = Precisions::new(&surface[c], &equations[c], known.belief, prior.independence);
-                    (shape.expand(&x), precisions, known.scale_deviation)
+                    (shape.expand(&x), known)
                 })
                 .collect();
             if stop.load(Ordering::Relaxed) {
                 return None;
             }
             light = (0..light.len()).map(|texel| [0, 1, 2].map(|c| channels[c].0[texel])).collect();
-            let scale_deviation = channels.iter().map(|(_, _, deviation)| deviation / 3.0).sum();
-            let precisions: Vec<Precisions> = channels.into_iter().map(|(_, precisions, _)| precisions).collect();
-            known = LightKnown { shares: evidence_shares(&precisions, shape), scale_deviation };
+            known = channels.into_iter().map(|(_, known)| known).collect();
         }
+        let scale_deviation = known.iter().map(|channel| channel.scale_deviation / 3.0).sum();
+        let precisions: Vec<Precisions> = known
+            .into_iter()
+            .zip(surface.iter().zip(equations))
+            .map(|(channel, (own, all))| Precisions::new(own, all, channel.belief, prior.independence))
+            .collect();
+        let known = LightKnown { shares: evidence_shares(&precisions, shape), scale_deviation };
         Some((light, known))
     }
 }

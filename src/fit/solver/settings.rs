@@ -14,8 +14,7 @@ pub enum Suns {
     #[default]
     Any,
     /// One at most, where the light is brightest, as daylight has it. Of photographs, whose mesh and cameras are not quite
-    /// right, many small suns explain some of what is wrong: under a cloudy sky `saharov_bmvs` had twenty, up to 20 times
-    /// as bright as the sky and coloured, where one is 2 to 3 times as bright.
+    /// right, many small suns explain some of what is wrong.
     One,
 }
 

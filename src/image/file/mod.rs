@@ -173,28 +173,18 @@ pub fn write_png_srgb8(path: &Path, image: &Image<[u8; 3]>) -> Result<()> {
 
 /// Writes sRGB bytes with alpha as PNG; colours are not multiplied by alpha, as the format has it.
 pub fn write_png_srgba8(path: &Path, image: &Image<[u8; 4]>) -> Result<()> {
-    let mut bytes = Vec::new();
-    PngEncoder::new(&mut bytes)
-        .write_image(
-            image.pixels().as_flattened(),
-            image.width() as u32,
-            image.height() as u32,
-            ExtendedColorType::Rgba8,
-        )
-        .map_err(|error| cannot_encode("PNG", &error))?;
-    write_bytes(path, &bytes)
+    write_bytes(path, &encode_png(image, ExtendedColorType::Rgba8)?)
 }
 
 /// sRGB bytes as the bytes of a PNG file. Error: an image without pixels.
 pub fn encode_png_srgb8(image: &Image<[u8; 3]>) -> Result<Vec<u8>> {
+    encode_png(image, ExtendedColorType::Rgb8)
+}
+
+fn encode_png<const CHANNELS: usize>(image: &Image<[u8; CHANNELS]>, kind: ExtendedColorType) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     PngEncoder::new(&mut bytes)
-        .write_image(
-            image.pixels().as_flattened(),
-            image.width() as u32,
-            image.height() as u32,
-            ExtendedColorType::Rgb8,
-        )
+        .write_image(image.pixels().as_flattened(), image.width() as u32, image.height() as u32, kind)
         .map_err(|error| cannot_encode("PNG", &error))?;
     Ok(bytes)
 }

@@ -3,9 +3,10 @@
 //! Pictures are written by the program's own writers or by the crates it reads with, the rest is text. A scene has three
 //! photos and a mesh beside it, so that what its reader lists can be read on.
 
-use super::archive::{array, packed};
+use super::arrays::array;
 use crate::error::{Error, ErrorKind, Result};
 use crate::image::{Image, RgbImage, file, transfer};
+use crate::scene::read::zip::packed;
 use std::io::Cursor;
 use std::path::Path;
 

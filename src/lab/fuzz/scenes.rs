@@ -1,6 +1,6 @@
 //! Cameras of three photos of 12 x 9 pixels in the words of each program.
 
-use super::archive::array;
+use super::arrays::array;
 use super::corpus::{PHOTOS, Target};
 
 /// BlendedMVS.

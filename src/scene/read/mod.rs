@@ -54,7 +54,7 @@ pub mod transforms;
 mod udim;
 pub mod understood;
 pub mod world;
-mod zip;
+pub(crate) mod zip;
 
 pub use detect::{Format, Located, locate};
 pub use mesh_file::read_mesh;
