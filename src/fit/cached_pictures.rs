@@ -2,7 +2,7 @@
 
 use super::fitter::Fitter;
 use super::solver::SolverScene;
-use super::solver::whole_pixels::WholeSolution;
+use super::solver::descent::Descended;
 use super::targets::Target;
 use crate::image::{Image, RgbImage};
 use crate::math::sphere::tap_of_direction;
@@ -43,7 +43,7 @@ impl Fitter {
 
     /// The best texture without a light, from whole photos: what a picture can be that knows nothing of light. `None` as
     /// for [`Fitter::cached_view`], where the last photos were halved ones, or when `stop` was raised.
-    pub fn bake(&self, stop: &AtomicBool) -> Option<WholeSolution> {
+    pub fn bake(&self, stop: &AtomicBool) -> Option<Descended> {
         let solver = self.solver.as_ref().filter(|solver| solver.settings.map_size == self.state.map_size)?;
         (self.solver_photo_level == 0).then(|| solver.bake(stop)).flatten()
     }

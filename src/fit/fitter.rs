@@ -12,7 +12,7 @@ use super::schedule::{Stage, stages};
 use super::settings::{FitSettings, Method, Start};
 use super::solver::light_evidence::LightKnown;
 use super::solver::scene::foretold_gains;
-use super::solver::{Choices, LobeTails, SolverScene};
+use super::solver::{Choices, LobeTails, Objective, SolverScene};
 use super::stage_work::StageWork;
 use super::start;
 use super::state::{FitState, LossRow};
@@ -62,6 +62,8 @@ pub struct Fitter {
     pub(super) choices: Option<Arc<Choices>>,
     /// What the last maps that the solver made say of tails of lobes; no checkpoint holds it.
     pub(super) tails: Option<LobeTails>,
+    /// The objective before and after each step of the last descent; no checkpoint holds it.
+    pub(super) descent: Vec<[Objective; 2]>,
 }
 
 impl Fitter {
@@ -185,6 +187,7 @@ impl Fitter {
             light_known: LightKnown::default(),
             choices: None,
             tails: None,
+            descent: Vec::new(),
         })
     }
 
@@ -291,6 +294,12 @@ impl Fitter {
             .remedy("they were left out; look at that place of the photo or the mesh")
         });
         events.chain(counts).chain(self.setting_findings()).chain(self.tail_finding()).collect()
+    }
+
+    /// The objective before and after each step of the last descent, by what was learned of noise and gains then. Empty unless
+    /// there was one since the fit was started or taken up.
+    pub fn descent(&self) -> &[[Objective; 2]] {
+        &self.descent
     }
 
     /// That lobes have tails which the model's do not have, where maps that the solver made since the fit was started or

@@ -70,11 +70,9 @@ pub enum Choosing {
     Off,
     /// The report says what they choose; maps stay as the evidence of the pixels made them.
     #[default]
-    #[serde(rename = "report", alias = "tell")]
+    #[serde(rename = "report", alias = "tell", alias = "apply")]
     #[cfg_attr(feature = "cli", value(name = "report", alias = "tell"))]
     Tell,
-    /// Maps follow: regions lose a lobe that is not borne out, or share one.
-    Apply,
 }
 
 /// Settings of a fit. Defaults are the balanced preset.
@@ -173,11 +171,12 @@ pub struct FitSettings {
     #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().solver_rounds))]
     pub solver_rounds: usize,
     /// Width and height of the solver's visibility grid over the atlas, 16 to 4096, at most that of the maps [default: 256,
-    /// or 128 with refinement].
+    /// or 128 for many pixels].
     #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().solver_grid))]
     pub solver_grid: usize,
     /// Levels of the solver's coarse-to-fine, 1 to 6, each half the size of the next; the full size counts where refinement
-    /// makes its maps, and levels with maps below 128 x 128 texels are left out [default: 2, or 3 with refinement].
+    /// makes its maps, and levels with maps below 128 x 128 texels are left out. With three or more the finest maps are the
+    /// refinement's alone [default: 2, or 3 for many pixels].
     #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().solver_levels))]
     pub solver_levels: usize,
     /// What becomes of the judgement of held-out views on lobes, interreflection and resolution of the environment.
@@ -185,15 +184,13 @@ pub struct FitSettings {
     pub solver_choices: Choosing,
     /// Refinement steps of Adam after the solver, on all maps and the environment along gradients of the path tracer.
     ///
-    /// They are for photos of real places, whose edges, background and geometry the solver's model does not carry. The
-    /// solver then leaves the finest maps to what follows, and believes in a single sun and hardly any metal. Where its
-    /// model holds, they make maps worse.
+    /// They make GGX lobes of the solver's. Where its model holds, they make maps worse.
     #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().solver_polish))]
     pub solver_polish: usize,
-    /// Whole-pixel refinement after the solver: solutions for the diffuse map from all pixels of full size, with a gain for
-    /// each photo and channel and noise learned from the photos [default: 1 for 8-bit photos, else 0].
+    /// Whole-pixel refinement after the solver: descents over all texels from all pixels of full size, edges included, with a
+    /// gain for each photo and channel, and noise and smoothness learned from the photos; 0 leaves it out.
     ///
-    /// It makes the finest maps in place of the solver's tiles, which then believes in a single sun and hardly any metal.
+    /// It makes the finest maps in place of the solver's tiles.
     #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().solver_refine))]
     pub solver_refine: usize,
     /// Held-out evaluation interval in optimiser steps; 0 evaluates at the end only.
@@ -239,7 +236,7 @@ impl Default for FitSettings {
             solver_levels: 2,
             solver_choices: Choosing::Tell,
             solver_polish: 0,
-            solver_refine: 0,
+            solver_refine: 1,
             held_out_interval: 10,
             exclude: Vec::new(),
         }
@@ -252,12 +249,13 @@ impl FitSettings {
         self.method != Method::Adam || self.steps == Steps::OneStep || self.steps_all > 0
     }
 
-    /// Whether the finest maps are made after the solver's tiles, by whole pixels or by polishing.
+    /// Whether the finest maps are made by what follows the solver's tiles alone: tiles of full size take most of the time
+    /// where photos have many pixels, and find narrower lobes where they have few.
     pub fn is_refined(&self) -> bool {
-        self.solver_refine > 0 || self.solver_polish > 0
+        self.solver_polish > 0 || (self.solver_refine > 0 && self.solver_levels > FitSettings::default().solver_levels)
     }
 
-    /// Takes over whether others refine the solver's maps, and what goes with it.
+    /// Takes over whether others refine the solver's maps, and how.
     pub fn polish_as(&mut self, other: &FitSettings) {
         self.solver_polish = other.solver_polish;
         self.solver_refine = other.solver_refine;

@@ -31,8 +31,7 @@ impl Fitter {
         let check_choices = whole.check_choices && last_maps.is_some_and(|last| last.is_of_level_of(stage));
         let is_last = last_maps == Some(stage);
         // The grid is not halved with the maps: light that reaches points too far apart bounds what small maps can show.
-        let whole_pixels = stage.kind == StageKind::Refine;
-        let settings = SolverSettings { map_size: stage.map_size, check_choices, whole_pixels, ..whole };
+        let settings = SolverSettings { map_size: stage.map_size, check_choices, ..whole };
         let level = (stage.photo_level, stage.map_size);
         let is_of_level = |solver: &SolverScene| (self.solver_photo_level, solver.settings.map_size) == level;
         if !self.solver.as_ref().is_some_and(is_of_level) {
@@ -64,6 +63,9 @@ impl Fitter {
         }
         if stage.kind == StageKind::Maps {
             self.tails = report.tails;
+        }
+        if stage.kind == StageKind::Refine {
+            self.descent = std::mem::take(&mut report.descent);
         }
         self.figures.keep_errors(&report.view_errors);
         self.figures.keep_errors(&of_views);

@@ -15,8 +15,8 @@ use crate::scene::{Scene, View};
 pub struct Suited {
     /// The method that came nearer to the truth with such photos, and sooner.
     pub method: Method,
-    /// Solutions from whole pixels after the solver's coarser maps; 0 leaves the finest maps to the solver's tiles.
-    pub solver_refine: usize,
+    /// Whether photos have so many pixels that the solver makes maps of less than full size, on a coarser grid.
+    pub is_large: bool,
     /// Whether each photo gets a gain.
     pub exposure: bool,
     /// Width and height of maps with about as many texels as photos resolve; `None` where that is not known.
@@ -27,8 +27,9 @@ pub struct Suited {
 
 /// Steps of polishing that let lobes of another kind than the solver's settle.
 const POLISH_OF_LOBES: usize = 60;
-/// So much coarser is the solver's grid where whole pixels or polishing follow: the finest detail of their maps is the photos'.
-const COARSER_GRID: usize = 2;
+/// From so many pixels of all photos on the solver leaves maps of full size to the descent: with tiles of them fits of real
+/// places take three times as long.
+const MANY_PIXELS: usize = 4_000_000;
 /// Share of an atlas that charts cover, at the least, as a rule.
 const COVERED_SHARE: f64 = 0.6;
 /// Maps are not made smaller than this of themselves: that all levels of coarse-to-fine have texels.
@@ -37,19 +38,17 @@ const LEAST_MAP_SIZE: usize = 256;
 impl Suited {
     /// What suits a scene of which the check found what `report` says.
     ///
-    /// Linear radiance in all photos is what renderers write, and what the solver's model follows: there it ends nearer in
-    /// maps, light and pictures under another light than Adam, in less time. On photographs of real places, 8 bits a
-    /// channel, it does so in held-out pictures once its diffuse maps are solved from whole pixels, with what photos and
-    /// channels differ by, and once the photos' exposures, which cameras choose, are no riddle to the light. Maps with more texels than photos
-    /// have pixels to tell them apart cost time and show the photos' noise. Where there are no photos there is nothing to
-    /// solve.
+    /// The solver ends nearer in maps, light and held-out pictures than Adam, in less time, once the photos' exposures, which
+    /// cameras choose, are no riddle to the light. Maps with more texels than photos have pixels to tell them apart cost time
+    /// and show the photos' noise. Where there are no photos there is nothing to solve.
     pub fn to(scene: &Scene, report: &Report) -> Self {
         // Photographs developed to 16 bits are linear too, but cameras write down how they exposed.
         let by_camera = |view: &View| !view.photo.is_linear() || view.exposure_prior_stops.is_some();
         let is_photographed = scene.views.iter().any(by_camera);
         Suited {
             method: if scene.views.is_empty() { Method::Adam } else { Method::Solver },
-            solver_refine: usize::from(is_photographed),
+            is_large: scene.views.iter().map(|view| view.photo.width() * view.photo.height()).sum::<usize>()
+                > MANY_PIXELS,
             exposure: is_photographed && exposure::differ(&report.views),
             map_size: report.texels_resolved.map(map_size_for),
             sharpest_map_size: report.texels_resolved_sharpest.map(map_size_for),
@@ -81,22 +80,16 @@ impl Suited {
         if settings.method == Method::Automatic {
             settings.method = if Method::means_adam(chosen) { Method::Adam } else { self.method };
         }
-        if is_free("solver-refine") {
-            settings.solver_refine = self.solver_refine;
-        }
         // The solver's lobes are of Blinn-Phong: others are made of them by refinement.
         if is_free("solver-polish") && settings.lobe == LobeModel::Ggx {
             settings.solver_polish =
                 POLISH_OF_LOBES.saturating_mul(settings.steps_all) / FitSettings::default().steps_all;
         }
-        // What follows leaves the solver the sizes below the full one, and it does with one more of them.
-        let is_refined = settings.is_refined();
-        if is_free("solver-levels") {
-            settings.solver_levels = FitSettings::default().solver_levels + usize::from(is_refined);
+        if self.is_large && is_free("solver-levels") {
+            settings.solver_levels = FitSettings::default().solver_levels + 1;
         }
-        if is_free("solver-grid") {
-            let coarser = if is_refined { COARSER_GRID } else { 1 };
-            settings.solver_grid = FitSettings::default().solver_grid / coarser;
+        if self.is_large && is_free("solver-grid") {
+            settings.solver_grid = FitSettings::default().solver_grid / 2;
         }
         if is_free("exposure") {
             settings.exposure |= self.exposure;
@@ -117,12 +110,7 @@ impl Suited {
                 0 => String::new(),
                 steps => format!(", then {steps} refinement steps of Adam"),
             };
-            let why = match (self.solver_refine, settings.solver_refine) {
-                (0, _) => ", since all photos hold linear radiance",
-                (_, 0) => "",
-                _ => " with whole-pixel refinement of the diffuse map",
-            };
-            tell(format!("Using the solver{why}{polished}"), "method", "adam".into(), "takes Adam only");
+            tell(format!("Using the solver{polished}"), "method", "adam".into(), "takes Adam only");
         }
         if settings.exposure != asked.exposure {
             let sentence = "Photo exposures differ: exposure compensation is on, a gain per photo";
@@ -203,15 +191,15 @@ mod tests {
     }
 
     #[test]
-    fn photos_are_for_the_solver_unless_adam_is_meant_and_photographs_are_refined() {
+    fn photos_are_for_the_solver_unless_adam_is_meant() {
         let mut scene = linear_scene();
         let suits = |scene: &Scene, chosen: &[&str]| {
             let settings = applied(&Suited::to(scene, &Report::default()), FitSettings::default(), chosen);
-            (settings.method, settings.solver_refine)
+            settings.method
         };
-        assert_eq!(suits(&scene, &[]), (Method::Solver, 0));
-        assert_eq!(suits(&scene, &["map-size"]), (Method::Solver, 0));
-        assert_eq!(suits(&scene, &["consistency"]).0, Method::Adam);
+        assert_eq!(suits(&scene, &[]), Method::Solver);
+        assert_eq!(suits(&scene, &["map-size"]), Method::Solver);
+        assert_eq!(suits(&scene, &["consistency"]), Method::Adam);
         let own = FitSettings { method: Method::Adam, ..FitSettings::default() };
         let kept = applied(&Suited::to(&scene, &Report::default()), own.clone(), &["bounces"]);
         assert_eq!(kept, own, "a method that was chosen stays, and Adam is not given what is the solver's");
@@ -220,10 +208,10 @@ mod tests {
         assert_eq!((resolved.method, resolved.solver_polish), (Method::Solver, POLISH_OF_LOBES));
         resolved.validate().unwrap();
         scene.views[1].photo = Photo::Srgb8(Image::filled(8, 6, [200; 3]));
-        assert_eq!(suits(&scene, &[]), (Method::Solver, 1));
-        assert_eq!(suits(&scene, &["samples"]).0, Method::Adam);
+        assert_eq!(suits(&scene, &[]), Method::Solver);
+        assert_eq!(suits(&scene, &["samples"]), Method::Adam);
         scene.views.clear();
-        assert_eq!(suits(&scene, &[]).0, Method::Adam);
+        assert_eq!(suits(&scene, &[]), Method::Adam);
     }
 
     #[test]
@@ -248,7 +236,7 @@ mod tests {
     fn what_was_taken_is_told_and_nothing_else() {
         let suited = Suited {
             method: Method::Solver,
-            solver_refine: 1,
+            is_large: false,
             exposure: true,
             map_size: Some(512),
             sharpest_map_size: None,
@@ -261,7 +249,6 @@ mod tests {
         let all = told(&usual, &[]);
         assert_eq!(all.len(), 3, "{all:?}");
         assert!(all[0].contains("solver") && all[1].contains("gain") && all[2].contains("512 x 512"), "{all:?}");
-        assert!(all[0].contains("whole-pixel") && !told(&usual, &["solver-refine"])[0].contains("whole-pixel"));
         let polished = FitSettings { solver_polish: 7, ..usual.clone() };
         assert!(told(&polished, &["solver-polish"])[0].contains("then 7 refinement steps"));
         let solver = FitSettings { method: Method::Solver, ..usual.clone() };
@@ -287,31 +274,17 @@ mod tests {
     }
 
     #[test]
-    fn refinement_and_its_sizes_go_together() {
-        let photographs = Suited {
-            method: Method::Solver,
-            solver_refine: 1,
-            exposure: false,
-            map_size: None,
-            sharpest_map_size: None,
+    fn many_pixels_leave_full_size_to_the_descent() {
+        let of = |is_large: bool, chosen: &[&str]| {
+            let suited =
+                Suited { method: Method::Solver, is_large, exposure: false, map_size: None, sharpest_map_size: None };
+            let settings = applied(&suited, FitSettings::default(), chosen);
+            (settings.solver_levels, settings.solver_grid, settings.is_refined())
         };
-        let rendered = Suited { solver_refine: 0, ..photographs.clone() };
-        let of = |suited: &Suited, (refine, polish): (usize, usize), chosen: &[&str]| {
-            let from = FitSettings {
-                solver_refine: refine,
-                solver_polish: polish,
-                solver_levels: 1,
-                ..FitSettings::default()
-            };
-            let settings = applied(suited, from, chosen);
-            (settings.solver_refine, settings.solver_polish, settings.solver_levels, settings.solver_grid)
-        };
-        assert_eq!(of(&photographs, (0, 0), &[]), (1, 0, 3, 128));
-        assert_eq!(of(&rendered, (0, 0), &[]), (0, 0, 2, 256));
-        assert_eq!(of(&rendered, (0, 5), &["solver-polish"]), (0, 5, 3, 128));
-        assert_eq!(of(&photographs, (0, 0), &["solver-refine"]), (0, 0, 2, 256));
-        assert_eq!(of(&photographs, (0, 0), &["solver-levels"]), (1, 0, 1, 128));
-        assert_eq!(of(&photographs, (0, 0), &["solver-grid"]), (1, 0, 3, 256));
+        assert_eq!(of(false, &[]), (2, 256, false));
+        assert_eq!(of(true, &[]), (3, 128, true));
+        assert_eq!(of(true, &["solver-levels"]), (2, 128, false));
+        assert_eq!(of(true, &["solver-grid"]), (3, 256, true));
     }
 
     #[test]
@@ -321,7 +294,7 @@ mod tests {
         assert_eq!(sizes, [256, 256, 256, 512, 512, 1024, 2048, 4096, 8192]);
         let suited = |size| Suited {
             method: Method::Adam,
-            solver_refine: 0,
+            is_large: false,
             exposure: false,
             map_size: size,
             sharpest_map_size: None,

@@ -81,6 +81,7 @@ pub fn write(
     let transport = timed(&mut timings, "check of transport", || fitter.transport_error(stop));
     data.scene_facts.extend(told.facts(transport));
     data.capture = capture.views;
+    data.objective = fitter.descent().to_vec();
     data.choices = fitter.choices().map(|choices| ChoiceTable::of(choices));
     data.views = views
         .iter()

@@ -100,7 +100,10 @@ pub(super) fn score_views(
     let scene = fitter.scene().as_ref();
     let cached = fitter.cached_view();
     let has_held_out = fitter.view_uses().contains(&ViewUse::HeldOut);
-    let texture = has_held_out.then(|| fitter.bake(stop)).flatten().map(|bake| bake.rho);
+    let texture = has_held_out
+        .then(|| fitter.bake(stop))
+        .flatten()
+        .map(|bake| bake.texels.iter().map(|texel| texel.diffuse).collect::<Vec<_>>());
     let training = views_of(fitter.view_uses(), ViewUse::Training);
     let mut scored = Vec::with_capacity(scene.views.len());
     for (index, (view, &kind)) in scene.views.iter().zip(fitter.view_uses()).enumerate() {

@@ -4,6 +4,7 @@
 
 use glam::{Vec2, Vec3};
 use patina::export::{LossRow, RunFolder, RunResult};
+use patina::fit::solver::Objective;
 use patina::image::{Image, RgbImage};
 use patina::insight::capture::ViewCapture;
 use patina::insight::intervals::IntervalCoverage;
@@ -226,6 +227,10 @@ fn write_example(folder: &RunFolder, views: usize) -> ReportData {
     let all_seen = seen.map(|&count: &f32| count > 0.0);
     let data = ReportData {
         title: "bronze ball <demo>".into(),
+        objective: vec![[
+            Objective { pixels: -1000.0, neighbours: 400.0, lobes: 0.0 },
+            Objective { pixels: -1500.0, neighbours: 350.0, lobes: 12.0 },
+        ]],
         program: "patina 0.1.0".into(),
         scene_facts: [
             ("triangles", "31 964"),
@@ -390,6 +395,7 @@ fn a_full_report_holds_every_section_in_one_file() {
         assert!((back.raw.psnr_srgb_db - written.raw.psnr_srgb_db).abs() < 1e-9);
     }
     assert_eq!(back.views.len(), 10);
+    assert!(back.objective == data.objective && html.contains("<td>-538"), "the objective's fall");
     assert!(back.loss_history[222].loss.is_nan() && back.timings[5].seconds.is_nan());
 }
 

@@ -34,7 +34,7 @@ const HEADINGS: [(&str, &str); 15] = [
 
 /// Settings whose value a scene decides when they are not typed ([`crate::fit::Suited`]): a default told beside them
 /// would be one that few fits have. Their help says what is taken.
-const DECIDED_BY_SCENE: [&str; 6] = ["method", "map-size", "exposure", "solver-grid", "solver-levels", "solver-refine"];
+const DECIDED_BY_SCENE: [&str; 5] = ["method", "map-size", "exposure", "solver-grid", "solver-levels"];
 
 /// Puts the settings of a fit under their headings.
 pub fn arrange(command: clap::Command) -> clap::Command {
@@ -104,13 +104,12 @@ mod tests {
             !argument.is_hide_default_value_set() && !argument.get_default_values().is_empty()
         };
         let base = FitSettings::default();
-        for (method, solver_refine, exposure, map_size) in [
-            (Method::Solver, 0, false, None),
-            (Method::Solver, 1, true, Some(512)),
-            (Method::Adam, 0, false, Some(256)),
+        for (method, is_large, exposure, map_size) in [
+            (Method::Solver, false, false, None),
+            (Method::Solver, true, true, Some(512)),
+            (Method::Adam, false, false, Some(256)),
         ] {
-            let settings =
-                Suited { method, solver_refine, exposure, map_size, sharpest_map_size: None }.resolve(&base, &[]);
+            let settings = Suited { method, is_large, exposure, map_size, sharpest_map_size: None }.resolve(&base, &[]);
             for (name, _, taken) in base.differences(&settings) {
                 assert!(!told(&name), "--{name} tells a default, and {taken} was taken");
             }

@@ -91,7 +91,13 @@ fn other_numbers_of_steps_keep_what_is_done_and_reach_the_finest_level() {
 
 #[test]
 fn the_solver_visits_the_smallest_size_twice_and_keeps_its_plan_wherever_it_is() {
-    let settings = FitSettings { method: Method::Solver, map_size: 256, ..Default::default() };
+    let usual = FitSettings { method: Method::Solver, map_size: 256, ..Default::default() };
+    let names: Vec<String> = stages(&usual).iter().map(Stage::name).collect();
+    assert_eq!(names[5..], ["narrow light", "maps", "refine"]);
+    let large = FitSettings { solver_levels: 3, ..usual.clone() };
+    let names: Vec<String> = stages(&large).iter().map(Stage::name).collect();
+    assert_eq!(names, ["wide light 1/2", "narrow light 1/2", "maps 1/2", "refine"]);
+    let settings = FitSettings { solver_refine: 0, ..usual };
     let plan = stages(&settings);
     let names: Vec<String> = plan.iter().map(Stage::name).collect();
     let half = ["wide light 1/2", "narrow light 1/2", "maps 1/2", "narrow light 1/2", "maps 1/2"];

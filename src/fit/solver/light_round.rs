@@ -88,8 +88,7 @@ impl SolverScene {
             blocks: done.len(),
             light_unknowns: if self.settings.fixed_light { 0 } else { shape.count() },
             view_errors: errors.of_views(&self.views),
-            choices: None,
-            tails: None,
+            ..StepReport::default()
         })
     }
 
@@ -225,7 +224,7 @@ impl SolverScene {
         let mut known: Vec<ChannelKnown> = Vec::new();
         for growth in GROWTHS {
             let before = shape.coefficients_of_channels(&light);
-            let narrow = narrow_scales(shape, &light, &before, self.settings.suns, growth);
+            let narrow = narrow_scales(shape, &light, &before, growth);
             let channels: Vec<(Vec<f32>, ChannelKnown)> = (0..3usize)
                 .into_par_iter()
                 .map(|c| {

@@ -164,7 +164,6 @@ fn mean_weights(shape: &LightShape) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::super::light_suns::narrow_scales;
-    use super::super::settings::Suns;
     use super::*;
 
     #[test]
@@ -175,7 +174,7 @@ mod tests {
         light[sun as usize] = [1000.0, 800.0, 500.0];
         light[blue as usize][2] = 100.0;
         let coefficients = shape.coefficients_of_channels(&light);
-        let scales = narrow_scales(&shape, &light, &coefficients, Suns::Any, 10.0);
+        let scales = narrow_scales(&shape, &light, &coefficients, 10.0);
         assert!(scales[0] > 100.0 && scales[1..] == [1.0, 1.0], "{scales:?}");
 
         // A doubtful row, 40 +- 20, moves a texel of the sky by little, and the sun stays.
@@ -213,7 +212,7 @@ mod tests {
         }
         let light: Vec<[f32; 3]> = texels.map(|texel| [truth(texel); 3]).collect();
         let coefficients = shape.coefficients_of_channels(&light);
-        let scales = narrow_scales(&shape, &light, &coefficients, Suns::Any, 10.0);
+        let scales = narrow_scales(&shape, &light, &coefficients, 10.0);
         let prior = LightPrior { variation: 0.7, independence: 1.0, gauge_slack: 1.0 };
         let row = vec![1.0 / (width * height) as f32; width * height];
         let mut x = vec![0.7; shape.count()];

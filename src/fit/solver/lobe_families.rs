@@ -13,7 +13,7 @@
 //! has keep half of what is believed.
 
 use super::estimate::{Estimate, TexelVariance};
-use super::lobe_prior::{LobeFamily, LobeKind, LobePrior, REACH, SurfaceKinds};
+use super::lobe_prior::{LobeFamily, LobeKind, LobePrior, REACH};
 use super::lobe_scene::SceneLobes;
 use crate::material::Material;
 
@@ -119,16 +119,13 @@ impl Sums {
     }
 }
 
-/// What is believed of lobes when maps are made: the prior of these kinds, the same with lobes as this scene has them, and
-/// where any kinds may be, a family for each kind of surface that earlier maps show. Where nothing was solved for yet, by
+/// What is believed of lobes when maps are made: the prior, the same with lobes as this scene has them, and
+/// a family for each kind of surface that earlier maps show. Where nothing was solved for yet, by
 /// maps or by rounds on the light, it is the prior alone.
-pub fn with_families_of(estimate: &Estimate, kinds: SurfaceKinds) -> LobePrior {
-    let any = kinds.prior();
+pub fn with_families_of(estimate: &Estimate) -> LobePrior {
+    let any = LobePrior::default();
     let Some(scene) = SceneLobes::of(estimate) else { return any };
-    let clusters = match kinds {
-        SurfaceKinds::Any => clusters(&known_samples(estimate)),
-        SurfaceKinds::Outdoors => Vec::new(),
-    };
+    let clusters = clusters(&known_samples(estimate));
     // Texels that are known well are no fair sample of the surface: shares go with the root of their number.
     let total: f64 = clusters.iter().map(|cluster| cluster.count.sqrt()).sum();
     let of_any = if total > 0.0 { ANY_SHARE } else { 1.0 };
@@ -214,7 +211,7 @@ pub(super) mod tests {
 
     #[test]
     fn materials_that_are_known_become_families_and_what_is_not_known_does_not() {
-        let prior = with_families_of(&estimate(), SurfaceKinds::Any);
+        let prior = with_families_of(&estimate());
         assert_eq!(prior.families.len(), 4, "{prior:?}");
         let total: f64 = prior.families.iter().flat_map(|family| &family.kinds).map(|kind| kind.share).sum();
         assert!((total - 1.0).abs() < 1e-12);
@@ -232,7 +229,7 @@ pub(super) mod tests {
     fn all_texels_together_are_a_family_of_the_scene() {
         // A quarter at -0.7, half at -1.2, a quarter at -0.3 that is hardly known (a variance of 0.5): all together -0.85 with
         // a deviation of 0.52 below zero, so a whole normal distribution is wider and lies further up.
-        let families = with_families_of(&estimate(), SurfaceKinds::Any).families;
+        let families = with_families_of(&estimate()).families;
         let (any, scene) = (&families[0], &families[1]);
         let (mean, deviation) = scene.log_width;
         assert!((-0.75..-0.6).contains(&mean) && (0.6..0.7).contains(&deviation), "{scene:?}");
@@ -246,22 +243,6 @@ pub(super) mod tests {
     #[test]
     fn where_nothing_was_solved_for_nothing_is_added() {
         let light = Environment { radiance: Image::filled(4, 2, Vec3::ONE) };
-        for kinds in [SurfaceKinds::Any, SurfaceKinds::Outdoors] {
-            assert_eq!(with_families_of(&Estimate::start(16, &light, 1), kinds), kinds.prior());
-        }
-    }
-
-    #[test]
-    fn outdoors_maps_tell_of_the_scene_as_a_whole_but_add_no_kinds() {
-        let prior = with_families_of(&estimate(), SurfaceKinds::Outdoors);
-        let [any, scene] = prior.families.as_slice() else { panic!("{prior:?}") };
-        let share = |family: &LobeFamily| family.kinds.iter().map(|kind| kind.share).sum::<f64>();
-        assert!((share(any) + share(scene) - 1.0).abs() < 1e-12);
-        // Metals, the kind without a diffuse reflectance of its surroundings, are hardly believed in.
-        for family in &prior.families {
-            let metal: f64 = family.kinds.iter().filter(|kind| kind.diffuse.0.is_some()).map(|kind| kind.share).sum();
-            assert!(metal > 0.0 && metal < 0.01 * share(family), "{family:?}");
-        }
-        assert_eq!(scene.log_width, with_families_of(&estimate(), SurfaceKinds::Any).families[1].log_width);
+        assert_eq!(with_families_of(&Estimate::start(16, &light, 1)), LobePrior::default());
     }
 }

@@ -40,38 +40,14 @@ pub struct LobePrior {
     pub keep: f64,
 }
 
-/// Which kinds of surface a scene may have.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum SurfaceKinds {
-    /// All, metals as often as in a workshop, and more of what maps show already ([`super::lobe_families`]).
-    #[default]
-    Any,
-    /// Hardly any metal, and no more of what maps show. What is wrong with mesh, cameras and light of photographs goes
-    /// together over whole tiles and counts for more than a metal's share: granite comes out as rough metal over an orange
-    /// ground, with held-out pictures further off. Metal that pixels show is found all the same.
-    Outdoors,
-}
-
-impl SurfaceKinds {
-    /// What is believed of lobes before any maps are made.
-    pub fn prior(self) -> LobePrior {
-        match self {
-            SurfaceKinds::Any => LobePrior::of_metal_share(METAL_SHARE),
-            SurfaceKinds::Outdoors => LobePrior::of_metal_share(OUTDOORS_METAL_SHARE),
-        }
-    }
-}
-
 /// Share of metal among all surface.
 const METAL_SHARE: f64 = 0.17;
-/// The same outdoors.
-const OUTDOORS_METAL_SHARE: f64 = 0.0017;
 /// Share of what is neither dielectric nor metal.
 const OTHER_SHARE: f64 = 0.03;
 
 impl Default for LobePrior {
     fn default() -> Self {
-        SurfaceKinds::Any.prior()
+        LobePrior::of_metal_share(METAL_SHARE)
     }
 }
 

@@ -13,11 +13,11 @@
 //!    wide and narrow hats ([`light_shape`]), with a weak wish for smoothness but for suns ([`light_suns`]).
 //!    [`light_round`] is the round as a whole, [`light_evidence`] says what each texel of the light is known by, `light_holes` fills what lies between texels
 //!    that photos show; `gains` of photos whose exposures differ.
-//! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`, `tile_texels`, `tile_spread`,
-//!    `tile_highlights`) with the footprints of pixels, where the evidence, as far as it is independent
-//!    (`tile_independence`), decides which texels share a lobe ([`lobe_tree`], [`lobe_evidence`], [`lobe_prior`],
-//!    [`lobe_sums`], [`lobe_widths`], [`lobe_families`], `lobe_scene`), then [`mod@diffuse`]: all diffuse texels together
-//!    ([`diffuse_system`]), until the light between surfaces stays (`settle`).
+//! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`) with the footprints of pixels, where the evidence,
+//!    as far as it is independent (`tile_independence`), decides which texels share a lobe ([`lobe_tree`],
+//!    [`lobe_evidence`], [`lobe_prior`], [`lobe_sums`], [`lobe_widths`], [`lobe_families`], `lobe_scene`).
+//!    Then `refine`: [`descent`] of the one [`objective`] over all texels, by whole [`pixels`] (`pixel_system`), with what
+//!    `neighbours` have in common and as much `freedom` as predicts photos that took no part.
 //! 6. [`choice`]: views that took no part say what lobes, light between surfaces and the light's resolution bought;
 //!    `lobe_tails` says whether highlights reach further than the model's lobes.
 //! 7. [`solver`]: the steps in their order. A fit does them one by one, as [`crate::fit::Fitter`] does those of Adam: on
@@ -31,10 +31,10 @@ pub mod block;
 mod cell_sums;
 pub mod choice;
 pub mod coupling;
-pub mod diffuse;
-pub mod diffuse_system;
+pub mod descent;
 pub mod eliminate;
 pub mod estimate;
+mod freedom;
 mod gains;
 mod light_colour;
 pub mod light_evidence;
@@ -53,30 +53,29 @@ mod lobe_tails;
 pub mod lobe_tree;
 pub mod lobe_widths;
 pub mod maps;
+mod neighbours;
 pub mod non_negative;
 pub mod normal_equations;
+pub mod objective;
 pub mod observations;
 pub mod photo_gains;
 pub mod pixel_noise;
+mod pixel_system;
 pub mod pixel_terms;
+pub mod pixels;
 pub mod plan;
+mod refine;
 pub mod report;
 pub mod round;
 pub mod scene;
 pub mod settings;
-mod settle;
 mod sieve;
 #[allow(clippy::module_inception)]
 pub mod solver;
-mod texel_system;
 pub mod tile;
-mod tile_highlights;
 mod tile_independence;
 mod tile_lobes;
-mod tile_spread;
-mod tile_texels;
 pub mod transport_check;
-pub mod whole_pixels;
 
 #[cfg(test)]
 mod tests;
@@ -84,6 +83,7 @@ mod tests;
 pub use choice::Choices;
 pub use estimate::{Estimate, TexelVariance};
 pub use lobe_tails::LobeTails;
+pub use objective::Objective;
 pub use report::StepReport;
 pub use scene::SolverScene;
 pub use settings::SolverSettings;

@@ -1,8 +1,8 @@
 //! Pixels that say something of one texel each, sorted by texel.
 //!
 //! A pixel counts where the photo shows surface, the rays agree that one piece of surface fills it, and it is finite. It
-//! is booked at the texel it covers most; what it covers of the neighbours is put right at the end, when diffuse
-//! reflectance is solved with the full footprints ([`super::diffuse`]).
+//! is booked at the texel it covers most; what it covers of the neighbours, and pixels with edges, count in the descent at
+//! the end ([`super::pixels`]).
 
 use crate::fit::targets::Target;
 use crate::render::cached::ViewFootprints;

@@ -3,6 +3,7 @@
 use super::choice::Choices;
 use super::estimate::Estimate;
 use super::lobe_tails::LobeTails;
+use super::objective::Objective;
 use super::pixel_terms::PixelTerms;
 use super::round::{BlockWork, Round};
 use super::scene::SolverScene;
@@ -22,6 +23,8 @@ pub struct StepReport {
     pub light_unknowns: usize,
     /// Root mean squared error of views, by index in the scene.
     pub view_errors: Vec<(usize, f32)>,
+    /// The objective before and after each step of the descent, by what was learned then; only where there was one.
+    pub descent: Vec<[Objective; 2]>,
     /// What judging views say of the model's freedoms; only where maps were made and that was asked for.
     pub choices: Option<Choices>,
     /// What pixels say of tails of lobes; only where maps were made and enough views see lobes.
@@ -55,6 +58,14 @@ impl ErrorSums {
             if !observation.clipped {
                 self.add(observation.view as usize, squared_error(&round.model(work, term), term));
             }
+        }
+    }
+
+    /// Adds the sums of other pixels.
+    pub fn merge(&mut self, other: &ErrorSums) {
+        for (own, other) in self.sums.iter_mut().zip(&other.sums) {
+            own.0 += other.0;
+            own.1 += other.1;
         }
     }
 

@@ -1,6 +1,7 @@
 //! A scene made ready for the solver: all that follows from photos, geometry and settings and never changes in a fit.
 
 use super::observations::{Observation, Observations, of_view};
+use super::pixels::EdgeView;
 use super::plan::{self, Block};
 use super::settings::SolverSettings;
 use super::sieve::Sieve;
@@ -60,8 +61,10 @@ pub struct SolverScene {
     pub footprints: Vec<ViewFootprints>,
     /// How they were traced.
     pub first_hits: FootprintSettings,
-    /// Pixels that show surface.
+    /// Pixels that one piece of surface fills.
     pub observations: Observations,
+    /// Pixels with edges, view by view.
+    pub edges: Vec<EdgeView>,
     /// Pixels that show the light itself.
     pub background: Vec<BackgroundPixel>,
     /// The mean light on the observed surface as a row over the light, and what it is held to per channel.
@@ -96,7 +99,7 @@ impl SolverScene {
             bounce_rays: settings.bounce_rays,
             surface_rows: CachedSettings::default().surface_rows,
             max_bounces: settings.max_bounces,
-            fine_shadows: settings.fine_edges,
+            fine_shadows: true,
             lobe_strength: 1.0,
             seed: settings.seed,
         };
@@ -104,14 +107,7 @@ impl SolverScene {
         let Some(transport) = traced.filter(|own| own.is_of(&cached, settings.light_size)).or_else(build) else {
             return Ok(None);
         };
-        let first_hits = FootprintSettings {
-            map_size: settings.map_size,
-            ..match (settings.fine_edges, settings.whole_pixels) {
-                (true, _) => FootprintSettings::default(),
-                (false, true) => FootprintSettings::WHOLE,
-                (false, false) => FootprintSettings::COARSE,
-            }
-        };
+        let first_hits = FootprintSettings { map_size: settings.map_size, ..FootprintSettings::default() };
         let traced = |target: &Target, sieve: Option<&Sieve>| {
             let grid = &transport.grid;
             let wants = sieve.map(|sieve| move |pixel: u32, uv: Vec2| sieve.wants(pixel, uv));
@@ -121,9 +117,11 @@ impl SolverScene {
         };
         let mut sieve = Sieve::new(settings.map_size);
         let mut escaped = Vec::with_capacity(targets.len());
+        let mut edges = Vec::with_capacity(targets.len());
         for (index, target) in targets.iter().enumerate() {
             let Some(footprints) = traced(target, sieve.has_dropped().then_some(&sieve)) else { return Ok(None) };
             escaped.push(wholly_escaped(&footprints));
+            edges.push(EdgeView::of(scene, target, index as u32, targets.len(), &footprints));
             let pixels = of_view(scene, target, index as u32, &footprints);
             sieve.add(footprints, pixels);
         }
@@ -171,6 +169,7 @@ impl SolverScene {
             footprints,
             first_hits,
             observations,
+            edges,
             background,
             gauge,
             held_out,

@@ -21,7 +21,7 @@ pub enum SolverStep {
     Light(usize),
     /// All maps, under the light with its holes filled.
     Maps,
-    /// Diffuse maps from whole pixels.
+    /// All texels at once, from whole pixels.
     Refine,
 }
 
@@ -94,7 +94,7 @@ impl Solver {
     /// All steps in their order.
     pub fn steps(&self) -> Vec<SolverStep> {
         let rounds = self.scene.settings.coarse_rounds + self.scene.settings.fine_rounds;
-        (0..rounds).map(SolverStep::Light).chain([SolverStep::Maps]).collect()
+        (0..rounds).map(SolverStep::Light).chain([SolverStep::Maps, SolverStep::Refine]).collect()
     }
 
     /// Does all steps; `tell` hears of each. Stops early when `stop` is raised, with what there is.

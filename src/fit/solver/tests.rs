@@ -98,7 +98,7 @@ fn light_and_maps_are_found_together() {
     let mut solver = Solver::new(scene, surface, settings, None).unwrap();
     let mut stages = Vec::new();
     solver.run(&AtomicBool::new(false), &mut |step, _, _| stages.push(step));
-    assert_eq!(stages.len(), 9);
+    assert_eq!(stages.len(), 10);
     let (raw, constant) = diffuse_error(scene, &solver.maps(), false);
     assert!(raw < 0.9 * constant, "{raw} {constant}");
     let (own, _) = diffuse_error(scene, &solver.maps(), true);

@@ -2,8 +2,8 @@
 //!
 //! Blocks book a pixel at the one texel it covers most. Here diffuse reflectance is solved with the footprints inside the
 //! tile, pixels are relieved of what they cover of the neighbours, of their diffuse reflectance and of what their lobes
-//! send, and what is left tells of the lobe of the one texel (`tile_lobes`). At the end all that is unknown of the texels
-//! is solved together (`tile_texels`), by pixels among which highlights are no outliers (`tile_highlights`).
+//! send, and what is left tells of the lobe of the one texel (`tile_lobes`). Where all texels begin from then on is here:
+//! the descent goes on with all of them at once ([`super::descent`]).
 
 use super::lobe_evidence::LobeBelief;
 use super::lobe_prior::LobePrior;
@@ -184,20 +184,21 @@ impl Tile {
             let trees = if pass + 1 < PASSES { 1 } else { sharing.trees };
             self.solve_lobes(map_size, self.independence(independence), (prior, LobeSharing { trees, ..sharing }));
         }
-        self.end(mean_radiance, independence);
+        self.end();
     }
 
-    /// Once lobes are known: each texel by itself as far as its pixels tell it, highlights counted as such.
-    pub(super) fn end(&mut self, mean_radiance: f32, independence: f64) {
+    /// Once lobes are known: diffuse reflectance beside what they send.
+    pub(super) fn end(&mut self) {
         self.set_lobes();
         self.solve_diffuse();
-        self.trust_highlights(mean_radiance);
-        self.solve_texels(mean_radiance, independence);
     }
 
-    /// The pixels: observation, what the lobe sends, weight.
-    pub fn pixels(&self) -> impl Iterator<Item = (u32, [f32; 3], f32)> + '_ {
-        self.pixels.iter().map(|pixel| (pixel.observation, pixel.lobe, pixel.terms.weight))
+    /// Squared residuals of the pixels that count, mean over channels, with their views.
+    pub fn errors(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.pixels.iter().filter(|pixel| !pixel.clipped && pixel.terms.weight > 0.0).map(|pixel| {
+            let square: f32 = self.residual(pixel).iter().map(|left| left * left).sum();
+            (pixel.view as usize, f64::from(square) / 3.0)
+        })
     }
 
     /// Frees the pixels, which are large.

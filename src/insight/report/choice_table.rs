@@ -15,8 +15,6 @@ pub struct ChoiceTable {
     pub pixels: u64,
     /// Whether they were training views, withheld from this check only.
     pub are_withheld: bool,
-    /// Whether the maps took over what was chosen.
-    pub are_applied: bool,
     /// Seconds that the check took.
     #[serde(deserialize_with = "crate::export::loss_log::number_or_nan")]
     pub seconds: f64,
@@ -63,7 +61,6 @@ impl ChoiceTable {
             views: choices.views,
             pixels: choices.pixels,
             are_withheld: choices.are_withheld,
-            are_applied: choices.are_applied,
             seconds: choices.seconds,
         }
     }

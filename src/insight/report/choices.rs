@@ -56,14 +56,9 @@ pub(super) fn section(table: Option<&ChoiceTable>, map: Option<&GreyImage>) -> S
         "<p class=note>{} pixels of {} {who} judge, under the light that was found; none of them took part. Per region \
          of the maps the simplest model within one standard error of the best is the choice. Gains are over all \
          judging pixels, with standard errors over views; bold: not larger than its error, so nothing bears the freedom \
-         out. {} The check took {} s.</p>{}{}",
+         out. Maps are as the solver made them, whatever is chosen here. The check took {} s.</p>{}{}",
         whole(table.pixels),
         whole(table.views as u64),
-        if table.are_applied {
-            "Maps took over what is chosen; errors here are from before that."
-        } else {
-            "Maps are as the solver made them, whatever is chosen here."
-        },
         fixed(table.seconds, 2),
         tables::table("scores text2", &head, &rows),
         map.map_or_else(String::new, map_of_choices)

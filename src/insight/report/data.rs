@@ -2,6 +2,7 @@
 
 use crate::error::{Finding, Severity};
 use crate::export::LossRow;
+use crate::fit::solver::Objective;
 use crate::insight::capture::ViewCapture;
 use crate::insight::intervals::IntervalCoverage;
 use crate::insight::report::choice_table::ChoiceTable;
@@ -45,6 +46,8 @@ pub struct ReportData {
     pub non_finite: Vec<NonFiniteCount>,
     /// What views that took no part say of the model's freedoms; `None` where none were asked.
     pub choices: Option<ChoiceTable>,
+    /// The objective of the last descent, before and after each of its steps; empty where there was none.
+    pub objective: Vec<[Objective; 2]>,
     /// Texels of the atlas that some photograph sees, and that none does.
     pub texels: TexelCounts,
 }

@@ -21,7 +21,7 @@ pub fn html(data: &ReportData, images: &ReportImages) -> String {
         ("maps", "Maps", gallery::maps(images)),
         ("light", "Light", gallery::light(images)),
         ("choices", "What the scene needs", choices::section(data.choices.as_ref(), images.choices)),
-        ("loss", "Loss", curves::loss(&data.loss_history)),
+        ("loss", "Loss", curves::loss(&data.loss_history) + &objective(data)),
         ("run", "Run", run(data)),
     ];
     let title = if data.title.is_empty() { "Untitled scene" } else { &data.title };
@@ -43,6 +43,35 @@ pub fn html(data: &ReportData, images: &ReportImages) -> String {
         html += &format!("<section id={id}><h2>{name}</h2>{body}</section>");
     }
     html + "</main></body></html>\n"
+}
+
+/// The objective of the last descent, term by term.
+fn objective(data: &ReportData) -> String {
+    let Some([begin, _]) = data.objective.first() else { return String::new() };
+    // Densities have no zero: all is told as what it fell by.
+    let rows: Vec<Vec<String>> = data
+        .objective
+        .iter()
+        .enumerate()
+        .map(|(number, [before, after])| {
+            let fell = |before: f64, after: f64| format!("{:+.0}", after - before);
+            vec![
+                (number + 1).to_string(),
+                format!("{:.0}", before.total() - begin.total()),
+                fell(before.pixels, after.pixels),
+                fell(before.neighbours, after.neighbours),
+                fell(before.lobes, after.lobes),
+                fell(before.total(), after.total()),
+            ]
+        })
+        .collect();
+    let head = ["step", "objective<small>nats, from the first</small>", "pixels", "neighbours", "lobes", "<b>all</b>"];
+    format!(
+        "<h3>Objective of the last descent</h3><p class=note>The negative logarithm of how likely photos and beliefs are. Each \
+         step makes it less, by the noise and gains learned before it; learning them anew changes what it is from step to \
+         step.</p>{}",
+        tables::table("scores", &head, &rows)
+    )
 }
 
 /// A page inside the page, which can do nothing but draw.

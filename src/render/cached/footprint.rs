@@ -2,7 +2,7 @@
 //!
 //! A pixel is sampled at 4 places, or 64 where those and its corners do not agree (at 16, coverage errs by three per cent: a
 //! hundredth of a picture's root mean square before a black background); or in its middle alone
-//! ([`FootprintSettings::COARSE`]), where photographs are of a real place. Samples on one smooth piece of surface become
+//! ([`FootprintSettings::COARSE`]), for a first look. Samples on one smooth piece of surface become
 //! one shading point: their mean normal and direction, and one list of texels with weights that sum to 1 (the exact mean
 //! of their bilinear lookups). Most pixels have one; edges and silhouettes have several, each with its share. How far the
 //! normals of a piece differ is kept as their variance, which makes its lobe wider.
@@ -99,8 +99,6 @@ pub struct FootprintSettings {
 impl FootprintSettings {
     /// One ray a pixel, through its middle.
     pub const COARSE: FootprintSettings = FootprintSettings { map_size: 512, coarse_side: 1, fine_side: 1 };
-    /// Four rays a pixel: the whole of it, but for shares of edges.
-    pub const WHOLE: FootprintSettings = FootprintSettings { map_size: 512, coarse_side: 2, fine_side: 2 };
 }
 
 impl Default for FootprintSettings {
@@ -182,6 +180,11 @@ impl ViewFootprints {
 
     /// Leaves out all shading points but these, which rise, and what is known of whole pixels.
     pub fn keep_points(&mut self, kept: impl Iterator<Item = usize>) {
+        *self = self.of_points(kept);
+    }
+
+    /// These shading points alone, which rise, without what is known of whole pixels.
+    pub fn of_points(&self, kept: impl Iterator<Item = usize>) -> Self {
         let mut made = ViewFootprints::empty(self.width, self.height);
         for index in kept {
             let point = &self.points[index];
@@ -193,7 +196,7 @@ impl ViewFootprints {
         made.points.shrink_to_fit();
         made.texels.shrink_to_fit();
         made.lit.shrink_to_fit();
-        *self = made;
+        made
     }
 
     /// Leaves out all pixels but one in `step`, scattered evenly.

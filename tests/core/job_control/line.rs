@@ -93,11 +93,11 @@ fn photos_are_given_to_the_solver_unless_something_else_was_asked_for() {
         let settings = suited(scene, None, &[&["--method", "solver"], more].concat());
         (settings.solver_refine, settings.solver_polish, settings.solver_levels, settings.solver_grid)
     };
-    assert_eq!((polish(&linear, &[]), polish(&bytes, &[])), ((0, 0, 2, 256), (1, 0, 3, 128)));
-    assert_eq!(polish(&linear, &["--solver-polish", "5"]), (0, 5, 3, 128));
+    assert_eq!((polish(&linear, &[]), polish(&bytes, &[])), ((1, 0, 2, 256), (1, 0, 2, 256)), "alike");
+    assert_eq!(polish(&linear, &["--solver-polish", "5"]), (1, 5, 2, 256));
     assert_eq!(polish(&bytes, &["--solver-refine", "0"]), (0, 0, 2, 256));
-    assert_eq!(polish(&bytes, &["--solver-levels", "1"]), (1, 0, 1, 128));
-    assert_eq!(polish(&bytes, &["--solver-grid", "256"]), (1, 0, 3, 256));
+    assert_eq!(polish(&bytes, &["--solver-levels", "1"]), (1, 0, 1, 256));
+    assert_eq!(polish(&bytes, &["--solver-grid", "128"]), (1, 0, 2, 128));
 
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("settings.toml");

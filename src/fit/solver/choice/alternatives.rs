@@ -6,10 +6,8 @@
 //! what judges must not have taken part. Without light from other surface lobes stay as they were found with it: they
 //! would be integrated anew otherwise, which is what takes the time.
 
-use super::super::lobe_evidence::LobeBelief;
 use super::super::lobe_prior::LobePrior;
 use super::super::lobe_tree::LobeSharing;
-use super::super::lobe_widths::MOST_NODES;
 use super::super::tile::{Tile, forgiven, least_noise};
 use super::student::StudentNoise;
 use super::{ALTERNATIVES, Alternative};
@@ -17,19 +15,6 @@ use std::time::Instant;
 
 /// A lobe as maps hold it: F0 per channel, logarithm of the width.
 pub type Lobe = [f32; 4];
-
-/// What lobes send of a pixel under the alternatives that regions may choose instead of lobes of their own.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ChosenLobe {
-    /// Index of the observation.
-    pub observation: u32,
-    /// Radiance of the one lobe of the region.
-    pub one: [f32; 3],
-    /// Radiance of F0 0 and the widest lobe.
-    pub none: [f32; 3],
-    /// Radiance of lobes of their own.
-    pub own: [f32; 3],
-}
 
 /// What the alternatives of all tiles are solved with.
 #[derive(Clone, Copy)]
@@ -42,14 +27,10 @@ pub struct TileTerms<'a> {
     pub independence: f64,
     /// What is believed of lobes.
     pub prior: &'a LobePrior,
-    /// Which ways of sharing lobes are looked at.
-    pub lobe_sharing: LobeSharing,
     /// Whether an observation, by its index, takes no part.
     pub is_withheld: &'a (dyn Fn(u32) -> bool + Sync),
     /// The light that reaches an observation directly; `None` where there is no other.
     pub direct: Option<&'a (dyn Fn(u32) -> [f32; 3] + Sync)>,
-    /// Keep what lobes send of the pixels.
-    pub keep_lobes: bool,
 }
 
 /// What the alternatives make of a tile.
@@ -61,13 +42,10 @@ pub struct TileAlternatives {
     pub rho: [Vec<[f32; 3]>; ALTERNATIVES],
     /// The one lobe that all share, and what is believed of it.
     pub one: Lobe,
-    pub(super) one_belief: LobeBelief,
     /// The lobes of their own.
     pub own: Vec<Lobe>,
     /// The noise of each alternative; `None` where nothing could be solved.
     pub noise: Option<[StudentNoise; ALTERNATIVES]>,
-    /// What lobes send of the pixels, where [`TileTerms::keep_lobes`] asks for it.
-    pub chosen_lobes: Vec<ChosenLobe>,
     /// Seconds of one processor that each took here.
     pub seconds: [f64; ALTERNATIVES],
 }
@@ -75,13 +53,11 @@ pub struct TileAlternatives {
 impl TileAlternatives {
     /// Solves the alternatives of a tile that is solved; it is left as it was.
     pub fn of(tile: &mut Tile, terms: &TileTerms) -> Self {
-        let &TileTerms { map_size, mean_radiance, independence, prior, lobe_sharing, is_withheld, direct, keep_lobes } =
-            terms;
+        let &TileTerms { map_size, mean_radiance, independence, prior, is_withheld, direct } = terms;
         let kept: Vec<_> =
             tile.pixels.iter().map(|pixel| (pixel.terms.weight, pixel.terms.arriving, pixel.lobe)).collect();
         let kept_tile = (tile.rho.clone(), tile.lobes.clone(), tile.variance.clone(), tile.one_lobe);
         let kept_numbers = (tile.noise, tile.seconds);
-        let of_own: Vec<[f32; 3]> = tile.pixels.iter().map(|pixel| pixel.lobe).collect();
         let mut made = TileAlternatives { texels: tile.texels.clone(), ..TileAlternatives::default() };
         let mut any_withheld = false;
         for pixel in &mut tile.pixels {
@@ -94,7 +70,6 @@ impl TileAlternatives {
         if tile.pixels.is_empty() {
             return TileAlternatives::default();
         }
-        let mut chosen_lobes = Vec::new();
         let mut noise = [None; ALTERNATIVES];
         // Each begins at the reflectance that the tile was given and is solved as often: reflectance leans on what it
         // was, so that whoever is solved more often would follow the noise of the pixels further.
@@ -112,8 +87,8 @@ impl TileAlternatives {
         if any_withheld {
             tile.solve_diffuse();
             tile.weigh(mean_radiance);
-            tile.solve_lobes(map_size, tile.independence(independence), (prior, lobe_sharing));
-            tile.end(mean_radiance, independence);
+            tile.solve_lobes(map_size, tile.independence(independence), (prior, LobeSharing::THOROUGH));
+            tile.end();
         }
         let withheld_seconds = began.elapsed().as_secs_f64();
         let own: Vec<Lobe> = tile.lobes.iter().map(|lobe| lobe.mean.map(|value| value as f32)).collect();
@@ -131,14 +106,6 @@ impl TileAlternatives {
         tile.lobes.fill(one);
         tile.set_lobes();
         again(tile, Alternative::OneLobe);
-        if keep_lobes {
-            chosen_lobes.extend(tile.pixels.iter().zip(&of_own).map(|(pixel, &own)| ChosenLobe {
-                observation: pixel.observation,
-                one: pixel.lobe,
-                none: pixel.terms.grazing[MOST_NODES - 1],
-                own,
-            }));
-        }
         tile.pixels.iter_mut().for_each(|pixel| pixel.lobe = [0.0; 3]);
         again(tile, Alternative::Diffuse);
 
@@ -148,10 +115,8 @@ impl TileAlternatives {
             (pixel.terms.weight, pixel.lobe, pixel.withheld) = (weight, lobe, false);
         }
         made.seconds[Alternative::OwnLobes.index()] += withheld_seconds;
-        made.chosen_lobes = chosen_lobes;
         made.own = own;
         made.one = one.mean.map(|value| value as f32);
-        made.one_belief = one;
         // What is not solved anew has the noise of the solver's own choice.
         let of_own = noise[Alternative::OwnLobes.index()];
         made.noise = of_own.map(|of_own| noise.map(|noise| noise.unwrap_or(of_own)));

@@ -37,8 +37,7 @@ impl<'a> Check<'a> {
         if !scene.settings.check_choices {
             return None;
         }
-        // No pixel of a held-out view may move a number: where maps take choices over, training views judge.
-        let (views, withheld) = if scene.held_out_pixels.len() >= LEAST_VIEWS && !scene.settings.apply_choices {
+        let (views, withheld) = if scene.held_out_pixels.len() >= LEAST_VIEWS {
             let pixels = scene.held_out.iter().zip(&scene.held_out_pixels);
             (pixels.map(|((_, footprints), pixels)| (footprints, Cow::from(pixels))).collect(), Vec::new())
         } else {
@@ -68,10 +67,8 @@ impl<'a> Check<'a> {
             mean_radiance: scene.observations.mean,
             independence: scene.settings.independence,
             prior: self.prior,
-            lobe_sharing: scene.settings.lobe_sharing,
             is_withheld: &is_withheld,
             direct: has_bounces.then_some(&direct),
-            keep_lobes: scene.settings.apply_choices,
         };
         TileAlternatives::of(tile, &terms)
     }

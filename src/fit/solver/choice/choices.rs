@@ -66,8 +66,6 @@ pub struct Choices {
     pub pixels: u64,
     /// Whether those were training views, withheld from this check only.
     pub are_withheld: bool,
-    /// Whether the maps took over what was chosen.
-    pub are_applied: bool,
     /// Seconds that the check took.
     pub seconds: f64,
 }
@@ -170,7 +168,6 @@ impl Choices {
             views: judgement.views,
             pixels: total.pixels as u64,
             are_withheld,
-            are_applied: false,
             seconds: seconds.alternatives.iter().sum::<f64>() + seconds.judging,
         }
     }

@@ -11,19 +11,15 @@
 //! 4. [`clustered`]: means with standard errors over views, since pixels of one view go together.
 //! 5. [`check`]: which views judge, and the way from tiles to what is chosen. [`choices`]: the outcome, for the report.
 //!
-//! 6. [`apply`]: maps that take over what was chosen, where that is asked for.
-//!
-//! By default no map changes: what is chosen is told, not taken over. Lobes of their own are means over all ways to cut
-//! the surface, weighed by their evidence, so a texel that needs none of its own has one that is nearly its neighbours';
-//! and a region whose pixels no lobe explains better still has a roughness, which nothing but that evidence tells. Taken
-//! over, maps get worse, roughness most of all. Pictures of matte things in photographs may gain all the same: hence
-//! `--solver-choices apply`; training views judge then, so that held-out ones still judge the fit.
+//! No map changes: what is chosen is told, not taken over. Lobes of their own are means over all ways to cut the surface,
+//! weighed by their evidence, so a texel that needs none of its own has one that is nearly its neighbours'; and a region
+//! whose pixels no lobe explains better still has a roughness, which nothing but that evidence tells. Taken over, maps got
+//! worse, roughness most of all.
 //!
 //! It costs two more solutions of diffuse reflectance for each alternative and no lobe's integral but at judging pixels, some
 //! hundredths of the fit. Where views have to be withheld the beliefs about lobes are made once more.
 
 pub mod alternatives;
-pub mod apply;
 pub mod check;
 pub mod choices;
 pub mod clustered;

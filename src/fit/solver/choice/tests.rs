@@ -150,17 +150,9 @@ fn without_held_out_views_some_are_withheld_from_the_check_alone() {
     let (choices, estimate) = judge(&made, settings(), 2);
     let choices = choices.unwrap();
     println!("{choices}");
-    assert!(choices.views == 2 && choices.are_withheld && !choices.are_applied);
+    assert!(choices.views == 2 && choices.are_withheld);
     let none = shares(&choices, |code| code == 1.0);
     assert!(none[0] > 0.9 && none[1] < 0.1, "{none:?}");
     let (_, plain) = judge(&made, SolverSettings { check_choices: false, ..settings() }, 2);
     assert!(plain == estimate, "withheld views take part in the maps");
-    // Where it is asked for, maps take it over: no lobe on the left, one a region on the right.
-    let (choices, applied) = judge(&made, SolverSettings { apply_choices: true, ..settings() }, 2);
-    assert!(choices.unwrap().are_applied);
-    let is_solved = |texel: &usize| applied.is_mapped(*texel);
-    let left: Vec<usize> =
-        (0..SIZE * SIZE).filter(|texel| region_of(*texel, SIZE).is_multiple_of(2)).filter(is_solved).collect();
-    let black = left.iter().filter(|&&texel| applied.texels[texel].specular == [0.0; 3]).count();
-    assert!(black * 10 > left.len() * 9, "{black} of {}", left.len());
 }

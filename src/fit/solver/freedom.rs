@@ -1,0 +1,152 @@
+//! How freely texels may differ: by what predicts photos that took no part.
+//!
+//! The finest texture of a capture, and whether each texel may have a lobe of its own, are no constants: a granite of a
+//! thousand grains asks for another prior than a painted toy, and photos whose cameras are a fraction of a pixel off bear
+//! fewer freedoms out. Noise alone cannot tell, since errors of model, mesh and cameras go together over pixels. So every
+//! fourth view is withheld from a few short descents on a part of the surface, with one [`Freedom`] each, and the one is
+//! taken that predicts those views best (cross-validation; Stone 1974).
+
+use super::descent::{Lit, Sight, Step, conjugate_gradients, difference, stepped};
+use super::estimate::Estimate;
+use super::neighbours::Neighbours;
+use super::objective::Learned;
+use super::pixel_system::{PixelRow, PixelSystem, Rows};
+use super::pixels::Pixels;
+use super::scene::SolverScene;
+use crate::material::Material;
+use std::sync::atomic::AtomicBool;
+
+/// How freely texels may differ.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Freedom {
+    /// Scale of the differences between logarithms of neighbours' diffuse reflectances.
+    pub texture: f32,
+    /// How far a texel's lobe may go from its region's (standard deviations): F0 relative to itself, and twice the logarithm
+    /// of the width.
+    pub lobes: f32,
+}
+
+/// Scales of texture that are looked at, the least free first.
+const TEXTURES: [f32; 2] = [0.5, 4.0];
+/// Freedoms of lobes that are looked at, the least free first; the last one while textures are.
+const LOBES: [f32; 2] = [0.1, 1.0];
+/// Taken where too few views could judge.
+const USUAL: Freedom = Freedom { texture: 1.0, lobes: 0.3 };
+/// One of so many views judges.
+const JUDGE_EVERY: usize = 4;
+/// Fewer views do not judge.
+const LEAST_JUDGES: usize = 2;
+/// Pixels that take part, about, in chunks of neighbours.
+const PIXELS: usize = 1 << 16;
+/// Pixels of a chunk, which lie side by side on the surface.
+const CHUNK: usize = 2048;
+/// Two short steps.
+const STEPS: [Step; 2] = [Step { iterations: 16, moves_widths: false }; 2];
+
+/// What candidates are held against each other with.
+struct Contest<'a> {
+    scene: &'a SolverScene,
+    pixels: Pixels<'a>,
+    sight: Sight,
+    texels: &'a [Material<f32>],
+    shown: &'a [bool],
+    lit: Lit,
+    /// The noise by which all are judged: that of the first.
+    noise: Option<Learned>,
+}
+
+impl SolverScene {
+    /// The freedom that suits a capture, around an estimate's light and these texels, of which pixels show some. `None` when
+    /// `stop` was raised.
+    pub(super) fn choose_freedom(
+        &self,
+        estimate: &Estimate,
+        (texels, shown): (&[Material<f32>], &[bool]),
+        lit: Lit,
+        stop: &AtomicBool,
+    ) -> Option<Freedom> {
+        if (0..self.views.len()).filter(|&view| is_judge(view)).count() < LEAST_JUDGES {
+            return Some(USUAL);
+        }
+        let stride = (self.observations.list.len() / PIXELS).max(1);
+        let pixels = Pixels::sampled(self, CHUNK, stride);
+        let mut system = PixelSystem::new(&pixels, self.settings.map_size);
+        let sight = self.sight(&pixels, &mut system, estimate, texels, lit, stop)?;
+        let mut contest = Contest { scene: self, pixels, sight, texels, shown, lit, noise: None };
+        let mut nats = |candidates: &[Freedom]| -> Option<usize> {
+            let of_all: Option<Vec<Vec<f64>>> =
+                candidates.iter().map(|freedom| contest.nats(&mut system, *freedom, stop)).collect();
+            Some(best(&of_all?))
+        };
+        let [_, free] = LOBES;
+        let texture = TEXTURES[nats(&TEXTURES.map(|texture| Freedom { texture, lobes: free }))?];
+        if lit == Lit::No {
+            return Some(Freedom { texture, lobes: free });
+        }
+        let lobes = LOBES[nats(&LOBES.map(|lobes| Freedom { texture, lobes }))?];
+        Some(Freedom { texture, lobes })
+    }
+}
+
+/// Whether a view judges.
+fn is_judge(view: usize) -> bool {
+    view % JUDGE_EVERY == JUDGE_EVERY - 1
+}
+
+impl Contest<'_> {
+    /// Mean negative logarithm of the density of the judging views' pixels, view by view.
+    fn nats(&mut self, system: &mut PixelSystem, freedom: Freedom, stop: &AtomicBool) -> Option<Vec<f64>> {
+        let Contest { scene, pixels, sight, texels, shown, lit, noise } = self;
+        let beliefs = Neighbours::new(scene.settings.map_size, texels, shown.to_vec(), freedom);
+        let (mut own, mut seen): (Vec<Material<f32>>, Option<Sight>) = (texels.to_vec(), None);
+        let mut learned: Option<Learned> = None;
+        for step in STEPS {
+            let now = seen.as_ref().unwrap_or(sight);
+            let by_now = Learned::of(pixels, now, learned.as_ref());
+            let mut rows: Vec<PixelRow> = by_now.rows(pixels, now);
+            learned = Some(by_now);
+            rows.iter_mut()
+                .enumerate()
+                .filter(|(index, _)| is_judge(pixels.pixel(*index).view as usize))
+                .for_each(|(_, row)| row.weight = 0.0);
+            let rows = Rows { pieces: &now.pieces, pixels: &rows };
+            let way = conjugate_gradients(system, rows, &beliefs.parabola(&own), step, stop)?;
+            let next = stepped(&own, &way, 1.0, *lit);
+            let moved = now.moved(system, &difference(&own, &next));
+            (own, seen) = (next, Some(moved));
+        }
+        let seen = seen.as_ref().unwrap_or(sight);
+        // Each with its own gains, all by the noise of the first.
+        let learned = Learned::of(pixels, seen, learned.as_ref());
+        let by = learned.with_noise_of(noise.as_ref().unwrap_or(&learned));
+        let mut sums = vec![(0.0f64, 0.0f64); pixels.views()];
+        for index in 0..pixels.whole() {
+            let view = pixels.pixel(index).view as usize;
+            if is_judge(view) {
+                sums[view] = (sums[view].0 + by.nats(pixels, seen, index), sums[view].1 + 1.0);
+            }
+        }
+        noise.get_or_insert(learned);
+        Some(sums.into_iter().filter(|sum| sum.1 > 0.0).map(|(sum, count)| sum / count).collect())
+    }
+}
+
+/// The candidate that predicts judging views best: least mean of nats, which are given view by view; the least free of
+/// equals.
+fn best(nats: &[Vec<f64>]) -> usize {
+    let mean = |own: &usize| nats[*own].iter().sum::<f64>() / nats[*own].len().max(1) as f64;
+    (0..nats.len()).min_by(|a, b| mean(a).total_cmp(&mean(b))).unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_one_that_predicts_best_is_taken() {
+        let (good, bad) = (vec![1.0, 2.0, 3.0], vec![1.0, 2.5, 3.0]);
+        assert_eq!(best(&[bad.clone(), good.clone(), good.clone()]), 1);
+        assert_eq!(best(&[good, bad]), 0);
+        assert_eq!(best(&[]), 0);
+    }
+}

@@ -1,0 +1,353 @@
+//! What neighbouring texels are believed to have in common, and lobes with what was found of their region.
+//!
+//! Materials change at few places: differences of logarithms between neighbours have Cauchy's distribution, a small scale
+//! with heavy tails. What no pixel tells apart is smooth then, and edges stay. Its negative logarithm is replaced by the
+//! parabola that touches it from above (majorisation; Hunter and Lange 2004), so that a step that makes the parabola less
+//! makes the objective less.
+
+use super::freedom::Freedom;
+use super::pixel_system::Lanes;
+use crate::material::Material;
+use rayon::prelude::*;
+
+/// Scale of the differences of neighbours' F0, by their logarithms, and of the logarithms of their widths.
+const OF_LOBES: f32 = 0.1;
+/// Texels that one partial sum goes over: sums are the same whatever the number of threads.
+const CHUNK: usize = 1 << 14;
+/// Lanes that differ together: diffuse reflectance, F0, logarithm of the width.
+const GROUPS: [std::ops::Range<usize>; 3] = [0..3, 3..6, 6..7];
+
+/// What is believed of the texels of square maps.
+pub struct Neighbours {
+    size: usize,
+    /// Texels that pixels show: the others are not solved for.
+    shown: Vec<bool>,
+    /// Scale of the differences of neighbours, group by group, of logarithms.
+    scales: [f32; 3],
+    /// What is added to reflectances under the logarithm, diffuse and specular: darker than this all is equally dark.
+    dark: [f32; 2],
+    /// What was found of a texel's region: F0 and logarithm of the width.
+    centre: Vec<[f32; 4]>,
+    /// Standard deviation of a texel's lobe from its region's: of F0 relative to itself, of the logarithm of the width.
+    spread: [f32; 2],
+}
+
+/// The parabola that touches the beliefs from above.
+pub struct Parabola<'a> {
+    of: &'a Neighbours,
+    /// Slope at the place it touches.
+    slope: Vec<Lanes>,
+    /// What a step in each lane is in logarithms.
+    relative: Vec<Lanes>,
+    /// Weight of the difference to the right and to the lower neighbour, group by group; 0 where there is none.
+    weights: Vec<[[f32; 3]; 2]>,
+}
+
+impl Neighbours {
+    /// Beliefs about texels around `start`, of which pixels show those, that may differ so freely.
+    pub fn new(size: usize, start: &[Material<f32>], shown: Vec<bool>, freedom: Freedom) -> Self {
+        let seen = start.iter().zip(&shown).filter(|(_, shown)| **shown);
+        let (mut sum, mut count) = (0.0f64, 0.0f64);
+        for (texel, _) in seen {
+            sum += f64::from(texel.diffuse.iter().sum::<f32>()) / 3.0;
+            count += 1.0;
+        }
+        let mean = (sum / f64::max(count, 1.0)) as f32;
+        let centre = start.iter().map(|own| [own.specular[0], own.specular[1], own.specular[2], own.log_width]);
+        let dark = [(DARK[0] * mean).max(1e-6), DARK[1]];
+        Neighbours {
+            size,
+            shown,
+            scales: [freedom.texture, OF_LOBES, OF_LOBES],
+            dark,
+            centre: centre.collect(),
+            spread: [freedom.lobes, 0.5 * freedom.lobes],
+        }
+    }
+
+    /// The texel to the right and the one below, where pixels show both.
+    fn pairs_of(&self, texel: usize) -> [Option<usize>; 2] {
+        let (row, column) = (texel / self.size, texel % self.size);
+        let both = |other: usize| self.shown[texel] && self.shown[other];
+        [
+            (column + 1 < self.size).then_some(texel + 1).filter(|&other| both(other)),
+            (row + 1 < self.size).then_some(texel + self.size).filter(|&other| both(other)),
+        ]
+    }
+
+    /// Numbers that are compared: logarithms.
+    #[inline]
+    fn logarithms(&self, texel: &Material<f32>) -> [f32; 7] {
+        let mut made = texel.to_array();
+        for (lane, value) in made.iter_mut().enumerate().take(6) {
+            *value = (*value + self.dark[lane / 3]).max(1e-9).ln();
+        }
+        made
+    }
+
+    /// Squares of differences over the squares of scales, group by group.
+    #[inline]
+    fn squares(&self, one: &[f32; 7], other: &[f32; 7]) -> [f32; 3] {
+        std::array::from_fn(|group| {
+            let square: f32 = GROUPS[group].clone().map(|lane| (one[lane] - other[lane]).powi(2)).sum();
+            square / (self.scales[group] * self.scales[group])
+        })
+    }
+
+    /// Negative logarithm of the densities, constants left out: of differences between neighbours, and of lobes in their
+    /// regions. In nats.
+    pub fn energies(&self, texels: &[Material<f32>]) -> [f64; 2] {
+        let logarithms: Vec<[f32; 7]> = texels.par_iter().map(|texel| self.logarithms(texel)).collect();
+        let of_chunk = |(which, chunk): (usize, &[Material<f32>])| {
+            let mut sums = [0.0f64; 2];
+            for (offset, texel) in chunk.iter().enumerate() {
+                let own = which * CHUNK + offset;
+                if !self.shown[own] {
+                    continue;
+                }
+                for other in self.pairs_of(own).into_iter().flatten() {
+                    let squares = self.squares(&logarithms[own], &logarithms[other]);
+                    sums[0] += squares
+                        .iter()
+                        .zip(DIMENSIONS)
+                        .map(|(square, n)| power(n) * f64::from(square.ln_1p()))
+                        .sum::<f64>();
+                }
+                let away = self.away(own, texel);
+                sums[1] += 0.5 * away.iter().map(|away| f64::from(away * away)).sum::<f64>();
+            }
+            sums
+        };
+        let sums: Vec<[f64; 2]> = texels.par_chunks(CHUNK).enumerate().map(of_chunk).collect();
+        sums.into_iter().fold([0.0; 2], |total, sum| [total[0] + sum[0], total[1] + sum[1]])
+    }
+
+    /// How far a lobe is from its region's, in standard deviations.
+    #[inline]
+    fn away(&self, texel: usize, own: &Material<f32>) -> [f32; 4] {
+        let centre = &self.centre[texel];
+        let specular = |c: usize| (own.specular[c] - centre[c]) * self.stiffness(texel, c);
+        [specular(0), specular(1), specular(2), (own.log_width - centre[3]) * self.stiffness(texel, 3)]
+    }
+
+    /// One over the standard deviation of a number of a lobe.
+    #[inline]
+    fn stiffness(&self, texel: usize, number: usize) -> f32 {
+        match number {
+            3 => 1.0 / self.spread[1],
+            c => 1.0 / (self.spread[0] * (self.centre[texel][c] + self.dark[1])),
+        }
+    }
+
+    /// The parabola that touches at these texels.
+    pub fn parabola(&self, texels: &[Material<f32>]) -> Parabola<'_> {
+        let logarithms: Vec<[f32; 7]> = texels.par_iter().map(|texel| self.logarithms(texel)).collect();
+        let relative: Vec<Lanes> = texels
+            .par_iter()
+            .map(|texel| {
+                let own = texel.to_array();
+                std::array::from_fn(|lane| match lane {
+                    0..6 => 1.0 / (own[lane] + self.dark[lane / 3]).max(1e-9),
+                    6 => 1.0,
+                    _ => 0.0,
+                })
+            })
+            .collect();
+        let weights: Vec<[[f32; 3]; 2]> = (0..texels.len())
+            .into_par_iter()
+            .map(|own| {
+                self.pairs_of(own).map(|other| {
+                    let Some(other) = other else { return [0.0; 3] };
+                    let squares = self.squares(&logarithms[own], &logarithms[other]);
+                    std::array::from_fn(|group| {
+                        let weight = 2.0 * power(DIMENSIONS[group]) as f32 / (1.0 + squares[group]);
+                        weight / (self.scales[group] * self.scales[group])
+                    })
+                })
+            })
+            .collect();
+        let mut made = Parabola { of: self, slope: Vec::new(), relative, weights };
+        let mut slope = vec![[0.0f32; 8]; texels.len()];
+        made.add_differences(&|texel, lane| if lane < 7 { logarithms[texel][lane] } else { 0.0 }, &mut slope);
+        slope.par_iter_mut().enumerate().filter(|(texel, _)| self.shown[*texel]).for_each(|(texel, slope)| {
+            let away = self.away(texel, &texels[texel]);
+            (0..4).for_each(|number| slope[3 + number] += away[number] * self.stiffness(texel, number));
+        });
+        made.slope = slope;
+        made
+    }
+}
+
+/// Shares of the mean diffuse reflectance, and F0, below which all is equally dark.
+const DARK: [f32; 2] = [0.05, 0.02];
+/// Lanes of each group.
+const DIMENSIONS: [f64; 3] = [3.0, 3.0, 1.0];
+
+/// Cauchy's power in so many dimensions.
+fn power(dimensions: f64) -> f64 {
+    0.5 * (1.0 + dimensions)
+}
+
+impl Parabola<'_> {
+    /// Slope at the place it touches.
+    pub fn slope(&self) -> &[Lanes] {
+        &self.slope
+    }
+
+    /// Adds the curvature times a step.
+    pub fn add_product(&self, step: &[Lanes], product: &mut [Lanes]) {
+        self.add_differences(&|texel, lane| self.relative[texel][lane] * step[texel][lane], product);
+        product.par_iter_mut().enumerate().filter(|(texel, _)| self.of.shown[*texel]).for_each(|(texel, product)| {
+            for number in 0..4 {
+                product[3 + number] += self.of.stiffness(texel, number).powi(2) * step[texel][3 + number];
+            }
+        });
+    }
+
+    /// Adds, to each texel, weights times differences of `value` to its four neighbours, times what a step is in logarithms.
+    fn add_differences(&self, value: &(dyn Fn(usize, usize) -> f32 + Sync), sums: &mut [Lanes]) {
+        let size = self.of.size;
+        sums.par_iter_mut().enumerate().filter(|(texel, _)| self.of.shown[*texel]).for_each(|(texel, sum)| {
+            let relative = &self.relative[texel];
+            self.for_neighbours(texel, size, |other, weights| {
+                for (group, lanes) in GROUPS.into_iter().enumerate() {
+                    for lane in lanes {
+                        sum[lane] += relative[lane] * weights[group] * (value(texel, lane) - value(other, lane));
+                    }
+                }
+            });
+        });
+    }
+
+    /// The four neighbours of a texel with the weights of their differences.
+    #[inline]
+    fn for_neighbours(&self, texel: usize, size: usize, mut visit: impl FnMut(usize, &[f32; 3])) {
+        let [right, below] = &self.weights[texel];
+        let known = [
+            (right[0] > 0.0).then(|| (texel + 1, right)),
+            (below[0] > 0.0).then(|| (texel + size, below)),
+            (!texel.is_multiple_of(size)).then(|| (texel - 1, &self.weights[texel - 1][0])),
+            (texel >= size).then(|| (texel - size, &self.weights[texel - size][1])),
+        ];
+        for (other, weights) in known.into_iter().flatten().filter(|(_, weights)| weights[0] > 0.0) {
+            visit(other, weights);
+        }
+    }
+
+    /// Diagonal of the curvature of a texel.
+    pub fn diagonal(&self, texel: usize) -> Lanes {
+        let mut sum = [0.0f32; 3];
+        self.for_neighbours(texel, self.of.size, |_, weights| (0..3).for_each(|group| sum[group] += weights[group]));
+        let relative = &self.relative[texel];
+        std::array::from_fn(|lane| {
+            let of_lobe = if (3..7).contains(&lane) { self.of.stiffness(texel, lane - 3).powi(2) } else { 0.0 };
+            if lane < 7 { sum[lane / 3] * relative[lane] * relative[lane] + of_lobe } else { 0.0 }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::SequentialRandom;
+
+    const SIZE: usize = 8;
+    const FREEDOM: Freedom = Freedom { texture: 1.0, lobes: 1.0 };
+
+    fn made_up() -> (Vec<Material<f32>>, Neighbours) {
+        let mut random = SequentialRandom::new(3);
+        let mut texel = || {
+            Material::from_array(std::array::from_fn(|lane| {
+                let value = random.next_number();
+                if lane < 6 { 0.05 + 0.6 * value } else { -value }
+            }))
+        };
+        let (texels, start): (Vec<_>, Vec<_>) = (0..SIZE * SIZE).map(|_| (texel(), texel())).unzip();
+        let shown = (0..SIZE * SIZE).map(|texel| texel % 11 != 5).collect();
+        let beliefs =
+            Neighbours { scales: [0.5, 0.2, 0.3], spread: [0.3, 0.2], ..Neighbours::new(SIZE, &start, shown, FREEDOM) };
+        (texels, beliefs)
+    }
+
+    fn total(beliefs: &Neighbours, texels: &[Material<f32>]) -> f64 {
+        beliefs.energies(texels).iter().sum()
+    }
+
+    #[test]
+    fn the_slope_is_that_of_the_energies() {
+        let (texels, beliefs) = made_up();
+        let parabola = beliefs.parabola(&texels);
+        for texel in (0..SIZE * SIZE).step_by(5) {
+            for lane in 0..7 {
+                let at = |step: f32| {
+                    let mut moved = texels.clone();
+                    let mut own = moved[texel].to_array();
+                    own[lane] += step;
+                    moved[texel] = Material::from_array(own);
+                    total(&beliefs, &moved)
+                };
+                let slope = (at(1e-3) - at(-1e-3)) / 2e-3;
+                let found = f64::from(parabola.slope()[texel][lane]);
+                assert!((found - slope).abs() < 0.02 * (slope.abs() + 1.0), "{texel} {lane}: {found} {slope}");
+            }
+        }
+    }
+
+    /// In logarithms of reflectances and widths, which the curvature is of.
+    #[test]
+    fn the_parabola_touches_and_lies_above() {
+        let (texels, beliefs) = made_up();
+        let parabola = beliefs.parabola(&texels);
+        let here = total(&beliefs, &texels);
+        let mut random = SequentialRandom::new(8);
+        for _ in 0..40 {
+            let reach = 0.05 * random.next_number();
+            let steps: Vec<Lanes> = texels
+                .iter()
+                .map(|_| std::array::from_fn(|lane| if lane < 7 { reach * (random.next_number() - 0.5) } else { 0.0 }))
+                .collect();
+            let moved: Vec<Material<f32>> = texels
+                .iter()
+                .zip(&steps)
+                .map(|(texel, step)| {
+                    let own = texel.to_array();
+                    Material::from_array(std::array::from_fn(|lane| own[lane] + step[lane]))
+                })
+                .collect();
+            let mut product = vec![[0.0; 8]; texels.len()];
+            parabola.add_product(&steps, &mut product);
+            let along = |of: &[Lanes]| -> f64 {
+                steps.iter().flatten().zip(of.iter().flatten()).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
+            };
+            let above = here + along(parabola.slope()) + 0.5 * along(&product);
+            let there = total(&beliefs, &moved);
+            // The logarithm's own bend is small beside the parabola's.
+            assert!(there < above + 0.02 * (above - here).abs() + 1e-3, "{there} {above} {here}");
+            let curvature: f64 = steps
+                .iter()
+                .enumerate()
+                .map(|(texel, step)| -> f64 {
+                    let diagonal = parabola.diagonal(texel);
+                    (0..7).map(|lane| f64::from(diagonal[lane] * step[lane] * step[lane])).sum()
+                })
+                .sum();
+            assert!(along(&product) <= 2.0 * curvature, "{} {curvature}", along(&product));
+        }
+    }
+
+    #[test]
+    fn edges_between_materials_cost_little_more_when_they_are_sharper() {
+        let (mut texels, _) = made_up();
+        let flat = Material { diffuse: [0.3; 3], specular: [0.04; 3], log_width: -0.5 };
+        texels.fill(flat);
+        let free = Neighbours::new(SIZE, &texels, vec![true; SIZE * SIZE], FREEDOM);
+        let beliefs = Neighbours { scales: [0.1; 3], spread: [10.0; 2], ..free };
+        let step = |ratio: f32| {
+            let mut texels = texels.clone();
+            texels[..SIZE * SIZE / 2].iter_mut().for_each(|texel| texel.diffuse = [0.3 * ratio; 3]);
+            total(&beliefs, &texels)
+        };
+        assert_eq!(step(1.0), 0.0);
+        assert!(step(1.1) > 0.0 && step(4.0) < 2.0 * step(2.0), "{} {} {}", step(1.1), step(2.0), step(4.0));
+    }
+}

@@ -1,0 +1,188 @@
+//! The last step of the solver, and the bake without a light: the [descent](super::descent) from whole pixels.
+//!
+//! With a light and without one the same objective is made less from the same pixels with the same texels. So what the light
+//! bought can be read from the two.
+
+use super::descent::{Descended, Lit};
+use super::estimate::{Estimate, START_TEXEL, TexelVariance};
+use super::report::{StepReport, median};
+use super::scene::SolverScene;
+use crate::material::Material;
+use std::sync::atomic::AtomicBool;
+
+/// Standard deviations of a lobe that was taken over from its neighbourhood: of F0, and of the logarithm of the width.
+const LOBE_TAKEN_OVER: [f32; 2] = [0.1, 0.5];
+/// Largest standard deviation of a reflectance in [0, 1] of which nothing is known.
+const MOST_DEVIATION: f32 = 0.3;
+
+impl SolverScene {
+    /// The bake: one colour a texel, no light. `None` when `stop` was raised.
+    pub fn bake(&self, stop: &AtomicBool) -> Option<Descended> {
+        let grey = Material { diffuse: [self.observations.mean; 3], ..START_TEXEL };
+        let start = vec![grey; self.settings.map_size * self.settings.map_size];
+        self.descend(&Estimate::default(), start, Lit::No, stop)
+    }
+
+    /// Goes down the objective over all texels, under the light that was found. `None` when `stop` was raised: nothing was
+    /// changed then.
+    pub fn refine(&self, estimate: &mut Estimate, stop: &AtomicBool) -> Option<StepReport> {
+        let found = self.descend(estimate, estimate.texels.clone(), Lit::Yes, stop)?;
+        if self.settings.exposure {
+            for (log_gain, gain) in estimate.log_gains.iter_mut().zip(&found.learned.gains) {
+                *log_gain = gain.iter().map(|gain| gain.ln()).sum::<f32>() / 3.0;
+            }
+        }
+        for (known, precision) in estimate.variances.iter_mut().zip(&found.precision) {
+            if precision[0] <= 0.0 {
+                // What no pixel shows takes over what its neighbours have.
+                *known = TexelVariance::default();
+                continue;
+            }
+            let of_pixels = [0, 1, 2].map(|c| 1.0 / (self.settings.independence as f32 * precision[c]).max(1e-12));
+            if known.is_solved() {
+                // What errs in common over many pixels, as coarser maps knew it, is not made less by more of them.
+                known.variance.diffuse.iter_mut().zip(of_pixels).for_each(|(own, more)| *own += more);
+            } else {
+                let [specular, log_width] = LOBE_TAKEN_OVER.map(|deviation| deviation * deviation);
+                let diffuse = of_pixels.map(|variance| variance.min(MOST_DEVIATION * MOST_DEVIATION));
+                let variance = Material { diffuse, specular: [specular; 3], log_width };
+                *known = TexelVariance { variance, lobe_cluster_size: 1.0 };
+            }
+        }
+        estimate.texels.clone_from(&found.texels);
+        self.fill_from_neighbours(estimate);
+        let view_errors = found.errors.of_views(&self.views);
+        let mut errors: Vec<f32> = view_errors.iter().map(|(_, rmse)| *rmse).collect();
+        Some(StepReport {
+            residual: median(&mut errors),
+            squared_error: found.errors.mean(),
+            blocks: self.observations.list.len(),
+            view_errors,
+            descent: found.steps,
+            ..StepReport::default()
+        })
+    }
+}
+
+#[cfg(all(test, feature = "cli"))]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::super::SolverSettings;
+    use super::super::pixel_system::PixelSystem;
+    use super::super::pixels::Pixels;
+    use super::super::solver::Solver;
+    use super::*;
+    use crate::core_tests::hard_scenes::bowl_of_plaster;
+    use crate::light::Environment;
+    use crate::math::random::SequentialRandom;
+    use crate::render::Surface;
+    use glam::Vec3;
+
+    const SIZE: usize = 64;
+
+    /// A bowl whose photos are what the cache makes of a surface of patches under gains, and one pixel in fifty is wrong.
+    fn photographed(gains: impl Fn(usize) -> [f32; 3]) -> (Solver, Vec<Material<f32>>) {
+        let scene = bowl_of_plaster(SIZE);
+        let surface = Surface::new(scene.mesh.clone()).unwrap();
+        let settings = SolverSettings { map_size: SIZE, grid: SIZE, light_size: (32, 16), ..SolverSettings::default() };
+        let light = Environment::constant(32, 16, Vec3::new(0.8, 1.0, 1.2));
+        let mut solver = Solver::new(&scene, &surface, settings, Some(&light)).unwrap();
+        let truth: Vec<Material<f32>> = (0..SIZE * SIZE)
+            .map(|texel| {
+                let patch = (texel / SIZE / 8 + texel % SIZE / 8) % 2;
+                let diffuse = [[0.2, 0.3, 0.1], [0.5, 0.4, 0.6]][patch];
+                Material { diffuse, specular: [0.04; 3], log_width: -0.5 }
+            })
+            .collect();
+        solver.estimate.texels.clone_from(&truth);
+        let (radiance, whole) = {
+            let pixels = Pixels::of(&solver.scene);
+            let mut system = PixelSystem::new(&pixels, SIZE);
+            let never = AtomicBool::new(false);
+            let sight = solver.scene.sight(&pixels, &mut system, &solver.estimate, &truth, Lit::Yes, &never);
+            (sight.unwrap().radiance, pixels.whole())
+        };
+        let mut random = SequentialRandom::new(7);
+        let mut photo = |index: usize, view: u32| {
+            let (gain, noise) = (gains(view as usize), 1.0 + 0.002 * random.next_normal());
+            let wrong = if index.is_multiple_of(50) { 2.0 } else { 1.0 };
+            [0, 1, 2].map(|c| wrong * noise * gain[c] * radiance[index][c])
+        };
+        for (index, own) in solver.scene.observations.list.iter_mut().enumerate() {
+            own.radiance = photo(index, own.view);
+        }
+        let mut edges: Vec<_> = solver.scene.edges.iter_mut().flat_map(|view| &mut view.pixels).collect();
+        edges.sort_by_key(|own| (own.texel, own.view, own.first));
+        assert!(edges.len() > 20, "{}", edges.len());
+        for (index, own) in edges.into_iter().enumerate() {
+            own.radiance = photo(whole + index, own.view);
+        }
+        (solver, truth)
+    }
+
+    /// Root mean square of the difference of diffuse reflectance, relative to the truth, over texels that pixels show.
+    fn error(solver: &Solver, found: &Descended, factor: [f32; 3], truth: &[Material<f32>]) -> f64 {
+        let well =
+            |texel: &usize| found.precision[*texel][0] > 0.0 && solver.scene.observations.range(*texel).len() > 3;
+        let (mut sum, mut count) = (0.0, 0.0);
+        for texel in (0..truth.len()).filter(well) {
+            for c in 0..3 {
+                let own = found.texels[texel].diffuse[c] / factor[c];
+                sum += f64::from(own / truth[texel].diffuse[c] - 1.0).powi(2);
+                count += 1.0;
+            }
+        }
+        assert!(count > 500.0, "{count}");
+        f64::sqrt(sum / count)
+    }
+
+    fn grey(solver: &mut Solver) {
+        solver.estimate.texels.iter_mut().for_each(|texel| texel.diffuse = [0.4; 3]);
+    }
+
+    #[test]
+    fn reflectance_and_gains_are_found_beside_pixels_that_are_wrong() {
+        // What differs is large beside what the model's errors have in common, so that hardly any of it is shrunk.
+        let gains = |view: usize| [1.3f32, 0.8, 1.0].map(|gain| if view < 3 { gain } else { 1.0 });
+        let (mut solver, truth) = photographed(gains);
+        grey(&mut solver);
+        let never = AtomicBool::new(false);
+        let Solver { scene, estimate } = &solver;
+        let found = scene.descend(estimate, estimate.texels.clone(), Lit::Yes, &never).unwrap();
+        // Each step makes the objective less, the first ones by much.
+        for [before, after] in &found.steps {
+            assert!(after.total() < before.total(), "{before:?} {after:?}");
+        }
+        let [before, after] = found.steps[0];
+        assert!(after.pixels < before.pixels - 100.0, "{before:?} {after:?}");
+        // Gains have mean one over the views, and what that leaves is a factor of all reflectances.
+        let found_gains = &found.learned.gains;
+        for c in 0..3 {
+            let ratio = found_gains[0][c] / found_gains[7][c];
+            assert!((ratio / gains(0)[c] - 1.0).abs() < 0.02, "{found_gains:?}");
+        }
+        let factor = [0, 1, 2].map(|c| gains(7)[c] / found_gains[7][c]);
+        let off = error(&solver, &found, factor, &truth);
+        assert!(off < 0.03, "{off}");
+        // The same by the step, which begins at what it knows.
+        let before = solver.estimate.texels.clone();
+        let Solver { scene, estimate } = &mut solver;
+        let report = scene.refine(estimate, &never).unwrap();
+        assert!(report.squared_error > 0.0 && estimate.texels != before && report.descent.len() == found.steps.len());
+        assert!(scene.refine(&mut estimate.clone(), &AtomicBool::new(true)).is_none());
+    }
+
+    #[test]
+    fn with_light_pixels_are_explained_no_worse_than_by_a_texture_alone() {
+        let (mut solver, _) = photographed(|_| [1.0; 3]);
+        grey(&mut solver);
+        let never = AtomicBool::new(false);
+        let Solver { scene, estimate } = &solver;
+        let texture = scene.bake(&never).unwrap();
+        let lit = scene.descend(estimate, estimate.texels.clone(), Lit::Yes, &never).unwrap();
+        let of = |found: &Descended| found.errors.mean();
+        assert!(of(&lit) < of(&texture), "{} {}", of(&lit), of(&texture));
+        let (lit, texture) = (lit.learned.noise.deviation(0.3), texture.learned.noise.deviation(0.3));
+        assert!(lit < texture, "{lit} {texture}");
+    }
+}
