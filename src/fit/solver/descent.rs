@@ -16,6 +16,7 @@ use crate::material::Material;
 use crate::render::cached::lobe_sum::lobe_with_derivative;
 use crate::render::cached::{CachedTransport, SeenLight};
 use rayon::prelude::*;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Observations whose lobes are integrated together, sorted by the points of the grid that serve them.
@@ -56,17 +57,23 @@ pub enum Lit {
 /// What pixels see of an estimate.
 pub struct Sight {
     /// The equations of pieces around it, times their shares.
-    pub pieces: Vec<PieceRow>,
+    pub pieces: Arc<Vec<PieceRow>>,
     /// Radiance of each pixel, without the photo's gain.
     pub radiance: Vec<[f32; 3]>,
 }
 
 impl Sight {
+    /// What some of the pixels see.
+    pub(super) fn of_some(&self, pixels: &Pixels, taken: &[usize]) -> Self {
+        let pieces = taken.iter().flat_map(|&index| &self.pieces[pixels.pieces(index)]).copied().collect();
+        Sight { pieces: Arc::new(pieces), radiance: taken.iter().map(|&index| self.radiance[index]).collect() }
+    }
+
     /// What pixels see after texels went this far, by the equations around where they were.
     pub(super) fn moved(&self, system: &mut PixelSystem, by: &[Lanes]) -> Self {
         let sent = system.sent(&self.pieces, by);
         let radiance = self.radiance.iter().zip(sent).map(|(own, more)| [0, 1, 2].map(|c| own[c] + more[c]));
-        Sight { pieces: self.pieces.clone(), radiance: radiance.collect() }
+        Sight { pieces: Arc::clone(&self.pieces), radiance: radiance.collect() }
     }
 }
 
@@ -97,10 +104,10 @@ impl SolverScene {
     ) -> Option<Sight> {
         let lanes: Vec<Lanes> = texels.par_iter().map(lanes_of).collect();
         let means = system.means(&lanes);
-        let planes = self.transport.basis.planes(&estimate.light);
-        let at_points = (lit == Lit::Yes).then(|| {
-            let reflectance = self.transport.reflectance_of_points(texels, self.settings.map_size);
-            self.transport.point_light(&planes, &reflectance)
+        let light = (lit == Lit::Yes).then(|| {
+            let planes = self.transport.basis.planes(&estimate.light);
+            let at_points = self.point_light(texels, &planes);
+            (planes, at_points)
         });
         let count = pixels.count();
         let chunks: Vec<(Vec<PieceRow>, Vec<[f32; 3]>)> = (0..count.div_ceil(TOGETHER))
@@ -124,13 +131,13 @@ impl SolverScene {
                     let index = pixels.pieces(pixel).start + which;
                     let (row, mean) = (&mut rows[index - first], &means[index]);
                     let radiance = &mut radiance[pixel - range.start];
-                    let Some(at_points) = &at_points else {
+                    let Some((planes, at_points)) = &light else {
                         row.arriving = [point.share; 3];
                         (0..3).for_each(|c| radiance[c] += point.share * mean[c]);
                         continue;
                     };
                     let arriving = CachedTransport::interpolate(&at_points.arriving, footprints, point);
-                    let place = self.transport.lobe_place(point, &planes, at_points, seen);
+                    let place = self.transport.lobe_place(point, planes, at_points, seen);
                     let sums = lobe_with_derivative(&self.transport.basis, &place, mean[6].exp());
                     for c in 0..3 {
                         let sent = arriving[c] * mean[c] + mean[3 + c] * sums.base[c] + sums.grazing[c];
@@ -147,7 +154,7 @@ impl SolverScene {
             return None;
         }
         let (pieces, radiance): (Vec<_>, Vec<_>) = chunks.into_iter().unzip();
-        Some(Sight { pieces: pieces.concat(), radiance: radiance.concat() })
+        Some(Sight { pieces: Arc::new(pieces.concat()), radiance: radiance.concat() })
     }
 
     /// Goes down from `estimate`'s texels. `None` when `stop` was raised.
@@ -163,9 +170,10 @@ impl SolverScene {
         let mut texels = start;
         let mut sight = self.sight(&pixels, &mut system, estimate, &texels, lit, stop)?;
         let mut learned = Learned::of(&pixels, &sight, None);
-        let shown = system.diagonal(Rows { pieces: &sight.pieces, pixels: &learned.rows(&pixels, &sight) });
-        let shown: Vec<bool> = shown.iter().map(|diagonal| diagonal[0] > 0.0).collect();
-        let freedom = self.choose_freedom(estimate, (&texels, &shown), lit, stop)?;
+        let mut rows = learned.rows(&pixels, &sight);
+        let diagonal = system.diagonal(Rows { pieces: &sight.pieces, pixels: &rows });
+        let shown: Vec<bool> = diagonal.iter().map(|diagonal| diagonal[0] > 0.0).collect();
+        let freedom = self.choose_freedom(&pixels, &sight, (&texels, &shown), lit, stop)?;
         let beliefs = Neighbours::new(self.settings.map_size, &texels, shown, freedom);
         let mut steps = Vec::new();
         let mut is_exact = true;
@@ -175,12 +183,12 @@ impl SolverScene {
             }
             if number > 0 {
                 learned = Learned::of(&pixels, &sight, Some(&learned));
+                rows = learned.rows(&pixels, &sight);
             }
-            let rows = learned.rows(&pixels, &sight);
             let before = learned.objective(&pixels, &sight, beliefs.energies(&texels));
             let parabola = beliefs.parabola(&texels);
-            let rows = Rows { pieces: &sight.pieces, pixels: &rows };
-            let way = conjugate_gradients(&mut system, rows, &parabola, step, stop)?;
+            let equations = Rows { pieces: &sight.pieces, pixels: &rows };
+            let way = conjugate_gradients(&mut system, equations, &parabola, step, stop)?;
             let (mut share, mut after) = (1.0f32, before);
             for _ in 0..=HALVINGS {
                 let next = stepped(&texels, &way, share, lit);
@@ -198,7 +206,7 @@ impl SolverScene {
             }
             steps.push([before, after]);
         }
-        let rows = learned.rows(&pixels, &sight);
+        rows = learned.rows(&pixels, &sight);
         let precision = system.diagonal(Rows { pieces: &sight.pieces, pixels: &rows });
         let mut errors = ErrorSums::new(self.views.len());
         for (index, row) in rows.iter().enumerate().filter(|(_, row)| row.weight > 0.0) {

@@ -68,16 +68,6 @@ impl Estimate {
         }
     }
 
-    /// Diffuse reflectance of all texels.
-    pub fn diffuse(&self) -> Vec<[f32; 3]> {
-        self.texels.iter().map(|texel| texel.diffuse).collect()
-    }
-
-    /// Takes over diffuse reflectances of all texels.
-    pub fn set_diffuse(&mut self, rho: &[[f32; 3]]) {
-        self.texels.iter_mut().zip(rho).for_each(|(texel, rho)| texel.diffuse = *rho);
-    }
-
     /// Whether a texel was solved for when maps were made, better than any block of a round on the light is.
     #[inline]
     pub fn is_mapped(&self, texel: usize) -> bool {

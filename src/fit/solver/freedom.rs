@@ -7,7 +7,6 @@
 //! taken that predicts those views best (cross-validation; Stone 1974).
 
 use super::descent::{Lit, Sight, Step, conjugate_gradients, difference, stepped};
-use super::estimate::Estimate;
 use super::neighbours::Neighbours;
 use super::objective::Learned;
 use super::pixel_system::{PixelRow, PixelSystem, Rows};
@@ -46,6 +45,7 @@ const STEPS: [Step; 2] = [Step { iterations: 16, moves_widths: false }; 2];
 /// What candidates are held against each other with.
 struct Contest<'a> {
     scene: &'a SolverScene,
+    /// A share of the pixels, and what they see.
     pixels: Pixels<'a>,
     sight: Sight,
     texels: &'a [Material<f32>],
@@ -56,11 +56,12 @@ struct Contest<'a> {
 }
 
 impl SolverScene {
-    /// The freedom that suits a capture, around an estimate's light and these texels, of which pixels show some. `None` when
-    /// `stop` was raised.
+    /// The freedom that suits a capture, around these texels, of which pixels show some, and what pixels see of them. `None`
+    /// when `stop` was raised.
     pub(super) fn choose_freedom(
         &self,
-        estimate: &Estimate,
+        pixels: &Pixels,
+        sight: &Sight,
         (texels, shown): (&[Material<f32>], &[bool]),
         lit: Lit,
         stop: &AtomicBool,
@@ -69,21 +70,20 @@ impl SolverScene {
             return Some(USUAL);
         }
         let stride = (self.observations.list.len() / PIXELS).max(1);
-        let pixels = Pixels::sampled(self, CHUNK, stride);
-        let mut system = PixelSystem::new(&pixels, self.settings.map_size);
-        let sight = self.sight(&pixels, &mut system, estimate, texels, lit, stop)?;
-        let mut contest = Contest { scene: self, pixels, sight, texels, shown, lit, noise: None };
-        let mut nats = |candidates: &[Freedom]| -> Option<usize> {
-            let of_all: Option<Vec<Vec<f64>>> =
-                candidates.iter().map(|freedom| contest.nats(&mut system, *freedom, stop)).collect();
-            Some(best(&of_all?))
-        };
-        let [_, free] = LOBES;
-        let texture = TEXTURES[nats(&TEXTURES.map(|texture| Freedom { texture, lobes: free }))?];
+        let (some, taken) = pixels.sampled(CHUNK, stride);
+        let mut system = PixelSystem::new(&some, self.settings.map_size);
+        let sight = sight.of_some(pixels, &taken);
+        let mut contest = Contest { scene: self, pixels: some, sight, texels, shown, lit, noise: None };
+        let mut nats = |texture: f32, lobes: f32| contest.nats(&mut system, Freedom { texture, lobes }, stop);
+        let [held, free] = LOBES;
+        let mut of_textures: Vec<Vec<f64>> =
+            TEXTURES.into_iter().map(|texture| nats(texture, free)).collect::<Option<_>>()?;
+        let chosen = best(&of_textures);
+        let texture = TEXTURES[chosen];
         if lit == Lit::No {
             return Some(Freedom { texture, lobes: free });
         }
-        let lobes = LOBES[nats(&LOBES.map(|lobes| Freedom { texture, lobes }))?];
+        let lobes = LOBES[best(&[nats(texture, held)?, of_textures.swap_remove(chosen)])];
         Some(Freedom { texture, lobes })
     }
 }

@@ -38,7 +38,7 @@ impl SolverScene {
     pub fn light_round(&self, estimate: &mut Estimate, number: usize, stop: &AtomicBool) -> Option<StepReport> {
         let shape = self.shape_of_round(estimate, number);
         let planes = self.transport.basis.planes(&estimate.light);
-        let at_points = self.point_light(estimate, &planes);
+        let at_points = self.point_light(&estimate.texels, &planes);
         let round = self.round(estimate, &planes, &at_points);
         let openness = if self.settings.fixed_light { 1.0 } else { self.openness(number) };
         let prior = open_prior(self.observations.mean, openness);

@@ -41,7 +41,7 @@ impl SolverScene {
     /// Makes all maps. `None` when `stop` was raised: the estimate is of no use then.
     pub fn make_maps(&self, estimate: &mut Estimate, stop: &AtomicBool) -> Option<StepReport> {
         let planes = self.transport.basis.planes(&estimate.light);
-        let at_points = self.point_light(estimate, &planes);
+        let at_points = self.point_light(&estimate.texels, &planes);
         let round = self.round(estimate, &planes, &at_points);
         let prior = lobe_families::with_families_of(estimate);
         let mut check = Check::begin(self, &at_points, &prior);

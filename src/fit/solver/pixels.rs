@@ -13,9 +13,6 @@ use crate::scene::{Background, Scene};
 /// Most pixels with edges, of all views together.
 const MOST_EDGES: usize = 1 << 20;
 
-/// Pixels of a chunk where all are taken.
-const CHUNK: usize = 1 << 12;
-
 /// A pixel that shows several pieces of surface, or one beside a black background.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgePixel {
@@ -132,16 +129,25 @@ pub struct Pixels<'a> {
 impl<'a> Pixels<'a> {
     /// The pixels of a scene.
     pub fn of(scene: &'a SolverScene) -> Self {
-        Self::sampled(scene, CHUNK, 1)
-    }
-
-    /// About so many of the pixels: every chunk of `chunk` of them, side by side on the surface, that comes after `stride`.
-    pub fn sampled(scene: &'a SolverScene, chunk: usize, stride: usize) -> Self {
-        let is_taken = |index: &usize| (index / chunk).is_multiple_of(stride);
-        let whole = (0..scene.observations.list.len()).filter(is_taken).map(|index| index as u32).collect();
         let mut edges: Vec<EdgePixel> = scene.edges.iter().flat_map(|view| view.pixels.iter().copied()).collect();
         edges.sort_by_key(|own| (own.texel, own.view, own.first));
-        let edges: Vec<EdgePixel> = (0..edges.len()).filter(is_taken).map(|index| edges[index]).collect();
+        Self::made(scene, (0..scene.observations.list.len() as u32).collect(), edges)
+    }
+
+    /// One in `stride` chunks of these pixels, each of `chunk` side by side on the surface, and which they are of these.
+    pub fn sampled(&self, chunk: usize, stride: usize) -> (Self, Vec<usize>) {
+        let is_taken = |index: &usize| (index / chunk).is_multiple_of(stride);
+        let whole: Vec<usize> = (0..self.whole()).filter(is_taken).collect();
+        let edges: Vec<usize> = (0..self.edges.len()).filter(is_taken).collect();
+        let made = Self::made(
+            self.scene,
+            whole.iter().map(|&index| self.whole[index]).collect(),
+            edges.iter().map(|&index| self.edges[index]).collect(),
+        );
+        (made, whole.into_iter().chain(edges.into_iter().map(|index| self.whole() + index)).collect())
+    }
+
+    fn made(scene: &'a SolverScene, whole: Vec<u32>, edges: Vec<EdgePixel>) -> Self {
         let ends = edges.iter().scan(0, |end, own| {
             *end += own.count;
             Some(*end)

@@ -7,6 +7,7 @@ use super::objective::Objective;
 use super::pixel_terms::PixelTerms;
 use super::round::{BlockWork, Round};
 use super::scene::SolverScene;
+use crate::material::Material;
 use crate::render::cached::{CachedTransport, LightPlanes, PointLight};
 use crate::scene::Scene;
 
@@ -89,9 +90,9 @@ pub fn squared_error(model: &[f32; 3], term: &PixelTerms) -> f64 {
 }
 
 impl SolverScene {
-    /// The light at the points of the grid.
-    pub fn point_light(&self, estimate: &Estimate, planes: &LightPlanes) -> PointLight {
-        let reflectance = self.transport.reflectance_of_points(&estimate.texels, self.settings.map_size);
+    /// The light at the points of the grid, among surface of these texels.
+    pub fn point_light(&self, texels: &[Material<f32>], planes: &LightPlanes) -> PointLight {
+        let reflectance = self.transport.reflectance_of_points(texels, self.settings.map_size);
         self.transport.point_light(planes, &reflectance)
     }
 
@@ -102,7 +103,7 @@ impl SolverScene {
             return (None, Vec::new());
         }
         let planes = self.transport.basis.planes(&estimate.light);
-        let at = self.point_light(estimate, &planes);
+        let at = self.point_light(&estimate.texels, &planes);
         let mut sums = ErrorSums::new(self.held_out.len());
         for (index, (target, footprints)) in self.held_out.iter().enumerate() {
             let picture = self.transport.picture(footprints, &estimate.texels, &planes, &at);

@@ -17,7 +17,7 @@ pub const TILE: usize = 32;
 /// Times that reflectance and lobes are solved in turn.
 const PASSES: usize = 2;
 /// Sweeps of Gauss and Seidel over the reflectances of a tile.
-pub(super) const SWEEPS: usize = 8;
+const SWEEPS: usize = 8;
 /// Residuals of bright pixels are forgiven: at the mean radiance a fifth of the noise's variance goes with the radiance.
 /// With half of it highlights are too dull.
 const RELATIVE_NOISE: f32 = 0.5;
@@ -75,14 +75,14 @@ struct DiffusePart {
 }
 
 /// Parts of pixels, texel after texel.
-pub(super) struct ByTexel<P> {
+struct ByTexel<P> {
     parts: Vec<P>,
     ranges: Vec<Range<u32>>,
 }
 
 impl<P> ByTexel<P> {
     /// Those of a texel.
-    pub(super) fn of(&self, texel: usize) -> &[P] {
+    fn of(&self, texel: usize) -> &[P] {
         let Range { start, end } = self.ranges[texel];
         &self.parts[start as usize..end as usize]
     }
@@ -217,7 +217,7 @@ impl Tile {
     }
 
     /// The pixels that show each texel, and how much of them it is.
-    pub(super) fn pixels_of_texels(&self) -> ByTexel<(u32, f32)> {
+    fn pixels_of_texels(&self) -> ByTexel<(u32, f32)> {
         let mut first = vec![0u32; self.texels.len() + 1];
         for &(texel, _) in &self.taps {
             first[texel as usize + 1] += 1;
@@ -244,7 +244,7 @@ impl Tile {
     }
 
     /// How strongly diffuse reflectance leans on what it was, in units of the pixels' weights.
-    pub(super) fn lean(&self, c: usize) -> f32 {
+    fn lean(&self, c: usize) -> f32 {
         let power = |pixel: &TilePixel| pixel.terms.weight * pixel.terms.arriving[c] * pixel.terms.arriving[c];
         0.02 * self.pixels.iter().map(power).sum::<f32>() / self.texels.len().max(1) as f32 + 1e-12
     }

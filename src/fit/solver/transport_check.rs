@@ -45,7 +45,7 @@ impl SolverScene {
     /// `stop` was raised or no pixel is covered wholly.
     pub fn transport_error(&self, surface: &Surface, estimate: &Estimate, stop: &AtomicBool) -> Option<TransportError> {
         let planes = self.transport.basis.planes(&estimate.light);
-        let at = self.point_light(estimate, &planes);
+        let at = self.point_light(&estimate.texels, &planes);
         let size = self.settings.map_size;
         let texels = texels_from_maps(&estimate.maps(size));
         let parameters = Parameters::new(

@@ -3,9 +3,9 @@
 //! Pictures are written by the program's own writers or by the crates it reads with, the rest is text. A scene has three
 //! photos and a mesh beside it, so that what its reader lists can be read on.
 
-use super::arrays::array;
 use crate::error::{Error, ErrorKind, Result};
 use crate::image::{Image, RgbImage, file, transfer};
+use crate::scene::read::numpy;
 use crate::scene::read::zip::packed;
 use std::io::Cursor;
 use std::path::Path;
@@ -268,7 +268,7 @@ fn scenes() -> Result<Vec<Kind>> {
         scene("opensfm", "images/", vec![target("reconstruction.json", own::OPENSFM)])?,
         scene("alicevision", "", vec![target("sfm.json", own::ALICEVISION)])?,
         neus,
-        scene("llff", "images/", vec![target("poses_bounds.npy", array(&[3, 17], &own::llff_rows()))])?,
+        scene("llff", "images/", vec![target("poses_bounds.npy", numpy::written(&[3, 17], &own::llff_rows()))])?,
     ])
 }
 

@@ -7,7 +7,6 @@
 //! Memory is that of the whole process, as the allocator of `patina-lab` counts it, so inputs are opened one after the
 //! other; for more than one processor, run several kinds side by side. In another program nothing is counted.
 
-mod arrays;
 pub mod corpus;
 pub mod mutate;
 mod scenes;

@@ -1,7 +1,7 @@
 //! Cameras of three photos of 12 x 9 pixels in the words of each program.
 
-use super::arrays::array;
 use super::corpus::{PHOTOS, Target};
+use crate::scene::read::numpy;
 
 /// BlendedMVS.
 pub const CAM_TXT: &str =
@@ -168,7 +168,7 @@ pub const ALICEVISION: &str = r#"{"views":[{"viewId":"1","poseId":"1","intrinsic
 /// NeuS: a camera matrix, packed under the names of all.
 pub fn neus_target() -> Target {
     let world = [12.0, 0.0, 6.0, 20.4, 0.0, 12.0, 4.5, 14.4, 0.0, 0.0, 1.0, 4.0, 0.0, 0.0, 0.0, 1.0];
-    Target { path: "cameras_sphere.npz".into(), whole: array(&[4, 4], &world), wrap: |bytes| bytes.to_vec() }
+    Target { path: "cameras_sphere.npz".into(), whole: numpy::written(&[4, 4], &world), wrap: |bytes| bytes.to_vec() }
 }
 
 /// LLFF: three rows of a camera at a distance of 4.

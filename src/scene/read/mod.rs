@@ -29,7 +29,7 @@ mod mesh_frame;
 pub mod metashape;
 mod metashape_project;
 mod neural_scenes;
-mod numpy;
+pub(crate) mod numpy;
 mod obj;
 mod obj_elements;
 pub mod objects_with_lighting;

@@ -88,7 +88,7 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Array> {
 }
 
 /// An array of doubles as a file; for tests of the readers.
-#[cfg(test)]
+#[cfg(any(test, feature = "lab"))]
 pub fn written(shape: &[usize], values: &[f64]) -> Vec<u8> {
     let shape: Vec<String> = shape.iter().map(|length| format!("{length},")).collect();
     let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}), }}\n", shape.join(" "));

@@ -97,7 +97,7 @@ impl<'a> Check<'a> {
         let half = estimate.environment((width, height)).resampled(width / 2, height / 2).resampled(width, height);
         let half: Vec<[f32; 3]> = half.radiance.pixels().iter().map(|radiance| radiance.to_array()).collect();
         let planes = scene.transport.basis.planes(&half);
-        let at_points = scene.point_light(estimate, &planes);
+        let at_points = scene.point_light(&estimate.texels, &planes);
         let judgement = scene.judge(&self.surface, &self.views, light, (&planes, &at_points), stop)?;
         self.seconds.judging = began.elapsed().as_secs_f64();
         self.seconds.bounces = scene.transport.bounces.is_some().then_some(scene.transport.bounce_seconds);

@@ -51,7 +51,7 @@ fn photograph(held_out: usize, noise: f32, lobe_of: impl Fn(usize) -> Option<[f3
     let mut made = Photographed { scene, surface };
     let Solver { scene: cache, estimate } = solver(&made, settings());
     let planes = cache.transport.basis.planes(&estimate.light);
-    let at = cache.point_light(&estimate, &planes);
+    let at = cache.point_light(&estimate.texels, &planes);
     let mut random = SequentialRandom::new(9);
     let mut normal = move || random.next_normal();
     let judging = cache.held_out.iter().map(|(target, _)| (target.view, &target.camera));
