@@ -190,7 +190,7 @@ pub struct FitSettings {
     /// Whole-pixel refinement after the solver: descents over all texels from all pixels of full size, edges included, with a
     /// gain for each photo and channel, and noise and smoothness learned from the photos; 0 leaves it out.
     ///
-    /// It makes the finest maps in place of the solver's tiles.
+    /// With three levels or more it makes the finest maps in place of the solver's tiles.
     #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().solver_refine))]
     pub solver_refine: usize,
     /// Held-out evaluation interval in optimiser steps; 0 evaluates at the end only.

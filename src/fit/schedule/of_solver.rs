@@ -7,7 +7,7 @@ use crate::fit::settings::FitSettings;
 const LEAST_COARSE_MAP: usize = 128;
 /// Rounds of the solver on the light on each level but the coarsest, where it makes all maps.
 const FINER_ROUNDS: usize = 2;
-/// The same where polishing follows, whose steps move the light as well.
+/// The same where others make the finest maps.
 const FINER_ROUNDS_BEFORE_POLISHING: usize = 1;
 /// Rounds on the coarsest level after its first maps, which tell the lobes they are done with; maps are made anew after
 /// them.
@@ -18,8 +18,8 @@ const ROUNDS_AFTER_MAPS: usize = 1;
 enum Finest {
     /// The solver.
     Solver,
-    /// Polishing alone. Photographs are not what the solver's model says at edges and silhouettes: its finest maps take
-    /// most of the time there and end further off than Adam's from the coarser ones.
+    /// What follows alone: the descent from whole pixels, or Adam. Tiles of full size take most of the time where photos have
+    /// many pixels.
     Polish,
 }
 
@@ -34,9 +34,8 @@ enum CoarseMaps {
 
 /// The solver's part in maps of all sizes.
 ///
-/// Where polishing follows, light and maps need not be found as well: on photographs the time
-/// that second maps on the coarsest level, a second round on the light on finer ones and maps twice as large took serves
-/// better for more steps of polishing.
+/// Where others make the finest maps, the solver's need not be found as well: no second maps on the coarsest level, no second
+/// round on the light on finer ones.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) struct SolverShare {
     finest: Finest,
