@@ -10,7 +10,6 @@ use super::train::{TrainSettings, Training};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::files::write_bytes;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
-use std::collections::HashMap;
 use std::path::Path;
 
 /// Key of the account in the metadata of a file.
@@ -131,7 +130,7 @@ fn pack(path: &Path, account: &Account, parts: &[Part]) -> Result<()> {
         let view = TensorView::new(Dtype::F32, shape.clone(), data).map_err(|source| internal(source.to_string()))?;
         views.push((*name, view));
     }
-    let metadata = HashMap::from([(KEY.to_string(), text)]);
+    let metadata = std::iter::once((KEY.to_string(), text)).collect();
     let packed = serialize(views, Some(metadata)).map_err(|source| internal(source.to_string()))?;
     write_bytes(path, &packed)
 }
