@@ -1,15 +1,15 @@
 //! `patina demo`, `fit` and `resume`: drive a job and show its events.
 
 use super::arguments::{DemoOptions, FitOptions, ResumeOptions};
+use super::summary::summarise;
 use crate::error::{Error, ErrorKind, Result};
 use crate::export::RunFolder;
 use crate::export::run_folder::new_run_folder;
 use crate::fit::{FitSettings, Method};
-use crate::insight::report::data::ReportData;
 use crate::job::advance::{Advance, FIRST_RATIO};
 use crate::job::open::{self, OpenStage, Tell};
 use crate::job::prepare::RunSettings;
-use crate::job::{self, Event, JobHandle, demo};
+use crate::job::{self, Budget, Event, JobHandle, JobOptions, demo, known_maps};
 use crate::scene::demo::DemoSettings;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
@@ -43,8 +43,10 @@ pub fn demo(options: &DemoOptions, json: bool) -> Result<()> {
 
 /// Fits a scene.
 pub fn fit(options: &FitOptions, json: bool) -> Result<()> {
-    let AskedSettings { mut settings, chosen } = run_settings(options)?;
+    let job_options = within(options.seconds);
+    let AskedSettings { mut settings, mut chosen } = run_settings(options)?;
     settings.fit.validate()?;
+    known_maps::settle(&mut settings, &mut chosen)?;
     let stop = Arc::new(AtomicBool::new(false));
     stop_on_interrupt(Arc::clone(&stop));
     let output = options.output.clone().unwrap_or_else(|| usual_run_folder(&settings.scene));
@@ -64,8 +66,13 @@ pub fn fit(options: &FitOptions, json: bool) -> Result<()> {
     if !json {
         told.iter().for_each(|line| eprintln!("{line}"));
     }
-    let job = job::start(prepared, fitter, settings, folder.clone())?;
+    let job = job::start_with(prepared, fitter, settings, folder.clone(), job_options)?;
     watch(job, &folder, &stop, json)
+}
+
+/// A job that takes so many seconds from now on at the most, reading included.
+fn within(seconds: Option<f64>) -> JobOptions {
+    JobOptions { budget: seconds.map(Budget::of_seconds), ..JobOptions::default() }
 }
 
 /// Where a run goes that no folder was named for: `runs/SCENE-1`, `runs/SCENE-2`, ... where the program was started.
@@ -110,8 +117,10 @@ pub fn run_settings(options: &FitOptions) -> Result<AskedSettings> {
     // What was typed wins, even where it equals the default.
     settings.scene = absolute(&options.scene);
     settings.known_light = options.env.as_deref().map(absolute).unwrap_or(settings.known_light);
+    settings.known_maps = options.maps.as_deref().map(absolute).unwrap_or(settings.known_maps);
     settings.read = options.read.over(settings.read);
     settings.fit = options.fit.over(&settings.fit)?;
+    settings.fit.fixed_maps |= !settings.known_maps.as_os_str().is_empty();
     if let Some(uv) = options.uv {
         settings.atlas.keep_uv = uv;
     }
@@ -124,12 +133,13 @@ fn absolute(path: &Path) -> PathBuf {
 
 /// Takes up a run.
 pub fn resume(options: &ResumeOptions, json: bool) -> Result<()> {
+    let job_options = within(options.seconds);
     let folder = RunFolder::open(&options.run)?.held()?;
     let stop = Arc::new(AtomicBool::new(false));
     stop_on_interrupt(Arc::clone(&stop));
     let (prepared, fitter, settings) =
         with_bar(json, |tell| open::resume(&folder, options.scene.as_deref(), &stop, tell))?;
-    let job = job::start(prepared, fitter, settings, folder.clone())?;
+    let job = job::start_with(prepared, fitter, settings, folder.clone(), job_options)?;
     watch(job, &folder, &stop, json)
 }
 
@@ -284,69 +294,4 @@ fn line_of(event: &Event, advance: &Advance) -> serde_json::Value {
         Event::Stopped { steps_done } => json!({"event": "stopped", "steps_done": steps_done}),
         Event::Failed(error) => json!({"event": "failed", "message": error.to_string()}),
     }
-}
-
-/// Findings that are repeated when a fit has ended.
-const SPOILS_ALL: [&str; 8] = [
-    "intrinsics-scaled",
-    "light-in-groups",
-    "light-turns-with-camera",
-    "photo-turned",
-    "photos-disagree",
-    "photos-exchanged",
-    "photos-not-explained",
-    "photos-shifted",
-];
-
-/// Prints the scores and where to look.
-fn summarise(data: &ReportData, folder: &RunFolder) {
-    for aggregate in &data.aggregates {
-        let (raw, aligned) = (&aggregate.score.raw, &aggregate.score.aligned);
-        println!(
-            "{:15} {} views: PSNR {:.2} dB, SSIM {:.3}, RMSE {:.4} (scale-aligned: {:.2} dB, {:.3}, {:.4})",
-            aggregate.name,
-            aggregate.score.views,
-            raw.psnr_srgb_db,
-            raw.ssim_srgb,
-            raw.rmse_linear,
-            aligned.psnr_srgb_db,
-            aligned.ssim_srgb,
-            aligned.rmse_linear
-        );
-    }
-    // What spoils a fit as a whole is said once more beside its scores.
-    for finding in data.findings.iter().filter(|finding| SPOILS_ALL.contains(&finding.code.as_str())) {
-        println!("warning [{}]: {} ({})", finding.code, finding.message, finding.remedy);
-    }
-    if let Some(truth) = &data.truth {
-        println!("against the truth, raw (scale-aligned):");
-        if let Some(maps) = &truth.maps {
-            for (name, pair) in [("diffuse", maps.diffuse), ("specular", maps.specular), ("roughness", maps.roughness)]
-            {
-                println!("  {name:12} RMSE {:.4} ({:.4})", pair.raw, pair.aligned);
-            }
-        }
-        if let Some(light) = &truth.environment {
-            println!(
-                "  light        relative L2 {:.3} ({:.3}), log RMSE {:.3} ({:.3})",
-                light.relative_l2.raw, light.relative_l2.aligned, light.log_rmse.raw, light.log_rmse.aligned
-            );
-            if let Some(angle) = light.brightest_angle_degrees {
-                println!("  brightest light off by {angle:.1} degrees");
-            }
-        }
-        if let Some(relit) = &truth.relit {
-            println!(
-                "  relit        RMSE {:.4} ({:.4}), PSNR {:.2} dB ({:.2} dB)",
-                relit.raw.rmse_linear, relit.aligned.rmse_linear, relit.raw.psnr_srgb_db, relit.aligned.psnr_srgb_db
-            );
-        }
-    }
-    let whole = data.timings.iter().map(|time| format!("{} {:.1} s", time.stage, time.seconds)).collect::<Vec<_>>();
-    let total: f64 = data.timings.iter().map(|time| time.seconds).sum();
-    println!("{}; together {total:.1} s", whole.join(", "));
-    if let Some(bytes) = data.peak_memory_bytes {
-        println!("peak memory {}", crate::insight::report::number::memory(bytes));
-    }
-    println!("report: {}", folder.report_html_path().display());
 }

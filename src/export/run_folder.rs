@@ -146,12 +146,27 @@ impl RunFolder {
     /// Writes the result, checked first: a result that would not be read back is not written.
     pub fn write_result(&self, result: &RunResult) -> Result<()> {
         result.validate(&self.path)?;
-        file::write_exr_rgb(&self.file("diffuse.exr"), &result.maps.diffuse)?;
-        file::write_exr_rgb(&self.file("specular.exr"), &result.maps.specular)?;
-        file::write_exr_grey(&self.file("roughness.exr"), &result.maps.roughness)?;
-        file::write_exr_grey(&self.file("seen.exr"), &result.times_seen)?;
+        self.write_maps(&result.maps, &result.times_seen)?;
         file::write_exr_rgb(&self.file("env.exr"), &result.environment.radiance)?;
         obj::write(&self.file("mesh.obj"), &result.mesh)
+    }
+
+    /// Writes the maps alone, with what photos have seen of them.
+    pub fn write_maps(&self, maps: &MaterialMaps, times_seen: &GreyImage) -> Result<()> {
+        file::write_exr_rgb(&self.file("diffuse.exr"), &maps.diffuse)?;
+        file::write_exr_rgb(&self.file("specular.exr"), &maps.specular)?;
+        file::write_exr_grey(&self.file("roughness.exr"), &maps.roughness)?;
+        file::write_exr_grey(&self.file("seen.exr"), times_seen)
+    }
+
+    /// Reads what [`Self::write_maps`] wrote.
+    pub fn read_maps(&self) -> Result<(MaterialMaps, GreyImage)> {
+        let maps = MaterialMaps {
+            diffuse: self.read_rgb("diffuse.exr")?,
+            specular: self.read_rgb("specular.exr")?,
+            roughness: self.read_grey("roughness.exr")?,
+        };
+        Ok((maps, self.read_grey("seen.exr")?))
     }
 
     /// Reads the result. Before anything is read, all missing files are named in one error.
@@ -186,15 +201,12 @@ impl RunFolder {
             let message = format!("the run has no {}", missing.join(", no "));
             return Err(Error::new(ErrorKind::Missing, message).at(Place::File(self.file(first))).remedy(remedy));
         }
+        let (maps, times_seen) = self.read_maps()?;
         let result = RunResult {
-            maps: MaterialMaps {
-                diffuse: self.read_rgb("diffuse.exr")?,
-                specular: self.read_rgb("specular.exr")?,
-                roughness: self.read_grey("roughness.exr")?,
-            },
+            maps,
             environment: light(self)?,
             mesh: obj::read(&self.file("mesh.obj"))?,
-            times_seen: self.read_grey("seen.exr")?,
+            times_seen,
             lobe: self.read_lobe()?,
         };
         result.validate(&self.path)?;

@@ -42,10 +42,11 @@ impl Fitter {
     }
 
     /// The best texture without a light, from whole photos: what a picture can be that knows nothing of light. `None` as
-    /// for [`Fitter::cached_view`], where the last photos were halved ones, or when `stop` was raised.
+    /// for [`Fitter::cached_view`], where the last photos were halved ones, when `stop` was raised, and for a fit that was cut
+    /// short: it takes as long as the descent.
     pub fn bake(&self, stop: &AtomicBool) -> Option<Descended> {
         let solver = self.solver.as_ref().filter(|solver| solver.settings.map_size == self.state.map_size)?;
-        (self.solver_photo_level == 0).then(|| solver.bake(stop)).flatten()
+        (self.solver_photo_level == 0 && !self.is_cut_short).then(|| solver.bake(stop)).flatten()
     }
 }
 

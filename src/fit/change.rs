@@ -53,6 +53,7 @@ reaches! {
     exposure: NextSteps,
     start: Fit,
     fixed_light: NextSteps,
+    fixed_maps: Fit,
     rate_diffuse: NextSteps,
     rate_specular: NextSteps,
     rate_roughness: NextSteps,

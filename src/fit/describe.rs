@@ -161,6 +161,7 @@ mod tests {
         fixed.sort();
         let expected = [
             "environment-height",
+            "fixed-maps",
             "levels",
             "lobe",
             "map-size",

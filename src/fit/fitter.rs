@@ -8,6 +8,7 @@ use super::adam::Moments;
 use super::evidence;
 use super::figures::LiveFigures;
 use super::gauge::GaugeRule;
+use super::known_maps::KnownMaps;
 use super::schedule::{Stage, stages};
 use super::settings::{FitSettings, Method, Start};
 use super::solver::light_evidence::LightKnown;
@@ -62,6 +63,10 @@ pub struct Fitter {
     pub(super) choices: Option<Arc<Choices>>,
     /// What the last maps that the solver made say of tails of lobes; no checkpoint holds it.
     pub(super) tails: Option<LobeTails>,
+    /// Maps that are kept.
+    pub(super) known_maps: Option<Arc<KnownMaps>>,
+    /// Whether it was ended before its last step.
+    pub(super) is_cut_short: bool,
     /// The objective before and after each step of the last descent; no checkpoint holds it.
     pub(super) descent: Vec<[Objective; 2]>,
 }
@@ -187,6 +192,8 @@ impl Fitter {
             light_known: LightKnown::default(),
             choices: None,
             tails: None,
+            known_maps: None,
+            is_cut_short: false,
             descent: Vec::new(),
         })
     }
@@ -260,11 +267,17 @@ impl Fitter {
 
     /// What fixes the scale between reflectance and light.
     pub fn gauge(&self) -> GaugeRule {
+        if self.settings.fixed_maps {
+            return GaugeRule::FixedMaps;
+        }
         GaugeRule::of(self.scene.background, self.settings.background, self.settings.fixed_light, self.settings.method)
     }
 
-    /// The maps as they are, of the size of the stage.
+    /// The maps as they are, of the size of the stage; those that are kept bit for bit.
     pub fn maps(&self) -> MaterialMaps {
+        if let Some(known) = &self.known_maps {
+            return known.maps.clone();
+        }
         maps_from_texels(&self.state.texels, self.state.map_size, self.state.map_size)
     }
 

@@ -17,6 +17,8 @@ pub enum GaugeRule {
     Background,
     /// The light was known.
     FixedLight,
+    /// The maps were known.
+    FixedMaps,
     /// The start: mean reflectance 0.5 in the mean light that explains the photographs.
     Start,
     /// The start holds for the mean of the channels; how they differ is told by highlights, since F0 of what is no metal is
@@ -42,6 +44,10 @@ impl GaugeRule {
                 "Background pixels show the light directly and so fix the scale between reflectance and light."
             }
             GaugeRule::FixedLight => "The light was given, so the scale of reflectance is fixed.",
+            GaugeRule::FixedMaps => {
+                "The maps were given, so the scale of the light is fixed: an error that all reflectances have in common is \
+                 one of the light, too."
+            }
             GaugeRule::Start => {
                 "Nothing in the photographs fixes the scale between diffuse reflectance and light; it stays near the \
                  start, a mean reflectance of 0.5. Read the scale-aligned scores."

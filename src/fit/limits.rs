@@ -31,6 +31,9 @@ impl FitSettings {
         if !(2..=1024).contains(&self.environment_height) {
             return wrong("environment-height", "must be 2 to 1024");
         }
+        if self.fixed_maps {
+            self.validate_with_fixed_maps()?;
+        }
         if self.method == Method::Solver {
             if self.lobe == LobeModel::Ggx && self.solver_polish == 0 {
                 return Err(Error::new(
@@ -86,6 +89,42 @@ impl FitSettings {
         Ok(())
     }
 
+    /// What says nothing, or something else, once the maps are given.
+    fn validate_with_fixed_maps(&self) -> Result<()> {
+        let wrong = |name: &str, message: &str, remedy: &str| {
+            Err(Error::new(ErrorKind::InvalidSetting, message).at(Place::Setting(name.into())).remedy(remedy))
+        };
+        if self.fixed_light {
+            return wrong(
+                "fixed-light",
+                "with maps and environment both kept there is nothing to find",
+                "leave out --fixed-light, or --maps",
+            );
+        }
+        if self.method == Method::Adam {
+            return wrong(
+                "method",
+                "only the solver keeps maps; Adam moves them in all of its steps",
+                "leave out --method, and settings that are Adam's alone, such as --samples",
+            );
+        }
+        if self.lobe == LobeModel::Ggx {
+            return wrong(
+                "lobe",
+                "maps of GGX lobes cannot be kept: the solver's model has lobes of Blinn-Phong",
+                "keep the maps of a run with --lobe blinn-phong, and leave out --lobe here",
+            );
+        }
+        if self.solver_polish > 0 {
+            return wrong(
+                "solver-polish",
+                "its steps move the maps, which are to be kept",
+                "leave out --solver-polish",
+            );
+        }
+        Ok(())
+    }
+
     /// What the solver keeps at once must fit into memory: square equations of the light, and what each point of the grid
     /// sees of it.
     fn validate_sizes_of_solver(&self) -> Result<()> {
@@ -127,6 +166,22 @@ mod tests {
             FitSettings { light_smoothness: f32::NAN, ..Default::default() },
         ] {
             assert!(wrong.validate().is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn kept_maps_refuse_what_moves_them_and_what_leaves_nothing_to_find() {
+        let base = || FitSettings { fixed_maps: true, method: Method::Solver, ..Default::default() };
+        base().validate().unwrap();
+        for (name, wrong) in [
+            ("fixed-light", FitSettings { fixed_light: true, ..base() }),
+            ("method", FitSettings { method: Method::Adam, ..base() }),
+            ("lobe", FitSettings { lobe: LobeModel::Ggx, solver_polish: 5, ..base() }),
+            ("solver-polish", FitSettings { solver_polish: 5, ..base() }),
+        ] {
+            let error = wrong.validate().unwrap_err();
+            assert_eq!((error.kind(), error.place()), (ErrorKind::InvalidSetting, &Place::Setting(name.into())));
+            assert!(!error.remedy_text().is_empty(), "{error}");
         }
     }
 

@@ -6,10 +6,11 @@
 //! call, one step. Its parts stand in the order they run: `evidence` looks at what is given, `work` prepares a stage,
 //! `batch` picks views and pixels, `gradient` adds them up, `weigh` applies consistency, `advance` moves the numbers,
 //! `held_out` judges them. [`state`] is all they change, [`event`] what it tells of.
-//! `change` takes other settings between two steps, [`views`] leaves photos out, [`figures`] are for who watches.
+//! `change` takes other settings between two steps, `cut_short` ends a fit before its last one, [`views`] leaves photos
+//! out, [`figures`] are for who watches.
 //! [`by_name`] reads and sets each setting by its name, `describe` says with the command line's help what it means,
 //! [`presets`] are whole sets of them.
-//! [`solver`] is the other method, `solver_step` does its steps, [`suited`] says which of both a scene
+//! [`solver`] is the other method, `solver_step` does its steps, [`known_maps`] are maps that it keeps, [`suited`] says which of both a scene
 //! asks for, and what else it does.
 //! [`start`] chooses where to begin, [`gauge`] names the freedom that photographs leave, [`checkpoint`] saves it all.
 //!
@@ -23,6 +24,7 @@ mod cached_pictures;
 mod change;
 pub mod checkpoint;
 pub mod consistency;
+mod cut_short;
 #[cfg(feature = "cli")]
 pub mod describe;
 pub mod event;
@@ -32,6 +34,7 @@ pub mod fitter;
 pub mod gauge;
 mod gradient;
 mod held_out;
+pub mod known_maps;
 pub mod light_prior;
 mod limits;
 pub mod loss;
@@ -53,6 +56,7 @@ mod work;
 
 pub use cached_pictures::CachedPicture;
 pub use fitter::{Fitter, StepOutcome};
+pub use known_maps::KnownMaps;
 pub use presets::Preset;
 pub use settings::{FitSettings, Method};
 pub use state::LossRow;

@@ -141,6 +141,9 @@ pub struct FitSettings {
     /// Keep the environment as it is at the start; with `--env` on the command line, one that is known.
     #[cfg_attr(feature = "cli", arg(long))]
     pub fixed_light: bool,
+    /// Keep the maps of an earlier run and find the environment alone; `--maps RUN` names the run and turns this on.
+    #[cfg_attr(feature = "cli", arg(long))]
+    pub fixed_maps: bool,
     /// Step size of diffuse reflectance, 0 to 1.
     #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().rate_diffuse))]
     pub rate_diffuse: f32,
@@ -223,6 +226,7 @@ impl Default for FitSettings {
             exposure: false,
             start: Start::Measured,
             fixed_light: false,
+            fixed_maps: false,
             rate_diffuse: 0.03,
             rate_specular: 0.015,
             rate_roughness: 0.04,

@@ -31,8 +31,10 @@ impl Fitter {
         let check_choices = whole.check_choices && last_maps.is_some_and(|last| last.is_of_level_of(stage));
         let is_last = last_maps == Some(stage);
         // The grid is not halved with the maps: light that reaches points too far apart bounds what small maps can show.
-        let settings = SolverSettings { map_size: stage.map_size, check_choices, ..whole };
-        let level = (stage.photo_level, stage.map_size);
+        // Maps that are kept stay whole in the state; the solver looks at them by the size of its photos.
+        let map_size = if whole.fixed_maps { stage.map_size >> stage.photo_level } else { stage.map_size };
+        let settings = SolverSettings { map_size, check_choices, ..whole };
+        let level = (stage.photo_level, map_size);
         let is_of_level = |solver: &SolverScene| (self.solver_photo_level, solver.settings.map_size) == level;
         if !self.solver.as_ref().is_some_and(is_of_level) {
             // Photos and maps are other ones; what points of the surface see of each other and of the light is the same.
@@ -50,8 +52,12 @@ impl Fitter {
             _ => SolverStep::Light(self.light_rounds_done()),
         };
         self.grow_maps(stage.map_size);
-        let mut estimate = self.lend_estimate(&solver);
+        let mut estimate = self.lend_estimate(&solver)?;
         let report = solver.step(step, &mut estimate, stop);
+        if report.is_some() && whole.fixed_maps && self.steps_total() == self.state.step + 1 {
+            // Else before maps are made under the light.
+            solver.fill_holes(&mut estimate.light);
+        }
         let held_out = report.as_ref().map(|_| solver.held_out_rmse(&self.scene, &estimate));
         self.take_estimate(&solver, estimate);
         self.solver = Some(solver);
@@ -84,10 +90,11 @@ impl Fitter {
     pub fn deviations(&self) -> Option<MaterialMaps> {
         let state = &self.state;
         let of_light = state.light_scale_deviation;
-        self.knows_deviations().then(|| Estimate::deviations(&state.texels, &state.variances, state.map_size, of_light))
+        self.deviations_are_known()
+            .then(|| Estimate::deviations(&state.texels, &state.variances, state.map_size, of_light))
     }
 
-    fn knows_deviations(&self) -> bool {
+    pub(super) fn deviations_are_known(&self) -> bool {
         self.settings.method == Method::Solver
             && self.state.variances.len() == self.state.texels.len()
             && self.state.plan.iter().enumerate().any(|(number, stage)| {
@@ -138,20 +145,24 @@ impl Fitter {
     /// weighed by their evidence; 0 where a texel took over what its neighbours have. `None` as for [`Self::deviations`].
     pub fn lobe_sharing(&self) -> Option<GreyImage> {
         let size = self.state.map_size;
-        self.knows_deviations().then(|| {
+        self.deviations_are_known().then(|| {
             Image::from_fn(size, size, |row, column| self.state.variances[row * size + column].lobe_cluster_size)
         })
     }
 
     /// Moves the unknowns out of the state, so that none is held twice.
-    fn lend_estimate(&mut self, solver: &SolverScene) -> Estimate {
-        let state = &mut self.state;
-        let mut estimate = Estimate {
-            texels: std::mem::take(&mut state.texels),
-            variances: std::mem::take(&mut state.variances),
-            light: std::mem::take(&mut state.light),
-            light_known: std::mem::take(&mut self.light_known),
-            log_gains: solver.views.iter().map(|&view| state.log_gains[view]).collect(),
+    fn lend_estimate(&mut self, solver: &SolverScene) -> Result<Estimate> {
+        let mut estimate = if solver.settings.fixed_maps {
+            self.estimate_of_known(solver)?
+        } else {
+            let state = &mut self.state;
+            Estimate {
+                texels: std::mem::take(&mut state.texels),
+                variances: std::mem::take(&mut state.variances),
+                light: std::mem::take(&mut state.light),
+                light_known: std::mem::take(&mut self.light_known),
+                log_gains: solver.views.iter().map(|&view| state.log_gains[view]).collect(),
+            }
         };
         estimate.variances.resize(estimate.texels.len(), TexelVariance::default());
         // The paper's start is black: nothing could be told apart under it.
@@ -159,13 +170,15 @@ impl Fitter {
             let light = solver.constant_light();
             estimate.light = light.radiance.pixels().iter().map(|pixel| pixel.to_array()).collect();
         }
-        estimate
+        Ok(estimate)
     }
 
     fn take_estimate(&mut self, solver: &SolverScene, estimate: Estimate) {
         let state = &mut self.state;
-        state.texels = estimate.texels;
-        state.variances = estimate.variances;
+        if !solver.settings.fixed_maps {
+            state.texels = estimate.texels;
+            state.variances = estimate.variances;
+        }
         state.light = estimate.light;
         self.light_known = estimate.light_known;
         if !self.light_known.shares.is_empty() {

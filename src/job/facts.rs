@@ -53,6 +53,9 @@ pub(super) fn describe(
         scene_facts.push(fact("photographs", format!("{} x {} pixels", view.camera.width, view.camera.height)));
     }
     scene_facts.push(fact("maps", format!("{0} x {0} texels", settings.fit.map_size)));
+    if fitter.known_maps().is_some() {
+        scene_facts.push(fact("maps kept from", settings.known_maps.display().to_string()));
+    }
     if let Some(quality) = &prepared.quality {
         scene_facts.extend(atlas_facts(quality));
     }

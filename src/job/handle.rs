@@ -1,6 +1,6 @@
 //! What a watcher holds of a running job: where commands go, where events and snapshots come from.
 
-use super::{Command, Event, Slot, Snapshot};
+use super::{Budget, Command, Event, Slot, Snapshot};
 use crossbeam_channel::{Receiver, Sender};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,6 +16,9 @@ pub struct JobOptions {
     pub wake: Option<Wake>,
     /// Threads of its own; the usual ones when not given. Results do not depend on it.
     pub pool: Option<rayon::ThreadPool>,
+    /// How long the fit may take; as long as it needs when not given. It ends by then with what there is, as any fit ends,
+    /// and can be taken up.
+    pub budget: Option<Budget>,
     /// Called before each step with the number of steps done; a seam for tests of faults.
     #[doc(hidden)]
     pub before_step: Option<Box<dyn FnMut(usize) + Send>>,

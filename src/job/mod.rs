@@ -6,7 +6,9 @@
 //! cannot.
 //!
 //! [`open`] opens scenes and runs, begins fits and takes them up; [`prepare`] turns a scene into a surface with an atlas,
+//! [`known_maps`] takes that of a run whose maps are kept,
 //! [`worker`] is the thread and [`handle`] what a watcher holds of it, `save` keeps the run folder whole while it runs,
+//! [`budget`] limits how long that is,
 //! [`outcome`] renders, scores and writes the run folder, [`demo`] makes the built-in scene,
 //! [`capture_folder`] finds the parts of a scene in a folder and names them. [`preview`] draws for a window
 //! beside a fit, [`relit`] does so from cached transport, at once. After a fit, [`gallery`] makes what a user shows, [`gauge`] moves its scale, [`entanglement`] tells how
@@ -23,6 +25,7 @@ pub mod against_truth;
 pub mod ask;
 pub mod background;
 pub mod benchmark;
+pub mod budget;
 pub mod capture_folder;
 pub mod demo;
 pub mod entanglement;
@@ -33,6 +36,7 @@ pub mod film;
 pub mod gallery;
 pub mod gauge;
 pub mod handle;
+pub mod known_maps;
 pub mod materials;
 mod newest;
 pub mod object;
@@ -50,10 +54,12 @@ pub mod shown;
 pub mod slot;
 pub mod solver_told;
 mod stages;
+mod teller;
 pub mod time_left;
 mod view;
 pub mod worker;
 
+pub use budget::Budget;
 pub use facts::rows_of;
 pub use handle::{JobHandle, JobOptions, Wake};
 pub use prepare::RunSettings;

@@ -5,6 +5,7 @@
 //! refuses to do: to begin on a scene that cannot work, and to show a run without its own maps; a scene that moved away
 //! is only a finding there.
 
+use super::known_maps;
 pub use super::opened_scene::{OpenedScene, check, open_demo, open_scene, open_scene_of, read_scene, read_unchecked};
 use super::prepare::{Prepared, RunSettings, prepare_with, surface_of};
 use super::stages::told;
@@ -12,7 +13,7 @@ pub use super::stages::{OpenStage, Tell};
 pub use super::view::{OpenedRun, view_run};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::export::RunFolder;
-use crate::fit::{Fitter, Method, checkpoint};
+use crate::fit::{Fitter, KnownMaps, Method, checkpoint};
 use crate::light::Environment;
 use std::path::Path;
 use std::sync::Arc;
@@ -80,7 +81,8 @@ pub fn start_new(
 /// Begins a fit on a scene that is prepared already: reads the known light, if any, and chooses the start values.
 ///
 /// # Errors
-/// A setting out of range, a known light that cannot be read; `Stopped` when the flag is raised.
+/// A setting out of range, a known light or maps that cannot be read or are not of this surface; `Stopped` when the flag is
+/// raised.
 pub fn begin(
     mut prepared: Prepared,
     settings: RunSettings,
@@ -96,8 +98,12 @@ pub fn begin(
         known_light = Some(light);
     }
     let (scene, surface) = (Arc::clone(&prepared.scene), Arc::clone(&prepared.surface));
-    let fitter =
-        told(OpenStage::Start, stop, tell, || Fitter::new(scene, surface, settings.fit.clone(), known_light.as_ref()))?;
+    let known_maps = known_maps::of_settings(&settings, &surface)?;
+    let fitter = told(OpenStage::Start, stop, tell, || {
+        let mut fitter = Fitter::new(scene, surface, settings.fit.clone(), known_light.as_ref())?;
+        known_maps.map_or(Ok(()), |known| fitter.take_maps(known))?;
+        Ok(fitter)
+    })?;
     let settings = RunSettings { fit: fitter.settings().clone(), ..settings };
     prepared.findings.retain(|finding| !settings.fit.do_what_is_asked(finding));
     Ok((prepared, fitter, settings))
@@ -126,7 +132,13 @@ pub fn resume(
     let OpenedScene { scene, report, timings } = opened;
     let (scene, surface) = (Arc::new(scene), Arc::new(surface));
     let fitter = told(OpenStage::Start, stop, tell, || {
-        Fitter::resume(Arc::clone(&scene), Arc::clone(&surface), settings.fit.clone(), state)
+        let mut fitter = Fitter::resume(Arc::clone(&scene), Arc::clone(&surface), settings.fit.clone(), state)?;
+        if settings.fit.fixed_maps {
+            // Put there when the fit began: the run that they are of may have changed since.
+            let (maps, times_seen) = folder.read_maps()?;
+            fitter.take_maps(Arc::new(KnownMaps { maps, times_seen }))?;
+        }
+        Ok(fitter)
     })?;
     let prepared = Prepared { scene, surface, quality: None, findings: report.findings, timings };
     settings.fit = fitter.settings().clone();

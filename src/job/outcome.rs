@@ -49,7 +49,11 @@ pub fn write(
     let times_seen =
         timed(&mut timings, "coverage", || coverage::times_seen_by(scene, surface, &training, settings.fit.map_size));
     let covered = covered(surface, settings.fit.map_size);
-    let maps = fill_outside(&fitter.maps(), &times_seen, &covered);
+    let (maps, times_seen) = match fitter.known_maps() {
+        // Those that are kept are handed on as they are, with what their own photos have seen of them.
+        Some(known) => (known.maps.clone(), known.times_seen.clone()),
+        None => (fill_outside(&fitter.maps(), &times_seen, &covered), times_seen),
+    };
     let environment = fitter.environment();
     let (mesh, lobe) = (surface.mesh().clone(), fitter.lobe());
     let result = RunResult { maps, environment, mesh, times_seen, lobe };

@@ -1,5 +1,6 @@
 //! From a scene folder to something a fit can start on.
 
+use super::known_maps;
 use super::stages::{OpenStage, Tell, told};
 use crate::atlas::{self, AtlasQuality, AtlasSettings, covered_texels};
 use crate::error::{Finding, Result};
@@ -9,7 +10,7 @@ use crate::insight::report::data::StageTime;
 use crate::render::Surface;
 use crate::scene::{ReadSettings, Scene};
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -22,12 +23,20 @@ pub struct RunSettings {
     pub scene: PathBuf,
     /// A light that is known from the start; empty when none is.
     pub known_light: PathBuf,
+    /// A run whose maps are kept; empty when none is.
+    #[serde(skip_serializing_if = "is_empty")]
+    pub known_maps: PathBuf,
     /// How the scene is read.
     pub read: ReadSettings,
     /// How the atlas is made.
     pub atlas: AtlasSettings,
     /// How the maps are fitted.
     pub fit: FitSettings,
+}
+
+/// Settings of runs that keep no maps can be read by versions that know of none.
+fn is_empty(path: &Path) -> bool {
+    path.as_os_str().is_empty()
 }
 
 /// A scene that is ready for a fit.
@@ -77,6 +86,9 @@ pub fn prepare_with(
     stop: &AtomicBool,
     tell: Tell,
 ) -> Result<Prepared> {
+    if !settings.known_maps.as_os_str().is_empty() {
+        return known_maps::prepare(scene, findings, settings, timings, stop, tell);
+    }
     // Charts keep their distance at the size the maps are stored in.
     let atlas_settings = AtlasSettings { resolution_texels: settings.fit.map_size, ..settings.atlas.clone() };
     let progress = |share: f32| tell(OpenStage::Atlas, share);

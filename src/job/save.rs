@@ -49,6 +49,12 @@ impl Saver {
         outcome
     }
 
+    /// Writes the maps that a fit keeps, where it keeps some: what goes on from a checkpoint reads them.
+    pub fn write_known_maps(&self, fitter: &Fitter) -> Result<()> {
+        let Some(known) = fitter.known_maps() else { return Ok(()) };
+        self.folder.write_maps(&known.maps, &known.times_seen)
+    }
+
     fn write(&self, fitter: &Fitter, settings: &RunSettings) -> Result<PathBuf> {
         // A folder that was deleted is made again, with all that a resumed fit needs.
         if !self.folder.is_run() {
@@ -57,6 +63,7 @@ impl Saver {
         let mesh = self.folder.file("mesh.obj");
         if !mesh.is_file() {
             crate::export::obj::write(&mesh, fitter.surface().mesh())?;
+            self.write_known_maps(fitter)?;
         }
         self.folder.write_settings(settings)?;
         let path = self.folder.checkpoint_path();

@@ -1,5 +1,6 @@
 //! A run to look at, finished or not.
 
+use super::budget::ENDED_BY_BUDGET;
 use super::opened_scene::open_scene_of;
 use super::prepare::{RunSettings, surface_of};
 use super::solver_told::SolverTold;
@@ -67,8 +68,11 @@ pub fn view_run(folder: &RunFolder, moved_scene: Option<&Path>, stop: &AtomicBoo
             None
         }
     };
-    // Results of an earlier run in the same folder are older than a checkpoint that has steps to go.
-    let is_under_way = summary.as_ref().is_some_and(|summary| summary.step < summary.steps_total);
+    // Results of an earlier run in the same folder are older than a checkpoint that has steps to go, but for those of a fit
+    // that its budget ended where the checkpoint is.
+    let is_under_way = summary.as_ref().is_some_and(|summary| {
+        summary.step < summary.steps_total && !(folder.has_result() && ended_by_budget(folder, summary.step))
+    });
     let is_finished = folder.has_result() && !is_under_way;
     let can_resume = summary.is_some();
     let losses = match summary {
@@ -124,6 +128,14 @@ pub fn view_run(folder: &RunFolder, moved_scene: Option<&Path>, stop: &AtomicBoo
         is_finished,
         can_resume,
     })
+}
+
+/// Whether the report is of a fit that its budget ended after so many steps.
+fn ended_by_budget(folder: &RunFolder, steps: usize) -> bool {
+    let is_cut = |report: ReportData| {
+        report.loss_history.len() == steps && report.findings.iter().any(|finding| finding.code == ENDED_BY_BUDGET)
+    };
+    folder.read_report_json().is_ok_and(is_cut)
 }
 
 /// A scene that is only looked at needs no check.

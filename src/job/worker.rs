@@ -1,24 +1,23 @@
 //! The thread of a job.
 
-use super::handle::{JobHandle, JobOptions, Wake};
+use super::handle::{JobHandle, JobOptions};
 use super::outcome;
 use super::prepare::{Prepared, RunSettings};
 use super::save::Saver;
+use super::teller::Teller;
 use super::time_left;
-use super::{Command, Event, Progress, Slot, Snapshot, SolverTold};
+use super::{Budget, Command, Event, Progress, Slot, Snapshot, SolverTold};
 use crate::error::{Error, ErrorKind, Finding, Result, Severity, text_of_panic};
 use crate::export::RunFolder;
 use crate::fit::{FitSettings, Fitter, LossRow, StepOutcome};
 use crate::insight::report::data::StageTime;
-use crossbeam_channel::{Receiver, Sender, unbounded};
+use crossbeam_channel::{Receiver, unbounded};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Time between two snapshots, at least; maps of 2048^2 texels take a while to copy.
 const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(500);
-/// Events that may wait for a reader before progress is dropped.
-const MOST_WAITING_EVENTS: usize = 256;
 /// How long a job that holds waits for a command before it looks at its stop flag.
 const PATIENCE: Duration = Duration::from_millis(50);
 
@@ -55,6 +54,7 @@ pub fn start_with(
         commands: command_receiver,
         teller: teller.clone(),
         before_step: options.before_step,
+        budget: options.budget,
         snapshot: Arc::clone(&snapshot),
         stop: Arc::clone(&stop),
         began: Instant::now(),
@@ -84,31 +84,6 @@ pub fn start_with(
     Ok(JobHandle { commands, events, snapshot, stop, thread: Some(thread) })
 }
 
-/// Where events go.
-#[derive(Clone)]
-struct Teller {
-    events: Sender<Event>,
-    wake: Option<Wake>,
-}
-
-impl Teller {
-    /// Sends an event without waiting; progress only while the reader keeps up.
-    fn send(&self, event: Event) {
-        if matches!(event, Event::Progress(_)) && self.events.len() >= MOST_WAITING_EVENTS {
-            return;
-        }
-        // Nobody listens any more: the fit goes on, its files are what counts.
-        let _ = self.events.send(event);
-        self.wake();
-    }
-
-    fn wake(&self) {
-        if let Some(wake) = &self.wake {
-            wake();
-        }
-    }
-}
-
 struct Worker {
     fitter: Fitter,
     settings: RunSettings,
@@ -116,6 +91,7 @@ struct Worker {
     commands: Receiver<Command>,
     teller: Teller,
     before_step: Option<Box<dyn FnMut(usize) + Send>>,
+    budget: Option<Budget>,
     snapshot: Arc<Slot<Snapshot>>,
     stop: Arc<AtomicBool>,
     began: Instant,
@@ -132,6 +108,7 @@ impl Worker {
             self.saver.folder().set_result_aside()?;
             // A program that is killed before its first checkpoint must not leave an earlier one beside another mesh.
             self.saver.folder().remove_checkpoint()?;
+            self.saver.write_known_maps(&self.fitter)?;
         }
         crate::export::obj::write(&self.saver.folder().file("mesh.obj"), self.fitter.surface().mesh())?;
         if steps_done == 0 {
@@ -147,7 +124,7 @@ impl Worker {
         self.put_snapshot();
         let mut last_snapshot = Instant::now();
         let mut told_events = 0;
-        loop {
+        let is_cut_short = loop {
             if self.obey() {
                 return self.end_early();
             }
@@ -160,9 +137,13 @@ impl Worker {
             if let Some(hook) = &mut self.before_step {
                 hook(self.fitter.state().step);
             }
-            match self.fitter.step(&self.stop)? {
+            if self.is_out_of_time() {
+                break true;
+            }
+            match self.step()? {
+                StepOutcome::Interrupted if self.is_out_of_time() => break true,
                 StepOutcome::Interrupted => return self.end_early(),
-                StepOutcome::Finished => break,
+                StepOutcome::Finished => break false,
                 StepOutcome::Stepped(row) => {
                     let state = self.fitter.state();
                     for event in &state.events[told_events..] {
@@ -185,9 +166,17 @@ impl Worker {
                 self.put_snapshot();
                 last_snapshot = Instant::now();
             }
-        }
+        };
         self.put_snapshot();
         self.save();
+        if let Some(budget) = self.budget.take().filter(|_| is_cut_short) {
+            let finding = budget.finding(&self.fitter);
+            // What goes on later is the checkpoint; the result is made of what there is.
+            self.fitter.cut_short();
+            self.teller.send(Event::Finding(finding.clone()));
+            prepared.findings.push(finding);
+            self.put_snapshot();
+        }
         if let Some(finding) = self.fitter.tail_finding() {
             self.teller.send(Event::Finding(finding));
         }
@@ -212,6 +201,22 @@ impl Worker {
             Err(error) => return Err(error),
         }
         Ok(())
+    }
+
+    /// One step; where the time is limited, it is dropped when that is up.
+    fn step(&mut self) -> Result<StepOutcome> {
+        let Worker { fitter, budget, stop, .. } = self;
+        match budget {
+            Some(budget) => budget.limit(stop, |flag| fitter.step(flag)),
+            None => fitter.step(stop),
+        }
+    }
+
+    /// Whether the time is up with steps left, and nobody asked for a stop.
+    fn is_out_of_time(&self) -> bool {
+        self.budget.as_ref().is_some_and(Budget::is_over)
+            && !self.stop.load(Ordering::Relaxed)
+            && !self.fitter.steps_left().is_empty()
     }
 
     /// Does what was asked since the last step; waits a moment for it while the job holds. `true` to end.

@@ -14,12 +14,13 @@ pub const OUTPUT: &str = "Output";
 pub const EXPERT: &str = "Expert";
 
 /// Headings of the settings of a fit; those that are not listed are for experts.
-const HEADINGS: [(&str, &str); 15] = [
+const HEADINGS: [(&str, &str); 16] = [
     ("exclude", SCENE),
     ("environment-height", LIGHT),
     ("background", LIGHT),
     ("exposure", LIGHT),
     ("fixed-light", LIGHT),
+    ("fixed-maps", LIGHT),
     ("method", METHOD),
     ("map-size", METHOD),
     ("bounces", METHOD),

@@ -138,12 +138,21 @@ pub struct FitOptions {
     /// Start from this environment (HDR, EXR, PFM); with --fixed-light it is taken as known.
     #[arg(long, value_name = "FILE", help_heading = groups::LIGHT)]
     pub env: Option<PathBuf>,
+    /// Keep the maps of this run of the same mesh, and find only the environment of these photos (and with --exposure their
+    /// gains).
+    #[arg(long, value_name = "RUN", help_heading = groups::LIGHT)]
+    pub maps: Option<PathBuf>,
     /// A set of settings to begin with; options on the command line take precedence [default: standard].
     #[arg(long, value_enum, conflicts_with = "settings", help_heading = groups::METHOD)]
     pub preset: Option<Preset>,
     /// A settings file as in a run folder; options on the command line take precedence.
     #[arg(long, value_name = "FILE", help_heading = groups::METHOD)]
     pub settings: Option<PathBuf>,
+    /// End the fit after about so many seconds, reading included, with the best that was found by then: maps, environment,
+    /// scores and report are written as for any fit, and `patina resume` does what was left out. Scores and report come
+    /// after that time.
+    #[arg(long, value_name = "N", value_parser = seconds, help_heading = groups::METHOD)]
+    pub seconds: Option<f64>,
     /// The run folder to write [default: a new one in `runs`, named after the scene]. A result that is there is set aside
     /// in `earlier` until the new one is whole.
     #[arg(short, long, value_name = "RUN", help_heading = groups::OUTPUT)]
@@ -151,6 +160,12 @@ pub struct FitOptions {
     /// How maps and environment are fitted.
     #[command(flatten)]
     pub fit: TypedSettings,
+}
+
+/// A time that can be waited for.
+fn seconds(text: &str) -> Result<f64, String> {
+    let seconds: f64 = text.parse().map_err(|_| "give a number of seconds".to_string())?;
+    if seconds.is_finite() && seconds > 0.0 { Ok(seconds) } else { Err("give more than 0 seconds".into()) }
 }
 
 /// Settings of a fit, and which of them were typed.
@@ -203,4 +218,7 @@ pub struct ResumeOptions {
     /// The scene, when it has moved since.
     #[arg(long)]
     pub scene: Option<PathBuf>,
+    /// End the fit after about so many seconds, as `patina fit --seconds` does.
+    #[arg(long, value_name = "N", value_parser = seconds)]
+    pub seconds: Option<f64>,
 }

@@ -84,6 +84,9 @@ impl SolverShare {
 /// maps anew. What is done on the coarsest is cheap, and the second maps know which lobes the first have shown.
 pub(super) fn positions_of_solver(settings: &FitSettings, share: SolverShare) -> Vec<Position> {
     let SolverShare { finest, coarse_maps, visits_again, finer_rounds } = share;
+    if settings.fixed_maps {
+        return positions_with_fixed_maps(settings);
+    }
     let mut positions: Vec<Position> = Vec::new();
     let map_size_at = |photo_level: usize| match coarse_maps {
         CoarseMaps::Halved => settings.map_size >> photo_level,
@@ -115,5 +118,28 @@ pub(super) fn positions_of_solver(settings: &FitSettings, share: SolverShare) ->
     }
     add(StageKind::Refine, settings.solver_refine, 0);
     add(StageKind::Polish, settings.solver_polish, 0);
+    positions
+}
+
+/// Light alone: on the coarsest level as ever, then with narrow hats on each finer one. The maps that are kept have their
+/// full size throughout; the solver halves them for its levels.
+fn positions_with_fixed_maps(settings: &FitSettings) -> Vec<Position> {
+    let is_large = |level: &usize| settings.map_size >> *level >= LEAST_COARSE_MAP;
+    let coarsest = (1..settings.solver_levels).take_while(is_large).last().unwrap_or(0);
+    let wide = settings.solver_rounds / 2;
+    let position = |kind, photo_level, total| Position {
+        kind,
+        photo_level,
+        map_size: settings.map_size,
+        visit: 0,
+        total,
+        place: 0,
+        places: 1,
+    };
+    let mut positions = vec![
+        position(StageKind::WideLight, coarsest, wide),
+        position(StageKind::NarrowLight, coarsest, settings.solver_rounds - wide),
+    ];
+    positions.extend((0..coarsest).rev().map(|level| position(StageKind::NarrowLight, level, FINER_ROUNDS)));
     positions
 }

@@ -1,6 +1,7 @@
 //! What the solver changes: maps, light and gains, and how sure it is of the maps.
 
 use super::light_evidence::LightKnown;
+use crate::atlas::{dilate, nearest_covered};
 use crate::image::Image;
 use crate::light::Environment;
 use crate::material::texels::maps_from_texels;
@@ -150,6 +151,17 @@ impl Estimate {
         pixels.resize(width * height, Vec3::ZERO);
         Environment { radiance: Image::from_pixels(width, height, pixels) }
     }
+}
+
+/// Texels of square maps that were not solved for take the values of the nearest that were; where none was, all stay.
+pub fn fill_from_solved(texels: &mut Vec<Material<f32>>, variances: &[TexelVariance], map_size: usize) {
+    let solved: Vec<bool> = variances.iter().map(TexelVariance::is_solved).collect();
+    if !solved.contains(&true) {
+        return;
+    }
+    let nearest = nearest_covered(&Image::from_pixels(map_size, map_size, solved));
+    let image = Image::from_pixels(map_size, map_size, std::mem::take(texels));
+    *texels = dilate(&image, &nearest).into_pixels();
 }
 
 /// How far the roughness, the square of a width, may be off (root mean square) where the logarithm of the width is normal

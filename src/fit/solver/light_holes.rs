@@ -13,7 +13,7 @@ const MOST_TO_RIM: f64 = 3.0 / 16.0;
 
 impl SolverScene {
     /// Fills the holes of a light that is not given.
-    pub(super) fn fill_holes(&self, light: &mut [[f32; 3]]) {
+    pub(in crate::fit) fn fill_holes(&self, light: &mut [[f32; 3]]) {
         if !self.settings.fixed_light {
             fill_holes(light, self.settings.light_size, &shown_by_background(&self.background, light.len()));
         }

@@ -1,4 +1,5 @@
-//! A round on the light: some blocks are solved under the light as it is, and their rows move it.
+//! A round on the light: some blocks are solved under the light as it is, and their rows move it. Where maps are given there is
+//! nothing to solve in a block, and its rows are all that it has to say.
 
 use super::coupling::{self, KeptUnknown};
 use super::eliminate::BlockRows;
@@ -27,6 +28,8 @@ const BACKGROUND_NOISE: f64 = 0.03;
 const BACKGROUND_GAUGE_SLACK: f64 = 0.05;
 /// A block with fewer observations says nothing of the light.
 const LEAST_OBSERVATIONS: usize = 16;
+/// The same where its reflectances are given: it has nothing to find out of them first.
+const LEAST_WITH_GIVEN_MAPS: usize = 4;
 /// Parts in which normal matrices are added up; fixed, so that results do not depend on the number of threads.
 const PARTS: usize = 4;
 
@@ -42,7 +45,7 @@ impl SolverScene {
         let round = self.round(estimate, &planes, &at_points);
         let openness = if self.settings.fixed_light { 1.0 } else { self.openness(number) };
         let prior = open_prior(self.observations.mean, openness);
-        let (mut equations, done) = self.equations(&round, &shape, &prior, number, stop)?;
+        let (mut equations, done) = self.equations(&round, estimate, &shape, &prior, number, stop)?;
 
         let light = if self.settings.fixed_light {
             None
@@ -67,18 +70,9 @@ impl SolverScene {
             estimate.light = light;
             estimate.light_known = known;
         }
-        for (index, work) in &done {
-            let solution = &work.solution;
-            for &(texel, cell) in &self.round_blocks[*index].texels {
-                if estimate.is_mapped(texel as usize) {
-                    continue;
-                }
-                let diffuse = solution.cells[usize::from(cell)];
-                let own = Material { diffuse, specular: solution.specular, log_width: solution.log_width };
-                estimate.set(texel as usize, own, TexelVariance::default());
-            }
+        if !self.settings.fixed_maps {
+            self.take_blocks(estimate, &done);
         }
-        estimate.fill_with_mean();
         if let Some(gains) = gains {
             estimate.log_gains = gains;
         }
@@ -90,6 +84,22 @@ impl SolverScene {
             view_errors: errors.of_views(&self.views),
             ..StepReport::default()
         })
+    }
+
+    /// Texels of solved blocks that no maps were made for take what was found for the block, all others the mean.
+    fn take_blocks(&self, estimate: &mut Estimate, done: &Solved) {
+        for (index, work) in done {
+            let solution = &work.solution;
+            for &(texel, cell) in &self.round_blocks[*index].texels {
+                if estimate.is_mapped(texel as usize) {
+                    continue;
+                }
+                let diffuse = solution.cells[usize::from(cell)];
+                let own = Material { diffuse, specular: solution.specular, log_width: solution.log_width };
+                estimate.set(texel as usize, own, TexelVariance::default());
+            }
+        }
+        estimate.fill_with_mean();
     }
 
     /// How far lobes are let go in a round: 0 in the first, 1 in the last, more in rounds on finer photos, which count
@@ -111,13 +121,15 @@ impl SolverScene {
     fn equations(
         &self,
         round: &Round,
+        estimate: &Estimate,
         shape: &LightShape,
         prior: &BlockPrior,
         number: usize,
         stop: &AtomicBool,
     ) -> Option<([NormalEquations; 3], Solved)> {
         let blocks = &self.round_blocks;
-        let chosen = plan::choose(blocks, self.settings.blocks, LEAST_OBSERVATIONS, self.settings.seed, number);
+        let least = if self.settings.fixed_maps { LEAST_WITH_GIVEN_MAPS } else { LEAST_OBSERVATIONS };
+        let chosen = plan::choose(blocks, self.settings.blocks, least, self.settings.seed, number);
         let part = chosen.len().div_ceil(PARTS).max(1);
         let parts: Vec<([NormalEquations; 3], Solved, [Vec<KeptUnknown>; 3])> = chosen
             .par_chunks(part)
@@ -132,10 +144,17 @@ impl SolverScene {
                     }
                     let mut work = BlockWork::default();
                     round.gather(&blocks[index], self.settings.observations, &mut work);
-                    if !round.solve(&blocks[index], prior, &mut work) {
+                    let is_solved = match self.settings.fixed_maps {
+                        true => round.take_given(estimate, prior, &mut work),
+                        false => round.solve(&blocks[index], prior, &mut work),
+                    };
+                    if !is_solved {
                         continue;
                     }
-                    if !self.settings.fixed_light {
+                    if self.settings.fixed_maps {
+                        round.given_rows(estimate, &work, shape, &mut rows);
+                        equations.iter_mut().zip(&rows).for_each(|(equations, rows)| equations.add(rows));
+                    } else if !self.settings.fixed_light {
                         round.rows(&blocks[index], &work, shape, &mut rows);
                         for (equations, rows) in equations.iter_mut().zip(&rows) {
                             equations.add(rows);
@@ -160,7 +179,7 @@ impl SolverScene {
             done.extend(part);
             kept.iter_mut().zip(own).for_each(|(kept, own)| kept.extend(own));
         }
-        if !self.settings.fixed_light {
+        if !self.settings.fixed_light && !self.settings.fixed_maps {
             let own: Vec<&plan::Block> = done.iter().map(|(index, _): &(usize, BlockWork)| &blocks[*index]).collect();
             let pairs = coupling::neighbours(&own);
             total.par_iter_mut().zip(&kept).for_each(|(total, kept)| {
@@ -190,7 +209,7 @@ impl SolverScene {
     /// the colour that highlights ask for.
     fn held_light(&self, estimate: &Estimate, done: &Solved, number: usize) -> [f64; 3] {
         let (row, grey) = &self.gauge;
-        if number < self.settings.coarse_rounds {
+        if number < self.settings.coarse_rounds || self.settings.fixed_maps {
             return *grey;
         }
         let now = [0, 1, 2].map(|c| -> f64 {
@@ -218,7 +237,12 @@ impl SolverScene {
             independence: self.settings.independence,
             // Where the background shows, it fixes the scale; but not alone: what photos show behind a thing is seldom as
             // far away as a sky, and the light would grow from round to round.
-            gauge_slack: if self.background.is_empty() { self.settings.gauge_slack } else { BACKGROUND_GAUGE_SLACK },
+            gauge_slack: match self.background.is_empty() {
+                // Maps that are given fix it, and nothing else should.
+                _ if self.settings.fixed_maps => f64::INFINITY,
+                true => self.settings.gauge_slack,
+                false => BACKGROUND_GAUGE_SLACK,
+            },
         };
         let mut light = estimate.light.clone();
         let mut known: Vec<ChannelKnown> = Vec::new();

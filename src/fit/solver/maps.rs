@@ -2,7 +2,7 @@
 
 use super::choice::alternatives::TileAlternatives;
 use super::choice::check::Check;
-use super::estimate::{Estimate, TexelVariance};
+use super::estimate::{Estimate, TexelVariance, fill_from_solved};
 use super::lobe_families;
 use super::lobe_prior::LobePrior;
 use super::lobe_tails::TailSums;
@@ -12,8 +12,6 @@ use super::report::{ErrorSums, StepReport, median};
 use super::round::{BlockWork, Round, open_prior};
 use super::scene::SolverScene;
 use super::tile::{TILE, Tile};
-use crate::atlas::{dilate, nearest_covered};
-use crate::image::Image;
 use crate::material::Material;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -149,13 +147,6 @@ impl SolverScene {
 
     /// Texels without observations take the values of the nearest that has some.
     pub(super) fn fill_from_neighbours(&self, estimate: &mut Estimate) {
-        let size = self.settings.map_size;
-        let solved: Vec<bool> = estimate.variances.iter().map(TexelVariance::is_solved).collect();
-        if !solved.contains(&true) {
-            return;
-        }
-        let nearest = nearest_covered(&Image::from_pixels(size, size, solved));
-        let texels = Image::from_pixels(size, size, std::mem::take(&mut estimate.texels));
-        estimate.texels = dilate(&texels, &nearest).into_pixels();
+        fill_from_solved(&mut estimate.texels, &estimate.variances, self.settings.map_size);
     }
 }

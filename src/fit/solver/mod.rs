@@ -8,7 +8,8 @@
 //!    looking at all.
 //! 3. [`round`]: a block's rows over the light; [`eliminate`] takes the block's own unknowns out of them, so that what is
 //!    left is the Schur complement of the joint Gauss-Newton system; [`coupling`] takes out the reflectances of all blocks
-//!    together, with what neighbours are believed to have in common.
+//!    together, with what neighbours are believed to have in common. `light_reach` is what light sends to a pixel,
+//!    `given_maps` does all of this for reflectances that are given.
 //! 4. [`light_step`]: the light from those rows, added up ([`normal_equations`]), at least zero ([`non_negative`]), in
 //!    wide and narrow hats ([`light_shape`]), with a weak wish for smoothness but for suns ([`light_suns`]).
 //!    [`light_round`] is the round as a whole, [`light_evidence`] says what each texel of the light is known by, `light_holes` fills what lies between texels
@@ -36,9 +37,11 @@ pub mod eliminate;
 pub mod estimate;
 mod freedom;
 mod gains;
+mod given_maps;
 mod light_colour;
 pub mod light_evidence;
 mod light_holes;
+mod light_reach;
 pub mod light_round;
 pub mod light_shape;
 pub mod light_step;

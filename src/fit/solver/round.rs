@@ -2,16 +2,18 @@
 
 use super::block::{BlockSolution, solve_block};
 use super::eliminate::BlockRows;
+use super::light_reach::LightReach;
 use super::light_shape::LightShape;
 use super::lobe_widths::{MOST_NODES, WIDTHS, log_widths};
 use super::observations::{Observation, Observations};
 use super::pixel_terms::{BlockPrior, PixelTerms};
 use super::plan::Block;
-use crate::math::sum_of_products;
-use crate::render::cached::irradiance::add_irradiance_row;
 use crate::render::cached::lobe_place::{LobeSums, wide_from};
-use crate::render::cached::lobe_sum::{add_lobe_row, lobe_sums, lobe_with_derivative};
+use crate::render::cached::lobe_sum::lobe_sums;
 use crate::render::cached::{CachedTransport, LightPlanes, PointLight, SeenLight, ShadingPoint, ViewFootprints};
+
+/// Weight of a pixel below which it says nothing of the light.
+pub(super) const LEAST_WEIGHT: f32 = 0.02;
 
 /// What all blocks of a round share.
 pub struct Round<'a> {
@@ -60,12 +62,12 @@ pub fn open_prior(mean_radiance: f32, openness: f64) -> BlockPrior {
 }
 
 impl Round<'_> {
-    fn point(&self, observation: &Observation) -> &ShadingPoint {
+    pub(super) fn point(&self, observation: &Observation) -> &ShadingPoint {
         &self.footprints[observation.view as usize].points[observation.point as usize]
     }
 
     /// Mean over an observation's footprint of what the points of the grid hold.
-    fn interpolate(&self, values: &[[f32; 3]], observation: &Observation) -> [f32; 3] {
+    pub(super) fn interpolate(&self, values: &[[f32; 3]], observation: &Observation) -> [f32; 3] {
         CachedTransport::interpolate(values, &self.footprints[observation.view as usize], self.point(observation))
     }
 
@@ -104,7 +106,7 @@ impl Round<'_> {
 
     /// Terms of a block in the order of the points of the grid that serve their lobes: what a point sees is put
     /// together once then.
-    fn by_lobe_point(&self, work: &BlockWork, mut terms: Vec<usize>) -> Vec<usize> {
+    pub(super) fn by_lobe_point(&self, work: &BlockWork, mut terms: Vec<usize>) -> Vec<usize> {
         terms.sort_by_key(|&index| self.point_of(work, index).lobe_point);
         terms
     }
@@ -179,7 +181,7 @@ impl Round<'_> {
         })
     }
 
-    fn reweigh(&self, work: &mut BlockWork) {
+    pub(super) fn reweigh(&self, work: &mut BlockWork) {
         let models: Vec<[f32; 3]> = work.terms.iter().map(|term| self.model(work, term)).collect();
         let squared = |term: &PixelTerms, model: &[f32; 3]| {
             (0..3).map(|c| (term.radiance[c] - model[c]).powi(2)).sum::<f32>() / 3.0
@@ -199,45 +201,22 @@ impl Round<'_> {
     /// units of the block's noise.
     pub fn rows(&self, block: &Block, work: &BlockWork, shape: &LightShape, made: &mut [BlockRows; 3]) {
         let Some(prior) = work.prior else { return };
-        let used: Vec<usize> = (0..work.used.len()).filter(|&index| work.terms[index].weight > 0.02).collect();
+        let used: Vec<usize> = (0..work.used.len()).filter(|&index| work.terms[index].weight > LEAST_WEIGHT).collect();
         let cells = block.cell_count;
         let unknowns = cells + 3;
         let count = shape.count();
         for rows in made.iter_mut() {
             rows.reset(count, used.len(), unknowns);
         }
-        let basis = &self.transport.basis;
         let solution = &work.solution;
         let width = solution.log_width.exp();
-        let mut full = vec![0.0f32; basis.padded()];
-        let mut seen = SeenLight::default();
-        let mut reduced = [(); 3].map(|()| vec![0.0f32; count]);
+        let mut reach = LightReach::new(self, shape);
         let row_of = |index: usize| used.partition_point(|&other| other < index);
         for index in self.by_lobe_point(work, used.clone()) {
             let (row, term) = (row_of(index), &work.terms[index]);
             let observation = &self.observations.list[work.used[index] as usize];
-            let point = self.point(observation);
-            for row in &mut reduced {
-                row.fill(0.0);
-            }
-            full.fill(0.0);
-            for &(at, weight) in self.footprints[observation.view as usize].lit_of(point) {
-                let normal = self.transport.grid.points[at as usize].shading_normal;
-                add_irradiance_row(basis, normal, self.transport.visibility.of(at as usize), weight, &mut full);
-            }
-            shape.reduce(&full, &mut reduced[0]);
-            let place = self.transport.lobe_place(point, self.light, self.at_points, &mut seen);
-            let sums = lobe_with_derivative(basis, &place, width);
-            // What the lobe sends of other surface: what is left of it without the light.
-            let mut of_surface = [[0.0f32; 3]; 2];
-            for (which, scales) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
-                full.fill(0.0);
-                add_lobe_row(basis, &place, width, scales, &mut full);
-                shape.reduce(&full, &mut reduced[1 + which]);
-                let all = [&sums.base, &sums.grazing][which];
-                of_surface[which] = [0, 1, 2].map(|c| all[c] - sum_of_products::<16>(&full, &self.light.channels[c]));
-            }
-            let direct = self.interpolate(&self.at_points.direct, observation);
+            reach.look(self, observation, width, shape);
+            let LightReach { rows: reduced, sums, of_surface, direct, .. } = &reach;
             let scale = f64::from(term.weight.sqrt()) / prior.noise;
             for (c, rows) in made.iter_mut().enumerate() {
                 let rho = solution.cells[usize::from(term.cell)][c];

@@ -40,6 +40,8 @@ pub struct SolverSettings {
     pub use_background: bool,
     /// Keep the light as it is.
     pub fixed_light: bool,
+    /// Keep the maps as they are.
+    pub fixed_maps: bool,
     /// Let views that took no part judge what lobes, light between surfaces and the light's resolution bought, when maps
     /// are made.
     pub check_choices: bool,
@@ -61,6 +63,7 @@ impl SolverSettings {
             exposure: settings.exposure,
             use_background: settings.background == BackgroundEvidence::Use,
             fixed_light: settings.fixed_light,
+            fixed_maps: settings.fixed_maps,
             check_choices: settings.solver_choices != Choosing::Off,
             seed: settings.seed,
             ..any
@@ -87,6 +90,7 @@ impl Default for SolverSettings {
             exposure: false,
             use_background: true,
             fixed_light: false,
+            fixed_maps: false,
             check_choices: false,
             seed: 1,
         }

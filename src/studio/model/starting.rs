@@ -95,7 +95,12 @@ impl Model {
     fn job_options(&self) -> JobOptions {
         let before_step = self.before_step.clone();
         let before_step = before_step.map(|hook| Box::new(move |step| hook(step)) as Box<dyn FnMut(usize) + Send>);
-        JobOptions { wake: Some(Arc::clone(&self.wake)), pool: background::pool("patina-fit"), before_step }
+        JobOptions {
+            wake: Some(Arc::clone(&self.wake)),
+            pool: background::pool("patina-fit"),
+            before_step,
+            budget: None,
+        }
     }
 
     fn go_on_with(&mut self, folder: RunFolder) {

@@ -1,0 +1,64 @@
+//! Ends a fit before its last step, with maps and light that are whole all the same.
+
+use super::fitter::Fitter;
+use super::schedule::StageKind;
+use super::settings::Method;
+use super::solver::estimate::fill_from_solved;
+use crate::material::LobeModel;
+use crate::material::lobe::nearest;
+
+impl Fitter {
+    /// The stages that are not done, by their names, with the steps that are left of each.
+    pub fn steps_left(&self) -> Vec<(String, usize)> {
+        let left = self.state.plan.iter().enumerate().skip(self.state.stage).map(|(number, stage)| {
+            let done = if number == self.state.stage { self.state.step_in_stage } else { 0 };
+            (stage.name(), stage.steps.saturating_sub(done))
+        });
+        left.filter(|(_, steps)| *steps > 0).collect()
+    }
+
+    /// Whether maps were made: by Adam from its first step on, by the solver once it has made some, of whatever size.
+    pub fn has_maps(&self) -> bool {
+        if self.settings.fixed_maps {
+            return true;
+        }
+        match self.settings.method {
+            Method::Solver | Method::Automatic => self.state.plan.iter().enumerate().any(|(number, stage)| {
+                let is_done = number < self.state.stage
+                    || (number == self.state.stage && self.state.step_in_stage >= stage.steps);
+                is_done && matches!(stage.kind, StageKind::Maps | StageKind::Refine)
+            }),
+            Method::Adam => self.state.step > 0,
+        }
+    }
+
+    /// Ends the fit with what there is: maps grow to their full size, texels that nothing was found for take what the
+    /// nearest has, and holes in the light are filled. The cheapest that is a whole result, in no time beside a step.
+    ///
+    /// The state is then that of a fit at its end: a checkpoint to go on from has to be written before.
+    pub fn cut_short(&mut self) {
+        let Some(stage) = self.stage().copied() else { return };
+        let knows_deviations = self.deviations_are_known();
+        if stage.kind.is_of_solver() {
+            let state = &mut self.state;
+            if let Some(solver) = &self.solver {
+                solver.fill_holes(&mut state.light);
+            }
+            if !state.variances.is_empty() {
+                fill_from_solved(&mut state.texels, &state.variances, state.map_size);
+            }
+        }
+        self.grow_maps(self.settings.map_size);
+        if self.lobe() != self.settings.lobe && self.settings.lobe == LobeModel::Ggx {
+            nearest::to_ggx(&mut self.state.texels);
+        }
+        if !knows_deviations {
+            // Those of a round on the light are none of the maps.
+            self.state.variances.clear();
+        }
+        self.state.stage = self.state.plan.len();
+        self.state.step_in_stage = 0;
+        self.work = None;
+        self.is_cut_short = true;
+    }
+}
