@@ -4,32 +4,28 @@
 //! ([`super::neighbours`]), and conjugate gradients go down what that makes (Gauss and Newton). The step is halved until the
 //! objective itself, with lobes integrated anew and light between surfaces as the new maps have it, is less; a step that
 //! never is leaves all as it was. Noise and gains are learned before each step, and stay while the objective falls.
+//!
+//! With a light it begins twice: at the texels that were found, and at one plain dielectric ([`super::second_start`]).
 
+use super::conjugate_gradients::conjugate_gradients;
 use super::estimate::Estimate;
-use super::neighbours::{Neighbours, Parabola};
+use super::freedom::Freedom;
+use super::neighbours::Neighbours;
 use super::objective::{Learned, Objective};
-use super::pixel_system::{Lanes, PieceRow, PixelSystem, Rows};
-use super::pixels::{Piece, Pixels};
+use super::pixel_system::{Lanes, PixelSystem, Rows};
+use super::pixels::Pixels;
 use super::report::ErrorSums;
 use super::scene::SolverScene;
+use super::sight::{Lit, Sight, Slopes, lanes_of};
 use crate::material::Material;
-use crate::render::cached::lobe_sum::lobe_with_derivative;
-use crate::render::cached::{CachedTransport, SeenLight};
 use rayon::prelude::*;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
-/// Observations whose lobes are integrated together, sorted by the points of the grid that serve them.
-const TOGETHER: usize = 4096;
-/// Texels that one sum of a dot product goes over: sums are the same whatever the number of threads.
-const CHUNK: usize = 1 << 14;
-/// Steps down.
-const STEPS: [Step; 4] = [
-    Step { iterations: 12, moves_widths: false },
-    Step { iterations: 12, moves_widths: false },
-    Step { iterations: 12, moves_widths: true },
-    Step { iterations: 24, moves_widths: true },
-];
+/// The first steps down, from each start.
+pub(super) const FIRST_STEPS: [Step; 2] = [Step { iterations: 12, slopes: Slopes::OfReflectances }; 2];
+/// Those after them, from the better one.
+const LAST_STEPS: [Step; 2] =
+    [Step { iterations: 12, slopes: Slopes::OfWidths }, Step { iterations: 24, slopes: Slopes::OfWidths }];
 /// Times that a step is halved.
 const HALVINGS: usize = 3;
 /// How far the logarithm of a width may go in one step: farther off its slope is another.
@@ -40,41 +36,9 @@ const WIDTH_REACH: f32 = 0.3;
 pub(super) struct Step {
     /// Iterations of conjugate gradients.
     pub(super) iterations: usize,
-    /// Whether widths move, and light between surfaces follows: lobes have to be integrated anew then. Without, pixels are
+    /// What moves. With widths, lobes are integrated anew after it, and light between surfaces follows; without, pixels are
     /// linear in the texels, and no integral is needed.
-    pub(super) moves_widths: bool,
-}
-
-/// Light without which there are only colours, or the one that was found.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Lit {
-    /// A texture without a light: a pixel is the mean of its texels' diffuse colours.
-    No,
-    /// The estimate's light, lobes and light between surfaces.
-    Yes,
-}
-
-/// What pixels see of an estimate.
-pub struct Sight {
-    /// The equations of pieces around it, times their shares.
-    pub pieces: Arc<Vec<PieceRow>>,
-    /// Radiance of each pixel, without the photo's gain.
-    pub radiance: Vec<[f32; 3]>,
-}
-
-impl Sight {
-    /// What some of the pixels see.
-    pub(super) fn of_some(&self, pixels: &Pixels, taken: &[usize]) -> Self {
-        let pieces = taken.iter().flat_map(|&index| &self.pieces[pixels.pieces(index)]).copied().collect();
-        Sight { pieces: Arc::new(pieces), radiance: taken.iter().map(|&index| self.radiance[index]).collect() }
-    }
-
-    /// What pixels see after texels went this far, by the equations around where they were.
-    pub(super) fn moved(&self, system: &mut PixelSystem, by: &[Lanes]) -> Self {
-        let sent = system.sent(&self.pieces, by);
-        let radiance = self.radiance.iter().zip(sent).map(|(own, more)| [0, 1, 2].map(|c| own[c] + more[c]));
-        Sight { pieces: Arc::clone(&self.pieces), radiance: radiance.collect() }
-    }
+    pub(super) slopes: Slopes,
 }
 
 /// Where a descent ended.
@@ -91,73 +55,32 @@ pub struct Descended {
     pub errors: ErrorSums,
 }
 
-impl SolverScene {
-    /// What pixels see. `None` when `stop` was raised.
-    pub(super) fn sight(
-        &self,
-        pixels: &Pixels,
-        system: &mut PixelSystem,
-        estimate: &Estimate,
-        texels: &[Material<f32>],
-        lit: Lit,
-        stop: &AtomicBool,
-    ) -> Option<Sight> {
-        let lanes: Vec<Lanes> = texels.par_iter().map(lanes_of).collect();
-        let means = system.means(&lanes);
-        let light = (lit == Lit::Yes).then(|| {
-            let planes = self.transport.basis.planes(&estimate.light);
-            let at_points = self.point_light(texels, &planes);
-            (planes, at_points)
-        });
-        let count = pixels.count();
-        let chunks: Vec<(Vec<PieceRow>, Vec<[f32; 3]>)> = (0..count.div_ceil(TOGETHER))
-            .into_par_iter()
-            .map_init(SeenLight::default, |seen, chunk| {
-                let range = chunk * TOGETHER..((chunk + 1) * TOGETHER).min(count);
-                let first = pixels.pieces(range.start).start;
-                let mut rows = vec![PieceRow::default(); pixels.pieces(range.end - 1).end - first];
-                let mut radiance = vec![[0.0f32; 3]; range.len()];
-                if stop.load(Ordering::Relaxed) {
-                    return (rows, radiance);
-                }
-                let mut order: Vec<(u32, usize, usize)> = range
-                    .clone()
-                    .flat_map(|pixel| (0..pixels.pieces(pixel).len()).map(move |which| (pixel, which)))
-                    .map(|(pixel, which)| (pixels.piece(pixel, which).point.lobe_point, pixel, which))
-                    .collect();
-                order.sort_unstable();
-                for (_, pixel, which) in order {
-                    let Piece { footprints, point } = pixels.piece(pixel, which);
-                    let index = pixels.pieces(pixel).start + which;
-                    let (row, mean) = (&mut rows[index - first], &means[index]);
-                    let radiance = &mut radiance[pixel - range.start];
-                    let Some((planes, at_points)) = &light else {
-                        row.arriving = [point.share; 3];
-                        (0..3).for_each(|c| radiance[c] += point.share * mean[c]);
-                        continue;
-                    };
-                    let arriving = CachedTransport::interpolate(&at_points.arriving, footprints, point);
-                    let place = self.transport.lobe_place(point, planes, at_points, seen);
-                    let sums = lobe_with_derivative(&self.transport.basis, &place, mean[6].exp());
-                    for c in 0..3 {
-                        let sent = arriving[c] * mean[c] + mean[3 + c] * sums.base[c] + sums.grazing[c];
-                        radiance[c] += point.share * sent;
-                        row.arriving[c] = point.share * arriving[c];
-                        row.base[c] = point.share * sums.base[c];
-                        row.slope[c] = point.share * (mean[3 + c] * sums.d_base[c] + sums.d_grazing[c]);
-                    }
-                }
-                (rows, radiance)
-            })
-            .collect();
-        if stop.load(Ordering::Relaxed) {
-            return None;
-        }
-        let (pieces, radiance): (Vec<_>, Vec<_>) = chunks.into_iter().unzip();
-        Some(Sight { pieces: Arc::new(pieces.concat()), radiance: radiance.concat() })
-    }
+/// A place on the way down.
+pub(super) struct Place {
+    /// The texels.
+    pub(super) texels: Vec<Material<f32>>,
+    /// What pixels see there.
+    pub(super) sight: Sight,
+    /// Noise and gains that were learned last.
+    pub(super) learned: Option<Learned>,
+    /// What is believed of the texels.
+    pub(super) beliefs: Neighbours,
+    /// Whether the sight has all slopes, at these very texels.
+    pub(super) is_exact: bool,
+}
 
-    /// Goes down from `estimate`'s texels. `None` when `stop` was raised.
+/// A way down.
+pub(super) struct Descent<'a> {
+    pub(super) scene: &'a SolverScene,
+    pub(super) pixels: &'a Pixels<'a>,
+    pub(super) system: PixelSystem,
+    estimate: &'a Estimate,
+    lit: Lit,
+    stop: &'a AtomicBool,
+}
+
+impl SolverScene {
+    /// Goes down from `start` under `estimate`'s light. `None` when `stop` was raised.
     pub(super) fn descend(
         &self,
         estimate: &Estimate,
@@ -166,48 +89,25 @@ impl SolverScene {
         stop: &AtomicBool,
     ) -> Option<Descended> {
         let pixels = Pixels::of(self);
-        let mut system = PixelSystem::new(&pixels, self.settings.map_size);
-        let mut texels = start;
-        let mut sight = self.sight(&pixels, &mut system, estimate, &texels, lit, stop)?;
-        let mut learned = Learned::of(&pixels, &sight, None);
-        let mut rows = learned.rows(&pixels, &sight);
-        let diagonal = system.diagonal(Rows { pieces: &sight.pieces, pixels: &rows });
+        let system = PixelSystem::new(&pixels, self.settings.map_size);
+        let mut descent = Descent { scene: self, pixels: &pixels, system, estimate, lit, stop };
+        let sight = descent.sight(&start, FIRST_STEPS[0].slopes)?;
+        let rows = Learned::of(&pixels, &sight, None).rows(&pixels, &sight);
+        let diagonal = descent.system.diagonal(Rows { pieces: &sight.pieces, pixels: &rows });
         let shown: Vec<bool> = diagonal.iter().map(|diagonal| diagonal[0] > 0.0).collect();
-        let freedom = self.choose_freedom(&pixels, &sight, (&texels, &shown), lit, stop)?;
-        let beliefs = Neighbours::new(self.settings.map_size, &texels, shown, freedom);
+        let freedom = self.choose_freedom(&pixels, &sight, (&start, &shown), lit, stop)?;
+
         let mut steps = Vec::new();
-        let mut is_exact = true;
-        for (number, step) in STEPS.into_iter().enumerate() {
-            if step.moves_widths && !is_exact {
-                sight = self.sight(&pixels, &mut system, estimate, &texels, lit, stop)?;
-            }
-            if number > 0 {
-                learned = Learned::of(&pixels, &sight, Some(&learned));
-                rows = learned.rows(&pixels, &sight);
-            }
-            let before = learned.objective(&pixels, &sight, beliefs.energies(&texels));
-            let parabola = beliefs.parabola(&texels);
-            let equations = Rows { pieces: &sight.pieces, pixels: &rows };
-            let way = conjugate_gradients(&mut system, equations, &parabola, step, stop)?;
-            let (mut share, mut after) = (1.0f32, before);
-            for _ in 0..=HALVINGS {
-                let next = stepped(&texels, &way, share, lit);
-                let seen = match step.moves_widths {
-                    true => self.sight(&pixels, &mut system, estimate, &next, lit, stop)?,
-                    false => sight.moved(&mut system, &difference(&texels, &next)),
-                };
-                let objective = learned.objective(&pixels, &seen, beliefs.energies(&next));
-                if objective.total() < before.total() {
-                    (texels, sight, after) = (next, seen, objective);
-                    is_exact = step.moves_widths;
-                    break;
-                }
-                share *= 0.5;
-            }
-            steps.push([before, after]);
+        let mut place = descent.down(descent.place(&start, sight, (&shown, freedom)), &FIRST_STEPS, &mut steps)?;
+        if lit == Lit::Yes {
+            place = descent.or_plain(place, (&start, &shown, freedom), &mut steps)?;
         }
-        rows = learned.rows(&pixels, &sight);
-        let precision = system.diagonal(Rows { pieces: &sight.pieces, pixels: &rows });
+        let place = descent.down(place, &LAST_STEPS, &mut steps)?;
+
+        let Place { texels, sight, learned, .. } = place;
+        let learned = learned?;
+        let rows = learned.rows(&pixels, &sight);
+        let precision = descent.system.diagonal(Rows { pieces: &sight.pieces, pixels: &rows });
         let mut errors = ErrorSums::new(self.views.len());
         for (index, row) in rows.iter().enumerate().filter(|(_, row)| row.weight > 0.0) {
             let own = pixels.pixel(index);
@@ -219,10 +119,54 @@ impl SolverScene {
     }
 }
 
-/// The numbers of a texel, and a gap.
-fn lanes_of(texel: &Material<f32>) -> Lanes {
-    let [a, b, c, d, e, f, log_width] = texel.to_array();
-    [a, b, c, d, e, f, log_width, 0.0]
+impl Descent<'_> {
+    /// What pixels see of texels. `None` when `stop` was raised.
+    pub(super) fn sight(&mut self, texels: &[Material<f32>], slopes: Slopes) -> Option<Sight> {
+        let pixels = (self.pixels, &mut self.system);
+        self.scene.sight(pixels, self.estimate, texels, (self.lit, slopes), self.stop)
+    }
+
+    /// A place to begin at, around which texels may differ so freely.
+    pub(super) fn place(&self, start: &[Material<f32>], sight: Sight, (shown, freedom): (&[bool], Freedom)) -> Place {
+        let beliefs = Neighbours::new(self.scene.settings.map_size, start, shown.to_vec(), freedom);
+        Place { texels: start.to_vec(), sight, learned: None, beliefs, is_exact: false }
+    }
+
+    /// Goes these steps from a place, and tells the objective before and after each. `None` when `stop` was raised.
+    pub(super) fn down(&mut self, from: Place, steps: &[Step], told: &mut Vec<[Objective; 2]>) -> Option<Place> {
+        let Place { mut texels, mut sight, mut learned, beliefs, mut is_exact } = from;
+        for (number, step) in steps.iter().enumerate() {
+            let moves_widths = step.slopes == Slopes::OfWidths;
+            if moves_widths && !is_exact {
+                sight = self.sight(&texels, step.slopes)?;
+            }
+            let by = Learned::of(self.pixels, &sight, learned.as_ref());
+            let rows = by.rows(self.pixels, &sight);
+            let before = by.objective(self.pixels, &sight, beliefs.energies(&texels));
+            let parabola = beliefs.parabola(&texels);
+            let equations = Rows { pieces: &sight.pieces, pixels: &rows };
+            let way = conjugate_gradients(&mut self.system, equations, &parabola, *step, self.stop)?;
+            let after_it = steps.get(number + 1).map_or(Slopes::OfReflectances, |next| next.slopes);
+            let (mut share, mut after) = (1.0f32, before);
+            for _ in 0..=HALVINGS {
+                let next = stepped(&texels, &way, share, self.lit);
+                let seen = match moves_widths {
+                    true => self.sight(&next, after_it)?,
+                    false => sight.moved(&mut self.system, &difference(&texels, &next)),
+                };
+                let objective = by.objective(self.pixels, &seen, beliefs.energies(&next));
+                if objective.total() < before.total() {
+                    (texels, sight, after) = (next, seen, objective);
+                    is_exact = moves_widths && after_it == Slopes::OfWidths;
+                    break;
+                }
+                share *= 0.5;
+            }
+            told.push([before, after]);
+            learned = Some(by);
+        }
+        Some(Place { texels, sight, learned, beliefs, is_exact })
+    }
 }
 
 /// Texels after a share of a step, within what there is.
@@ -251,74 +195,4 @@ pub(super) fn difference(from: &[Material<f32>], to: &[Material<f32>]) -> Vec<La
         std::array::from_fn(|lane| to[lane] - from[lane])
     };
     from.par_iter().zip(to).map(one).collect()
-}
-
-fn dot(a: &[Lanes], b: &[Lanes]) -> f64 {
-    let of_chunk = |(a, b): (&[Lanes], &[Lanes])| -> f64 {
-        a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
-    };
-    let sums: Vec<f64> = a.par_chunks(CHUNK).zip(b.par_chunks(CHUNK)).map(of_chunk).collect();
-    sums.into_iter().sum()
-}
-
-/// `a = factor_of_a a + factor_of_b b`.
-fn combine(a: &mut [Lanes], factor_of_a: f32, b: &[Lanes], factor_of_b: f32) {
-    a.par_iter_mut().zip(b).for_each(|(a, b)| {
-        for k in 0..8 {
-            a[k] = factor_of_a * a[k] + factor_of_b * b[k];
-        }
-    });
-}
-
-/// The way to the least of pixels' squares and beliefs' parabola, about. `None` when `stop` was raised.
-pub(super) fn conjugate_gradients(
-    system: &mut PixelSystem,
-    rows: Rows,
-    beliefs: &Parabola,
-    step: Step,
-    stop: &AtomicBool,
-) -> Option<Vec<Lanes>> {
-    let mut diagonal = system.diagonal(rows);
-    diagonal.par_iter_mut().enumerate().for_each(|(texel, diagonal)| {
-        let of_beliefs = beliefs.diagonal(texel);
-        for k in 0..8 {
-            diagonal[k] += of_beliefs[k];
-        }
-    });
-    let precondition = |residual: &[Lanes]| -> Vec<Lanes> {
-        let lanes = if step.moves_widths { 7 } else { 6 };
-        let one = |(residual, diagonal): (&Lanes, &Lanes)| {
-            std::array::from_fn(|k| if k < lanes && diagonal[k] > 0.0 { residual[k] / diagonal[k] } else { 0.0 })
-        };
-        residual.par_iter().zip(&diagonal).map(one).collect()
-    };
-    let mut residual = system.pull(rows);
-    combine(&mut residual, 1.0, beliefs.slope(), -1.0);
-    let mut way = vec![[0.0f32; 8]; residual.len()];
-    let mut z = precondition(&residual);
-    let mut direction = z.clone();
-    let mut power = dot(&residual, &z);
-    let first = power;
-    for _ in 0..step.iterations {
-        if stop.load(Ordering::Relaxed) {
-            return None;
-        }
-        if power.is_nan() || power <= 1e-10 * first {
-            break;
-        }
-        let mut product = system.product(rows, &direction);
-        beliefs.add_product(&direction, &mut product);
-        let along = dot(&direction, &product);
-        if along.is_nan() || along <= 0.0 {
-            break;
-        }
-        let length = (power / along) as f32;
-        combine(&mut way, 1.0, &direction, length);
-        combine(&mut residual, 1.0, &product, -length);
-        z = precondition(&residual);
-        let next = dot(&residual, &z);
-        combine(&mut direction, (next / power) as f32, &z, 1.0);
-        power = next;
-    }
-    Some(way)
 }

@@ -6,12 +6,14 @@
 //! fourth view is withheld from a few short descents on a part of the surface, with one [`Freedom`] each, and the one is
 //! taken that predicts those views best (cross-validation; Stone 1974).
 
-use super::descent::{Lit, Sight, Step, conjugate_gradients, difference, stepped};
+use super::conjugate_gradients::conjugate_gradients;
+use super::descent::{Step, difference, stepped};
 use super::neighbours::Neighbours;
 use super::objective::Learned;
 use super::pixel_system::{PixelRow, PixelSystem, Rows};
 use super::pixels::Pixels;
 use super::scene::SolverScene;
+use super::sight::{Lit, Sight, Slopes};
 use crate::material::Material;
 use std::sync::atomic::AtomicBool;
 
@@ -40,7 +42,7 @@ const PIXELS: usize = 1 << 16;
 /// Pixels of a chunk, which lie side by side on the surface.
 const CHUNK: usize = 2048;
 /// Two short steps.
-const STEPS: [Step; 2] = [Step { iterations: 16, moves_widths: false }; 2];
+const STEPS: [Step; 2] = [Step { iterations: 16, slopes: Slopes::OfReflectances }; 2];
 
 /// What candidates are held against each other with.
 struct Contest<'a> {

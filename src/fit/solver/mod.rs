@@ -17,8 +17,9 @@
 //! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`) with the footprints of pixels, where the evidence,
 //!    as far as it is independent (`tile_independence`), decides which texels share a lobe ([`lobe_tree`],
 //!    [`lobe_evidence`], [`lobe_prior`], [`lobe_sums`], [`lobe_widths`], [`lobe_families`], `lobe_scene`).
-//!    Then `refine`: [`descent`] of the one [`objective`] over all texels, by whole [`pixels`] (`pixel_system`), with what
-//!    `neighbours` have in common and as much `freedom` as predicts photos that took no part.
+//!    Then `refine`: [`descent`] of the one [`objective`] over all texels (`conjugate_gradients`), by what whole [`pixels`] see
+//!    (`sight`, `pixel_system`), with what `neighbours` have in common and as much `freedom` as predicts photos that took no
+//!    part; from the lobes that were found, or those of one dielectric where that explains pixels better (`second_start`).
 //! 6. [`choice`]: views that took no part say what lobes, light between surfaces and the light's resolution bought;
 //!    `lobe_tails` says whether highlights reach further than the model's lobes.
 //! 7. [`solver`]: the steps in their order. A fit does them one by one, as [`crate::fit::Fitter`] does those of Adam: on
@@ -31,6 +32,7 @@
 pub mod block;
 mod cell_sums;
 pub mod choice;
+mod conjugate_gradients;
 pub mod coupling;
 pub mod descent;
 pub mod eliminate;
@@ -71,8 +73,10 @@ mod refine;
 pub mod report;
 pub mod round;
 pub mod scene;
+mod second_start;
 pub mod settings;
 mod sieve;
+mod sight;
 #[allow(clippy::module_inception)]
 pub mod solver;
 pub mod tile;

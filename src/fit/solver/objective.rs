@@ -3,11 +3,11 @@
 //! `J = sum over pixels of -ln Student((y - g I) / sigma)`, plus what is believed of neighbouring texels and of lobes.
 //! What noise and gains are is learned from the capture ([`Learned`]); by those of one moment J is compared with itself.
 
-use super::descent::Sight;
 use super::photo_gains::{GainSums, gains};
 use super::pixel_noise::{PixelNoise, Residual};
 use super::pixel_system::PixelRow;
 use super::pixels::Pixels;
+use super::sight::Sight;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -36,6 +36,7 @@ impl Objective {
 }
 
 /// What is learned from the residuals of a capture.
+#[derive(Clone)]
 pub struct Learned {
     /// Gain of each view and channel.
     pub gains: Vec<[f32; 3]>,

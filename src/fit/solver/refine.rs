@@ -3,10 +3,11 @@
 //! With a light and without one the same objective is made less from the same pixels with the same texels. So what the light
 //! bought can be read from the two.
 
-use super::descent::{Descended, Lit};
+use super::descent::Descended;
 use super::estimate::{Estimate, START_TEXEL, TexelVariance};
 use super::report::{StepReport, median};
 use super::scene::SolverScene;
+use super::sight::Lit;
 use crate::material::Material;
 use std::sync::atomic::AtomicBool;
 
@@ -66,10 +67,11 @@ impl SolverScene {
 
 #[cfg(all(test, feature = "cli"))]
 #[allow(clippy::unwrap_used)]
-mod tests {
+pub(super) mod tests {
     use super::super::SolverSettings;
     use super::super::pixel_system::PixelSystem;
     use super::super::pixels::Pixels;
+    use super::super::sight::Slopes;
     use super::super::solver::Solver;
     use super::*;
     use crate::core_tests::hard_scenes::bowl_of_plaster;
@@ -78,10 +80,11 @@ mod tests {
     use crate::render::Surface;
     use glam::Vec3;
 
-    const SIZE: usize = 64;
+    /// Texels along the side of the maps.
+    pub const SIZE: usize = 64;
 
     /// A bowl whose photos are what the cache makes of a surface of patches under gains, and one pixel in fifty is wrong.
-    fn photographed(gains: impl Fn(usize) -> [f32; 3]) -> (Solver, Vec<Material<f32>>) {
+    pub fn photographed(gains: impl Fn(usize) -> [f32; 3]) -> (Solver, Vec<Material<f32>>) {
         let scene = bowl_of_plaster(SIZE);
         let surface = Surface::new(scene.mesh.clone()).unwrap();
         let settings = SolverSettings { map_size: SIZE, grid: SIZE, light_size: (32, 16), ..SolverSettings::default() };
@@ -99,7 +102,13 @@ mod tests {
             let pixels = Pixels::of(&solver.scene);
             let mut system = PixelSystem::new(&pixels, SIZE);
             let never = AtomicBool::new(false);
-            let sight = solver.scene.sight(&pixels, &mut system, &solver.estimate, &truth, Lit::Yes, &never);
+            let sight = solver.scene.sight(
+                (&pixels, &mut system),
+                &solver.estimate,
+                &truth,
+                (Lit::Yes, Slopes::OfReflectances),
+                &never,
+            );
             (sight.unwrap().radiance, pixels.whole())
         };
         let mut random = SequentialRandom::new(7);

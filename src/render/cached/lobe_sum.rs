@@ -34,6 +34,13 @@ pub fn lobe_sums(basis: &LightBasis, place: &LobePlace, widths: &[f32], sums: &m
     }
 }
 
+/// The sums of a lobe, without derivatives.
+pub fn lobe_alone(basis: &LightBasis, place: &LobePlace, width: f32) -> LobeSums {
+    let mut sums = [LobeSums::default()];
+    lobe_sums(basis, place, &[width], &mut sums);
+    sums[0]
+}
+
 /// The sums of a lobe and their derivatives by the logarithm of its width.
 ///
 /// Over hats the derivative is that of the sum. Over half vectors it is the difference of the sum at widths two per cent

@@ -1,0 +1,141 @@
+//! A second start of the [descent](super::descent): one plain dielectric, where that explains pixels better.
+//!
+//! The objective has many minima over lobes: from a metal, black below its lobe, no small step leads to a painted wall. Lobes
+//! come from tiles, which may have taken what is wrong with light, mesh or cameras for metal, and then no descent gets rid of
+//! it. So the same steps are gone from a surface that has the same dielectric everywhere, with the colours that pixels show
+//! under it. The surface is cut into small squares of texels, and each goes on from where its part of the objective, pixels
+//! and beliefs together, is less; all of it only if the whole objective is less then.
+
+use super::descent::{Descent, FIRST_STEPS, Place, difference};
+use super::estimate::START_TEXEL;
+use super::freedom::Freedom;
+use super::objective::{Learned, Objective};
+use super::sight::{Sight, Slopes};
+use crate::material::Material;
+use rayon::prelude::*;
+
+/// F0 of the dielectric: that of a refractive index of 1.5.
+const PLAIN_SPECULAR: f32 = 0.04;
+/// Texels along the side of a square.
+const SQUARE: usize = 8;
+
+impl Descent<'_> {
+    /// Where to go on from: `found`, which began at `start`, or with the dielectric where that is better. What it chose is
+    /// told as a step. `None` when the descent was stopped.
+    pub(super) fn or_plain(
+        &mut self,
+        found: Place,
+        (start, shown, freedom): (&[Material<f32>], &[bool], Freedom),
+        told: &mut Vec<[Objective; 2]>,
+    ) -> Option<Place> {
+        let (plain_start, sight) = self.plain(&found, start, shown)?;
+        let plain = self.down(self.place(&plain_start, sight, (shown, freedom)), &FIRST_STEPS, &mut Vec::new())?;
+        let by = Learned::of(self.pixels, &found.sight, found.learned.as_ref());
+        let better = self.better(&found, &plain, &by);
+        let choose = |one: &[Material<f32>], other: &[Material<f32>]| -> Vec<Material<f32>> {
+            (0..one.len()).map(|texel| if better[texel] { other[texel] } else { one[texel] }).collect()
+        };
+        let texels = choose(&found.texels, &plain.texels);
+        let sight = self.sight(&texels, Slopes::OfReflectances)?;
+        let begun = self.place(&choose(start, &plain_start), sight, (shown, freedom));
+        // Where squares meet neighbours differ at once; a step makes that good before it is judged.
+        let begun = Place { texels, learned: found.learned.clone(), ..begun };
+        let mixed = self.down(begun, &FIRST_STEPS[..1], &mut Vec::new())?;
+        let objective = |place: &Place| by.objective(self.pixels, &place.sight, place.beliefs.energies(&place.texels));
+        let (before, after) = (objective(&found), objective(&mixed));
+        if after.total() >= before.total() {
+            return Some(found);
+        }
+        told.push([before, after]);
+        Some(mixed)
+    }
+
+    /// The dielectric with the colours that pixels show under it: closed, texel by texel of those that pixels cover most.
+    fn plain(&mut self, found: &Place, start: &[Material<f32>], shown: &[bool]) -> Option<(Vec<Material<f32>>, Sight)> {
+        let mut widths: Vec<f32> =
+            start.iter().zip(shown).filter(|(_, shown)| **shown).map(|(own, _)| own.log_width).collect();
+        let middle = widths.len() / 2;
+        let log_width = match widths.is_empty() {
+            true => START_TEXEL.log_width,
+            false => *widths.select_nth_unstable_by(middle, f32::total_cmp).1,
+        };
+        let mut made: Vec<Material<f32>> =
+            start.iter().map(|own| Material { specular: [PLAIN_SPECULAR; 3], log_width, ..*own }).collect();
+        let sight = self.sight(&made, Slopes::OfReflectances)?;
+        let rows = found.learned.as_ref()?.rows(self.pixels, &sight);
+        let mut sums = vec![[[0.0f32; 3]; 2]; made.len()];
+        for (index, row) in rows.iter().enumerate().take(self.pixels.whole()) {
+            let [of_left, of_light] = &mut sums[self.pixels.texel(index) as usize];
+            for c in 0..3 {
+                let arriving = row.gain[c] * sight.pieces[index].arriving[c];
+                of_left[c] += row.weight * arriving * row.left[c];
+                of_light[c] += row.weight * arriving * arriving;
+            }
+        }
+        let before = made.clone();
+        for (own, [of_left, of_light]) in made.iter_mut().zip(&sums) {
+            for c in (0..3).filter(|&c| of_light[c] > 0.0) {
+                own.diffuse[c] = (own.diffuse[c] + of_left[c] / of_light[c]).clamp(0.0, 1.0);
+            }
+        }
+        let sight = sight.moved(&mut self.system, &difference(&before, &made));
+        Some((made, sight))
+    }
+
+    /// The texels of squares whose part of the objective is less at the other place; both by the same noise.
+    fn better(&self, one: &Place, other: &Place, by: &Learned) -> Vec<bool> {
+        let size = self.scene.settings.map_size;
+        let across = size.div_ceil(SQUARE);
+        let square = |texel: usize| texel / size / SQUARE * across + texel % size / SQUARE;
+        let by_other = Learned::of(self.pixels, &other.sight, other.learned.as_ref()).with_noise_of(by);
+        let gains: Vec<f64> = (0..self.pixels.count())
+            .into_par_iter()
+            .map(|pixel| by.nats(self.pixels, &one.sight, pixel) - by_other.nats(self.pixels, &other.sight, pixel))
+            .collect();
+        let mut gained = vec![0.0f64; across * across];
+        for (pixel, gain) in gains.into_iter().enumerate() {
+            gained[square(self.pixels.texel(pixel) as usize)] += gain;
+        }
+        let beliefs = [one, other].map(|place| place.beliefs.energies_of_texels(&place.texels));
+        for (texel, ([a, b], [c, d])) in beliefs[0].iter().zip(&beliefs[1]).enumerate() {
+            gained[square(texel)] += a + b - c - d;
+        }
+        (0..size * size).map(|texel| gained[square(texel)] > 0.0).collect()
+    }
+}
+
+#[cfg(all(test, feature = "cli"))]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::super::refine::tests::{SIZE, photographed};
+    use super::super::sight::Lit;
+    use super::super::solver::Solver;
+    use super::*;
+    use std::sync::atomic::AtomicBool;
+
+    #[test]
+    fn false_metal_becomes_the_painted_wall_that_it_is() {
+        let (solver, truth) = photographed(|_| [1.0; 3]);
+        let Solver { scene, estimate } = &solver;
+        // The upper half of the maps begins as a metal of the wall's colour, the lower half as it is.
+        let mut start = truth.clone();
+        for own in &mut start[..SIZE * SIZE / 2] {
+            *own = Material { diffuse: [0.02; 3], specular: own.diffuse, log_width: own.log_width };
+        }
+        let found = scene.descend(estimate, start, Lit::Yes, &AtomicBool::new(false)).unwrap();
+        // Two steps, what was chosen, two steps.
+        assert_eq!(found.steps.len(), 5, "{:?}", found.steps);
+        let [before, after] = found.steps[2];
+        assert!(after.total() < before.total() && after.neighbours < before.neighbours, "{before:?} {after:?}");
+        for half in [0..SIZE * SIZE / 2, SIZE * SIZE / 2..SIZE * SIZE] {
+            let mut specular: Vec<f32> = half
+                .filter(|&texel| scene.observations.range(texel).len() > 3)
+                .map(|texel| found.texels[texel].specular[1])
+                .collect();
+            assert!(specular.len() > 200, "{}", specular.len());
+            specular.sort_by(f32::total_cmp);
+            let [middle, most] = [0.5, 0.95].map(|share| specular[(specular.len() as f64 * share) as usize]);
+            assert!((0.02..0.08).contains(&middle) && most < 0.15, "{middle} {most}");
+        }
+    }
+}
