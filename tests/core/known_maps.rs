@@ -108,8 +108,9 @@ fn the_light_is_found_nearer_to_the_truth_than_with_maps_that_are_sought_too() {
     assert_eq!(stages, ["wide light", "wide light", "wide light", "narrow light", "narrow light", "narrow light"]);
     assert_eq!(keeping.gauge(), GaugeRule::FixedMaps);
     assert!(keeping.deviations().is_none() && keeping.light_evidence().is_some());
-    let held_out = keeping.state().losses.last().unwrap().held_out_rmse.unwrap();
-    assert!(held_out < free.state().losses.last().unwrap().held_out_rmse.unwrap(), "{held_out}");
+    // Round by round it explains the photo better that took no part.
+    let held_out: Vec<f64> = keeping.state().losses.iter().filter_map(|row| row.held_out_rmse).collect();
+    assert!(held_out.last().unwrap() < &(0.8 * held_out[0]), "{held_out:?}");
 }
 
 #[test]
