@@ -53,9 +53,7 @@ impl Fitter {
     /// What the solver begins a round with where maps are kept: those of its level, the light so far.
     pub(super) fn estimate_of_known(&self, solver: &SolverScene) -> Result<Estimate> {
         let Some(known) = &self.known_maps else {
-            return Err(Error::new(ErrorKind::InvalidSetting, "maps are to be kept, and none are given")
-                .at(Place::Setting("fixed-maps".into()))
-                .remedy("name the run that has them: --maps RUN"));
+            return Err(none_given());
         };
         let (mut texels, mut size) = (self.state.texels.clone(), self.state.map_size);
         let mut is_seen: Vec<bool> = known.times_seen.pixels().iter().map(|&times| times > 0.0).collect();
@@ -74,6 +72,13 @@ impl Fitter {
             log_gains: solver.views.iter().map(|&view| self.state.log_gains[view]).collect(),
         })
     }
+}
+
+/// Maps are to be kept, and none are named.
+pub(crate) fn none_given() -> Error {
+    Error::new(ErrorKind::InvalidSetting, "maps are to be kept, and none are given")
+        .at(Place::Setting("fixed-maps".into()))
+        .remedy("name the run that has them: --maps RUN")
 }
 
 /// Of maps of half the size, which texels have all of their four.

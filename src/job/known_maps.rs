@@ -10,6 +10,7 @@ use crate::atlas::{AtlasSettings, KeepUv};
 use crate::error::{Error, ErrorKind, Finding, Place, Result};
 use crate::export::{RunFolder, RunResult};
 use crate::fit::KnownMaps;
+use crate::fit::known_maps::none_given;
 use crate::insight::report::data::StageTime;
 use crate::material::LobeModel;
 use crate::render::Surface;
@@ -95,9 +96,7 @@ pub(super) fn of_settings(settings: &RunSettings, surface: &Surface) -> Result<O
     if run.as_os_str().is_empty() {
         return match settings.fit.fixed_maps {
             false => Ok(None),
-            true => Err(Error::new(ErrorKind::InvalidSetting, "maps are to be kept, and none are given")
-                .at(Place::Setting("fixed-maps".into()))
-                .remedy("name the run that has them: --maps RUN")),
+            true => Err(none_given()),
         };
     }
     let RunResult { maps, times_seen, mesh, .. } = read(run)?;
