@@ -2,10 +2,11 @@
 //!
 //! A [`Check`] fits, measures, and says a figure; where it falls short of what the program promises it says by how much.
 //! One that lacks an input it needs is told as left out, never as passed. [`captures`] fits spoiled captures,
-//! [`contests`] starts processes as `patina-lab bench fit` does.
+//! [`contests`] starts processes as `patina-lab bench fit` does, [`slow_tests`] runs what `cargo test` leaves out.
 
 mod captures;
 mod contests;
+mod slow_tests;
 
 use crate::error::{Error, ErrorKind, Result};
 use std::path::Path;
@@ -33,7 +34,7 @@ pub struct Check {
 }
 
 /// All checks, the quick ones first.
-pub const CHECKS: [Check; 5] = [
+pub const CHECKS: [Check; 6] = [
     Check {
         name: "contest",
         about: "a contest leaves tables and says who could not run",
@@ -50,6 +51,7 @@ pub const CHECKS: [Check; 5] = [
         run: captures::defects_are_told,
     },
     Check { name: "lobe-tails", about: "lobes with tails are told, over seeds", run: captures::tails_are_told },
+    Check { name: "slow-tests", about: "every test marked as slow passes", run: slow_tests::pass },
     Check { name: "mitsuba", about: "Mitsuba takes part in a contest", run: contests::with_mitsuba },
 ];
 
