@@ -5,8 +5,7 @@
 //! objective itself, with lobes integrated anew and light between surfaces as the new maps have it, is less; a step that
 //! never is leaves all as it was. Noise and gains are learned before each step, and stay while the objective falls.
 //!
-//! With a light, and where tiles saw no full-size photos, it begins twice: at the texels that were found, and at one plain
-//! dielectric ([`super::second_start`]).
+//! With a light it begins twice: at the texels that were found, and at one plain dielectric ([`super::second_start`]).
 
 use super::conjugate_gradients::conjugate_gradients;
 use super::estimate::Estimate;
@@ -100,7 +99,7 @@ impl SolverScene {
 
         let mut steps = Vec::new();
         let mut place = descent.down(descent.place(&start, sight, (&shown, freedom)), &FIRST_STEPS, &mut steps)?;
-        if lit == Lit::Yes && self.settings.second_start {
+        if lit == Lit::Yes {
             place = descent.or_plain(place, (&start, &shown, freedom), &mut steps)?;
         }
         let place = descent.down(place, &LAST_STEPS, &mut steps)?;

@@ -97,31 +97,28 @@ impl Neighbours {
     /// Negative logarithm of the densities, constants left out: of differences between neighbours, and of lobes in their
     /// regions. In nats.
     pub fn energies(&self, texels: &[Material<f32>]) -> [f64; 2] {
-        let of_texels = self.energies_of_texels(texels);
-        let of_chunk =
-            |chunk: &[[f64; 2]]| chunk.iter().fold([0.0; 2], |total, own| [total[0] + own[0], total[1] + own[1]]);
-        let sums: Vec<[f64; 2]> = of_texels.par_chunks(CHUNK).map(of_chunk).collect();
-        of_chunk(&sums)
-    }
-
-    /// The same texel by texel; a difference is told of the upper or left one of two.
-    pub fn energies_of_texels(&self, texels: &[Material<f32>]) -> Vec<[f64; 2]> {
         let logarithms: Vec<[f32; 7]> = texels.par_iter().map(|texel| self.logarithms(texel)).collect();
-        let one = |(own, texel): (usize, &Material<f32>)| {
-            if !self.shown[own] {
-                return [0.0; 2];
+        let of_chunk = |(which, chunk): (usize, &[Material<f32>])| {
+            let mut sums = [0.0f64; 2];
+            for (offset, texel) in chunk.iter().enumerate() {
+                let own = which * CHUNK + offset;
+                if !self.shown[own] {
+                    continue;
+                }
+                for other in self.pairs_of(own).into_iter().flatten() {
+                    let squares = self.squares(&logarithms[own], &logarithms[other]);
+                    sums[0] += squares
+                        .iter()
+                        .zip(DIMENSIONS)
+                        .map(|(square, n)| power(n) * f64::from(square.ln_1p()))
+                        .sum::<f64>();
+                }
+                sums[1] += 0.5 * self.away(own, texel).iter().map(|away| f64::from(away * away)).sum::<f64>();
             }
-            let of_pair = |other: usize| -> f64 {
-                let squares = self.squares(&logarithms[own], &logarithms[other]);
-                squares.iter().zip(DIMENSIONS).map(|(square, n)| power(n) * f64::from(square.ln_1p())).sum()
-            };
-            let away = self.away(own, texel);
-            [
-                self.pairs_of(own).into_iter().flatten().map(of_pair).sum(),
-                0.5 * away.iter().map(|away| f64::from(away * away)).sum::<f64>(),
-            ]
+            sums
         };
-        texels.par_iter().enumerate().map(one).collect()
+        let of_chunks: Vec<[f64; 2]> = texels.par_chunks(CHUNK).enumerate().map(of_chunk).collect();
+        of_chunks.iter().fold([0.0; 2], |total, own| [total[0] + own[0], total[1] + own[1]])
     }
 
     /// How far a lobe is from its region's, in standard deviations.

@@ -193,6 +193,20 @@ impl<'a> Pixels<'a> {
         }
     }
 
+    /// The pixels whose first texel is in this range.
+    pub fn of_texels(&self, texels: std::ops::Range<usize>) -> impl Iterator<Item = usize> {
+        let first = |texel: usize, mut low: usize, mut high: usize| {
+            while low < high {
+                let middle = low.midpoint(high);
+                if (self.texel(middle) as usize) < texel { low = middle + 1 } else { high = middle }
+            }
+            low
+        };
+        let (whole, count) = (self.whole(), self.count());
+        let within = |low, high| first(texels.start, low, high)..first(texels.end, low, high);
+        within(0, whole).chain(within(whole, count))
+    }
+
     /// The pieces of a pixel among all pieces.
     #[inline]
     pub fn pieces(&self, index: usize) -> std::ops::Range<usize> {

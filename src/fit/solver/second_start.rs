@@ -3,8 +3,8 @@
 //! The objective has many minima over lobes: from a metal, black below its lobe, no small step leads to a painted wall. Lobes
 //! come from tiles, which may have taken what is wrong with light, mesh or cameras for metal, and then no descent gets rid of
 //! it. So the same steps are gone from a surface that has the same dielectric everywhere, with the colours that pixels show
-//! under it. The surface is cut into small squares of texels, and each goes on from where its part of the objective, pixels
-//! and beliefs together, is less; all of it only if the whole objective is less then.
+//! under it. The surface is cut into small squares of texels, and one goes on from the dielectric where the photos that show it
+//! agree that its pixels are better explained; all of it only if the whole objective is less then.
 
 use super::descent::{Descent, FIRST_STEPS, Place, difference};
 use super::estimate::START_TEXEL;
@@ -82,26 +82,39 @@ impl Descent<'_> {
         Some((made, sight))
     }
 
-    /// The texels of squares whose part of the objective is less at the other place; both by the same noise.
+    /// The texels of squares whose pixels are better explained at the other place, as far as views agree on it; both by the
+    /// same noise. Beliefs are left out here: lobes of tiles differ from texel to texel by what widths, which have not moved
+    /// yet, will make good, and one material everywhere has no differences at all.
     fn better(&self, one: &Place, other: &Place, by: &Learned) -> Vec<bool> {
-        let size = self.scene.settings.map_size;
+        let (size, views) = (self.scene.settings.map_size, self.pixels.views());
         let across = size.div_ceil(SQUARE);
-        let square = |texel: usize| texel / size / SQUARE * across + texel % size / SQUARE;
         let by_other = Learned::of(self.pixels, &other.sight, other.learned.as_ref()).with_noise_of(by);
-        let gains: Vec<f64> = (0..self.pixels.count())
+        let rows_of_squares: Vec<Vec<bool>> = (0..across)
             .into_par_iter()
-            .map(|pixel| by.nats(self.pixels, &one.sight, pixel) - by_other.nats(self.pixels, &other.sight, pixel))
+            .map(|row| {
+                let mut gained = vec![0.0f64; across * views];
+                let texels = row * SQUARE * size..((row + 1) * SQUARE).min(size) * size;
+                for pixel in self.pixels.of_texels(texels) {
+                    let square = self.pixels.texel(pixel) as usize % size / SQUARE;
+                    gained[square * views + self.pixels.pixel(pixel).view as usize] +=
+                        by.nats(self.pixels, &one.sight, pixel) - by_other.nats(self.pixels, &other.sight, pixel);
+                }
+                gained.chunks(views).map(is_gain).collect()
+            })
             .collect();
-        let mut gained = vec![0.0f64; across * across];
-        for (pixel, gain) in gains.into_iter().enumerate() {
-            gained[square(self.pixels.texel(pixel) as usize)] += gain;
-        }
-        let beliefs = [one, other].map(|place| place.beliefs.energies_of_texels(&place.texels));
-        for (texel, ([a, b], [c, d])) in beliefs[0].iter().zip(&beliefs[1]).enumerate() {
-            gained[square(texel)] += a + b - c - d;
-        }
-        (0..size * size).map(|texel| gained[square(texel)] > 0.0).collect()
+        (0..size * size).map(|texel| rows_of_squares[texel / size / SQUARE][texel % size / SQUARE]).collect()
     }
+}
+
+/// Whether the sum over views is above 0 by more than its standard error. What is wrong with light, mesh and cameras goes
+/// together over the pixels of a photo, so that views are what can be counted.
+fn is_gain(of_views: &[f64]) -> bool {
+    let (count, sum, squares) = of_views
+        .iter()
+        .filter(|gained| **gained != 0.0)
+        .fold((0.0f64, 0.0f64, 0.0f64), |(count, sum, squares), own| (count + 1.0, sum + own, squares + own * own));
+    let variance = (squares - sum * sum / count).max(0.0) * count / (count - 1.0);
+    count > 1.0 && sum > variance.sqrt()
 }
 
 #[cfg(all(test, feature = "cli"))]
@@ -112,6 +125,15 @@ mod tests {
     use super::super::solver::Solver;
     use super::*;
     use std::sync::atomic::AtomicBool;
+
+    #[test]
+    fn a_gain_is_one_when_views_agree_on_it() {
+        assert!(is_gain(&[2.0, 1.0, 0.0, 3.0]));
+        // One view stands against all others, or alone.
+        assert!(!is_gain(&[90.0, -20.0, -30.0, -10.0]));
+        assert!(!is_gain(&[5.0, 0.0]) && !is_gain(&[0.0, 0.0]) && !is_gain(&[]));
+        assert!(!is_gain(&[-2.0, -1.0, -3.0]) && !is_gain(&[f64::NAN, 1.0, 1.0]));
+    }
 
     #[test]
     fn false_metal_becomes_the_painted_wall_that_it_is() {

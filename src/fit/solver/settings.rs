@@ -42,8 +42,6 @@ pub struct SolverSettings {
     pub fixed_light: bool,
     /// Keep the maps as they are.
     pub fixed_maps: bool,
-    /// Let the descent begin at one plain dielectric as well, where that explains pixels better.
-    pub second_start: bool,
     /// Let views that took no part judge what lobes, light between surfaces and the light's resolution bought, when maps
     /// are made.
     pub check_choices: bool,
@@ -66,8 +64,6 @@ impl SolverSettings {
             use_background: settings.background == BackgroundEvidence::Use,
             fixed_light: settings.fixed_light,
             fixed_maps: settings.fixed_maps,
-            // Lobes of tiles that saw full-size photos are the better start.
-            second_start: settings.is_refined(),
             check_choices: settings.solver_choices != Choosing::Off,
             seed: settings.seed,
             ..any
@@ -95,7 +91,6 @@ impl Default for SolverSettings {
             use_background: true,
             fixed_light: false,
             fixed_maps: false,
-            second_start: true,
             check_choices: false,
             seed: 1,
         }
