@@ -184,7 +184,7 @@ fn a_result_that_cannot_be_written_is_kept_and_can_be_saved_elsewhere() {
     studio.act(Act::ObjectStart);
     assert!(studio.log().contains("not on disk yet"), "{}", studio.log());
     let elsewhere = studio.folder.path().join("elsewhere");
-    studio.click("Save result to…");
+    studio.click("Save result as…");
     studio.replace_text("Path", &elsewhere.display().to_string());
     assert!(!studio.says("You can also drop a folder or file"), "nothing is dropped to be written");
     studio.click("Save here");
