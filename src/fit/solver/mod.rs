@@ -19,7 +19,7 @@
 //!    [`lobe_evidence`], [`lobe_prior`], [`lobe_sums`], [`lobe_widths`], [`lobe_families`], `lobe_scene`).
 //!    Then `refine`: [`descent`] of the one [`objective`] over all texels (`conjugate_gradients`), by what whole [`pixels`] see
 //!    (`sight`, `pixel_system`), with what `neighbours` have in common and as much `freedom` as predicts photos that took no
-//!    part; from the lobes that were found, or those of one dielectric where that explains pixels better (`second_start`).
+//!    part; from the lobes that were found, or those of one dielectric where that explains pixels as well (`second_start`, `agreement`).
 //! 6. [`choice`]: views that took no part say what lobes, light between surfaces and the light's resolution bought;
 //!    `lobe_tails` says whether highlights reach further than the model's lobes.
 //! 7. [`solver`]: the steps in their order. A fit does them one by one, as [`crate::fit::Fitter`] does those of Adam: on
@@ -29,6 +29,7 @@
 //! What it refuses to do: it does not score itself. Its model is the cache; pictures and scores are made by the path
 //! tracer. It knows nothing of threads that watch it, nor of files.
 
+mod agreement;
 pub mod block;
 mod cell_sums;
 pub mod choice;
