@@ -75,6 +75,15 @@ pub fn is_raw(bytes: &[u8]) -> bool {
         || sub_directories.into_iter().any(|directory| is_preview || raw_pixels(directory as usize))
 }
 
+/// Whether a tag of the first directory claims more values than the file has bytes: decoders make room for all of them
+/// before they read one.
+pub fn claims_more_than_it_holds(bytes: &[u8]) -> bool {
+    let Some((tiff, directory)) = Tiff::open(bytes) else { return false };
+    let entries = (0..usize::from(tiff.u16(directory).unwrap_or(0))).map(|entry| 2 + 12 * entry + 4);
+    let mut counts = entries.map_while(|offset| tiff.u32(directory.checked_add(offset)?));
+    counts.any(|count| count as usize > bytes.len())
+}
+
 /// The bytes of a TIFF with offsets of four bytes.
 struct Tiff<'a> {
     bytes: &'a [u8],
@@ -181,6 +190,18 @@ mod tests {
             assert!(!is_raw(&bytes));
         }
         assert_eq!(Exif::default().exposure_stops(), None);
+    }
+
+    #[test]
+    fn a_tag_with_more_values_than_bytes_is_a_claim() {
+        for little_endian in [true, false] {
+            let mut bytes = block(little_endian);
+            assert!(!claims_more_than_it_holds(&bytes));
+            // The count of the first tag: 256 or 65,536 times as many.
+            bytes[8 + 2 + 4 + 1] = 1;
+            assert!(claims_more_than_it_holds(&bytes));
+        }
+        assert!(!claims_more_than_it_holds(b"II*\0") && !claims_more_than_it_holds(b""));
     }
 
     #[test]

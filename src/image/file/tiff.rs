@@ -36,6 +36,9 @@ pub fn read_header(reader: &mut (impl BufRead + Seek), path: &Path, length: u64)
     if exif::is_raw(&bytes) {
         return Err(format::raw_file(path));
     }
+    if exif::claims_more_than_it_holds(&bytes) {
+        return Err(implausible(path, format!("a tag claims more values than the file has bytes ({})", bytes.len())));
+    }
     let outcome = guarded(path, || Ok(header_of(&mut Cursor::new(bytes.as_slice()))))?;
     let (header, colour) = outcome.map_err(|error| explain(error, path))?;
     let channels = match colour {
