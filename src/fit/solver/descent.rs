@@ -23,9 +23,16 @@ use std::sync::atomic::AtomicBool;
 
 /// The first steps down, from each start.
 pub(super) const FIRST_STEPS: [Step; 2] = [Step { iterations: 12, slopes: Slopes::OfReflectances }; 2];
-/// Those after them, from the better one.
-const LAST_STEPS: [Step; 2] =
-    [Step { iterations: 12, slopes: Slopes::OfWidths }, Step { iterations: 24, slopes: Slopes::OfWidths }];
+/// Those after them, from the better one: what the choice left unsettled first, without an integral of a lobe; then widths as
+/// well.
+const LAST_STEPS: [Step; 6] = [
+    FIRST_STEPS[0],
+    FIRST_STEPS[0],
+    FIRST_STEPS[0],
+    FIRST_STEPS[0],
+    Step { iterations: 12, slopes: Slopes::OfWidths },
+    Step { iterations: 24, slopes: Slopes::OfWidths },
+];
 /// Times that a step is halved.
 const HALVINGS: usize = 3;
 /// How far the logarithm of a width may go in one step: farther off its slope is another.

@@ -118,8 +118,8 @@ mod tests {
             *own = Material { diffuse: [0.02; 3], specular: own.diffuse, log_width: own.log_width };
         }
         let found = scene.descend(estimate, start, Lit::Yes, &AtomicBool::new(false)).unwrap();
-        // Two steps, what was chosen, two steps.
-        assert_eq!(found.steps.len(), 5, "{:?}", found.steps);
+        // Two steps, what was chosen, six steps.
+        assert_eq!(found.steps.len(), 9, "{:?}", found.steps);
         let [before, after] = found.steps[2];
         assert!(after.total() < before.total() && after.neighbours < before.neighbours, "{before:?} {after:?}");
         for is_upper in [true, false] {
