@@ -234,7 +234,8 @@ impl SolverScene {
     ) -> Option<(Vec<[f32; 3]>, LightKnown)> {
         let prior = LightPrior {
             variation: self.settings.light_variation,
-            independence: self.settings.independence,
+            // Blocks whose maps are sought are wrong together, by lobes and cells that are coarser than the surface's.
+            independence: if self.settings.fixed_maps { 1.0 } else { self.settings.independence },
             // Where the background shows, it fixes the scale; but not alone: what photos show behind a thing is seldom as
             // far away as a sky, and the light would grow from round to round.
             gauge_slack: match self.background.is_empty() {
