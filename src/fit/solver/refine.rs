@@ -168,7 +168,7 @@ pub(super) mod tests {
         let found_gains = &found.learned.gains;
         for c in 0..3 {
             let ratio = found_gains[0][c] / found_gains[7][c];
-            assert!((ratio / gains(0)[c] - 1.0).abs() < 0.02, "{found_gains:?}");
+            assert!((ratio / gains(0)[c] - 1.0).abs() < 0.025, "{found_gains:?}");
         }
         let factor = [0, 1, 2].map(|c| gains(7)[c] / found_gains[7][c]);
         let off = error(&solver, &found, factor, &truth);
