@@ -5,6 +5,7 @@ use crate::export::texture::TextureFormat;
 use crate::job::export::{ExportEvent, ExportOptions, Forecast, Format, export as run};
 use clap::Args;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// Options of `patina export`.
@@ -32,7 +33,7 @@ pub struct ExportArguments {
     pub output: Option<PathBuf>,
 }
 
-/// Exports a run for other programs.
+/// Exports a run for other programs. Ctrl-C ends it after the format at hand, and what was written is removed.
 pub fn export(arguments: &ExportArguments, json: bool) -> Result<()> {
     let options = ExportOptions {
         run: arguments.run.clone(),
@@ -43,7 +44,9 @@ pub fn export(arguments: &ExportArguments, json: bool) -> Result<()> {
         cameras: arguments.cameras,
         textures: arguments.textures,
     };
-    let exported = run(&options, &AtomicBool::new(false), &|event| tell(&event, json))?;
+    let stop = Arc::new(AtomicBool::new(false));
+    super::fit::stop_on_interrupt(Arc::clone(&stop));
+    let exported = run(&options, &stop, &|event| tell(&event, json))?;
     if json {
         println!("{}", serde_json::json!({"event": "exported", "export": exported}));
         return Ok(());

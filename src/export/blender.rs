@@ -1,4 +1,7 @@
 //! Blender 4.2 to 5: a script that builds mesh, material and world.
+//!
+//! Its material is the fitted model, a Diffuse BSDF plus a Principled BSDF that is all lobe; maps of one Principled BSDF alone
+//! lie beside, since Cycles lays that one's lobe over its diffuse part and darkens it towards grazing angles.
 
 use super::asset::{Asset, GRAZING_OF_VIEWS, MetalSplit};
 use super::environment_file::with_x_in_the_centre;
@@ -10,8 +13,9 @@ use std::path::Path;
 /// The script.
 const SCRIPT: &str = include_str!("python/import_patina.py");
 
-/// Writes the script, the mesh, maps as OpenEXR, the environment and `material.json`, which the script reads; gives the
-/// share of texels whose diffuse reflectance would have had to exceed 1, and metalness where there are metals.
+/// Writes the script, the mesh, maps as OpenEXR, the environment and `material.json`, which the script reads; gives, for
+/// the maps of one shader, the share of texels whose diffuse reflectance would have had to exceed 1, and metalness where
+/// there are metals.
 ///
 /// # Errors
 /// Files that cannot be written.
@@ -21,9 +25,11 @@ pub fn write(asset: &Asset, folder: &Path) -> Result<(f64, Option<MetalSplit>)> 
         Some(split) => split.base_colour_under_fresnel(GRAZING_OF_VIEWS, None),
         None => asset.diffuse_under_fresnel(GRAZING_OF_VIEWS),
     };
-    write_exr_rgb(&folder.join("base_color.exr"), &base_colour)?;
+    write_exr_rgb(&folder.join("diffuse.exr"), &asset.maps.diffuse)?;
     let mut ior = 1.5;
     if asset.has_lobe {
+        write_exr_rgb(&folder.join("specular.exr"), &asset.maps.specular)?;
+        write_exr_rgb(&folder.join("base_color.exr"), &base_colour)?;
         let tint = match &metals {
             Some(split) => {
                 ior = split.ior();
@@ -67,7 +73,7 @@ mod tests {
         assert!(write(&asset, folder.path()).unwrap().1.is_some());
         let named: Vec<&str> =
             SCRIPT.split('"').filter(|word| word.ends_with(".exr") || word.ends_with(".obj")).collect();
-        assert!(named.len() >= 5, "{named:?}");
+        assert!(named.len() >= 7, "{named:?}");
         for name in named {
             assert!(folder.path().join(name).is_file(), "{name}");
         }

@@ -4,6 +4,10 @@
 
 The script adds to the open scene; it reads the files that lie beside it. Without Blender's own start-up scene:
     blender --factory-startup --python import_patina.py -- --empty
+
+The material is a Diffuse BSDF plus a Principled BSDF that holds the lobe alone: the fitted model itself, but for the lobe's
+shape. With `-- --one-shader` it is one Principled BSDF, for exporters and bakers that know no other. That one takes from
+diffuse light what its lobe reflects, most at grazing angles, which no map makes up for.
 """
 import json
 import os
@@ -51,17 +55,35 @@ def material(facts):
         node.location = (-420, 300 - 290 * row)
         return node.outputs["Color"]
 
-    links.new(texture("base_color.exr", 0), shader.inputs["Base Color"])
     level = input_named(shader, "Specular IOR Level", "Specular")
-    if facts["has_lobe"]:
+    if not facts["has_lobe"]:
+        level.default_value = 0.0
+        links.new(texture("diffuse.exr", 0), shader.inputs["Base Color"])
+        return made
+    links.new(texture("roughness.exr", 1, is_data=True), shader.inputs["Roughness"])
+    if "--one-shader" in sys.argv:
         shader.inputs["IOR"].default_value = facts["ior"]
         level.default_value = 0.5
-        links.new(texture("roughness.exr", 1, is_data=True), shader.inputs["Roughness"])
+        links.new(texture("base_color.exr", 0), shader.inputs["Base Color"])
         links.new(texture("specular_tint.exr", 2), input_named(shader, "Specular Tint"))
         if facts["has_metals"]:
             links.new(texture("metallic.exr", 3, is_data=True), shader.inputs["Metallic"])
-    else:
-        level.default_value = 0.0
+        return made
+    # As a metal the shader is Schlick's rise from the F0 of its base colour, and nothing beneath: the lobe alone.
+    shader.inputs["Metallic"].default_value = 1.0
+    tint = input_named(shader, "Specular Tint")
+    # What tints the rise towards grazing angles; a number up to Blender 3.
+    tint.default_value = (1.0, 1.0, 1.0, 1.0) if hasattr(tint.default_value, "__len__") else 0.0
+    links.new(texture("specular.exr", 2), shader.inputs["Base Color"])
+    diffuse = nodes.new("ShaderNodeBsdfDiffuse")
+    links.new(texture("diffuse.exr", 0), diffuse.inputs["Color"])
+    both = nodes.new("ShaderNodeAddShader")
+    links.new(diffuse.outputs[0], both.inputs[0])
+    links.new(shader.outputs[0], both.inputs[1])
+    output = next(node for node in nodes if node.bl_idname == "ShaderNodeOutputMaterial")
+    for node, place in [(diffuse, (10, 480)), (both, (320, 300)), (output, (520, 300))]:
+        node.location = place
+    links.new(both.outputs[0], output.inputs["Surface"])
     return made
 
 

@@ -28,10 +28,12 @@ scene_exact.xml  the fitted model, BSDF `patina` of patina_lobe.py: diffuse.exr,
 environment_nodes.exr  the light on nodes, poles included: interpolated there it is the fitted one exactly
 All maps are linear and read raw.";
 pub(super) const BLENDER_FILES: &str = "\
-import_patina.py builds mesh, Principled BSDF and world: blender --python import_patina.py
+import_patina.py builds mesh, material and world: blender --python import_patina.py
+diffuse.exr, specular.exr  reflectances as fitted (F0), linear: a Diffuse BSDF plus a Principled BSDF that is all lobe
+roughness.exr    square root of the GGX width
+With `-- --one-shader` one Principled BSDF, of these maps:
 base_color.exr   linear; diffuse reflectance over 1 - mean F, since Cycles takes from it what the lobe reflects
 specular_tint.exr  linear; F0 over that of the index of refraction in material.json, specular level 0.5
-roughness.exr    square root of the GGX width
 metallic.exr     where the surface has metals (F0 above 0.16); base colour is F0 of what is metal
 environment.exr  linear; +x in the centre";
 pub(super) const MATERIALX_FILES: &str = "\
