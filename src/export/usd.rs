@@ -2,15 +2,18 @@
 //!
 //! The material is a `UsdPreviewSurface` with a variant set `workflow`. `specular` takes diffuse reflectance, F0 and
 //! roughness as they are; but few importers know that workflow, and Blender reads its colour as a factor of F0. So
-//! `metalness` is chosen at first: one F0 for what is no metal, metalness for the rest. Texture coordinates point up, as in
-//! Patina; the dome light's left border looks along -z, as in Patina.
+//! `metalness` is chosen at first: one F0 for what is no metal, metalness for the rest. Readers of that workflow pass over a
+//! specular colour; Blender multiplies F0 of what is no metal by it, so it holds what one F0 and metalness leave wrong.
+//! Texture coordinates point up, as in Patina; the dome light's left border looks along -z, as in Patina.
 
-use super::asset::{Asset, DielectricRange, GRAZING_OF_VIEWS, MetalSplit};
+use super::asset::{Asset, DielectricRange, GRAZING_OF_HALF_VECTORS, MetalSplit};
 use super::environment_file::smooth;
 use super::texture::{Curve, Texture};
 use crate::error::{Error, ErrorKind, Result};
 use crate::files::{write_atomically, write_bytes};
 use crate::image::file::write_exr_rgb;
+use crate::image::{Image, RgbImage};
+use glam::Vec3;
 use std::fmt::Write as _;
 use std::io::Write;
 use std::path::Path;
@@ -28,10 +31,11 @@ pub fn write(asset: &Asset, folder: &Path, sixteen_bits: bool) -> Result<(f64, O
     let mut held_share = 0.0;
     if let Some(split) = &split {
         let (base_colour, held) =
-            split.base_colour_under_fresnel(GRAZING_OF_VIEWS, Some(&asset.perceptual_roughness()));
+            split.base_colour_under_fresnel(GRAZING_OF_HALF_VECTORS, Some(&asset.perceptual_roughness()));
         held_share = held;
         files.push(("textures/base_color.png", png(Texture::Rgb(&base_colour), Curve::Srgb)?));
         files.push(("textures/metallic.png", png(Texture::Grey(&split.metallic), Curve::Linear)?));
+        files.push(("textures/tint.png", png(Texture::Rgb(&tint(asset, split)), Curve::Srgb)?));
         files.push(("textures/specular.png", png(Texture::Rgb(&asset.maps.specular), Curve::Srgb)?));
         files.push(("textures/roughness.png", png(Texture::Grey(&asset.perceptual_roughness()), Curve::Linear)?));
     }
@@ -51,6 +55,23 @@ pub fn write(asset: &Asset, folder: &Path, sixteen_bits: bool) -> Result<(f64, O
     members.extend(files.iter().map(|(name, bytes)| (*name, bytes.as_slice())));
     package(&folder.join(format!("{}.usdz", asset.name)), &members)?;
     Ok((held_share, split))
+}
+
+/// The largest factor of F0 that a tint holds; the texture is over it.
+const LARGEST_TINT: f32 = 4.0;
+
+/// By what F0 of what is no metal is multiplied so that, with the metal's share, it is the fitted one; over its largest.
+/// Where all is metal it is 1: a renderer that tints metals too would dim them towards grazing angles.
+fn tint(asset: &Asset, split: &MetalSplit) -> RgbImage {
+    let texels = asset.maps.specular.pixels().iter().zip(split.base_colour.pixels()).zip(split.metallic.pixels());
+    let pixels = texels
+        .map(|((f0, base), &metal)| {
+            let share = (1.0 - metal).max(1e-3);
+            let wanted = (*f0 - *base * metal) / (share * split.dielectric_f0.max(1e-6));
+            Vec3::ONE.lerp(wanted.clamp(Vec3::ZERO, Vec3::splat(LARGEST_TINT)), 1.0 - metal) / LARGEST_TINT
+        })
+        .collect();
+    Image::from_pixels(split.metallic.width(), split.metallic.height(), pixels)
 }
 
 /// The stage as text; `ior` is the index of refraction of what is no metal, `None` without a lobe.
@@ -143,9 +164,11 @@ fn material(name: &str, ior: Option<f64>) -> String {
         format!("color3f inputs:diffuseColor.connect = <{path}/base_color.outputs:rgb>"),
         format!("float inputs:ior = {ior:.4}"),
         format!("float inputs:metallic.connect = <{path}/metallic.outputs:r>"),
+        format!("color3f inputs:specularColor.connect = <{path}/tint.outputs:rgb>"),
         "int inputs:useSpecularWorkflow = 0".into(),
     ]) + &texture(&path, "base_color", Kind::Colour, deep)
-        + &texture(&path, "metallic", Kind::Value, deep);
+        + &texture(&path, "metallic", Kind::Value, deep)
+        + &texture(&path, "tint", Kind::Scaled(LARGEST_TINT), deep);
     let specular = over(&[
         format!("color3f inputs:diffuseColor.connect = <{path}/diffuse.outputs:rgb>"),
         format!("float inputs:ior = {ior:.4}"),
@@ -166,12 +189,14 @@ fn material(name: &str, ior: Option<f64>) -> String {
 enum Kind {
     Colour,
     Value,
+    /// A colour over this factor.
+    Scaled(f32),
 }
 
 /// A node that reads `textures/MAP.png`.
 fn texture(path: &str, map: &str, kind: Kind, indent: &str) -> String {
     let (space, output) = match kind {
-        Kind::Colour => ("sRGB", "float3 outputs:rgb"),
+        Kind::Colour | Kind::Scaled(_) => ("sRGB", "float3 outputs:rgb"),
         Kind::Value => ("raw", "float outputs:r"),
     };
     let lines = [
@@ -183,7 +208,11 @@ fn texture(path: &str, map: &str, kind: Kind, indent: &str) -> String {
         "token inputs:wrapT = \"clamp\"".into(),
         output.into(),
     ];
-    let lines: String = lines.iter().map(|line| format!("{indent}    {line}\n")).collect();
+    let scale = match kind {
+        Kind::Scaled(scale) => vec![format!("float4 inputs:scale = ({scale}, {scale}, {scale}, 1)")],
+        _ => Vec::new(),
+    };
+    let lines: String = lines.iter().chain(&scale).map(|line| format!("{indent}    {line}\n")).collect();
     format!("\n{indent}def Shader \"{map}\"\n{indent}{{\n{lines}{indent}}}\n")
 }
 
@@ -274,6 +303,27 @@ mod tests {
     }
 
     #[test]
+    fn a_tint_makes_up_for_what_one_f0_and_metalness_leave_wrong() {
+        let mut asset = small_asset(true);
+        // A coloured F0 over blue paint, of which a base colour can say but one.
+        asset.maps.diffuse.pixels_mut().fill(Vec3::new(0.1, 0.2, 0.6));
+        asset.maps.specular.pixels_mut().fill(Vec3::new(0.09, 0.05, 0.04));
+        let split = asset.metal_split(DielectricRange::Always(0.04));
+        let wrong = |tint: Vec3, texel: usize| {
+            let (base, metal) = (split.base_colour.pixels()[texel], split.metallic.pixels()[texel]);
+            let found = base * metal + tint * split.dielectric_f0 * (1.0 - metal);
+            (found - asset.maps.specular.pixels()[texel]).length()
+        };
+        let tint = tint(&asset, &split).pixels()[40] * LARGEST_TINT;
+        assert!(wrong(tint, 40) < 0.1 * wrong(Vec3::ONE, 40), "{} {}", wrong(tint, 40), wrong(Vec3::ONE, 40));
+        // A metal keeps its rise towards grazing angles.
+        asset.maps.diffuse.pixels_mut().fill(Vec3::ZERO);
+        asset.maps.specular.pixels_mut().fill(Vec3::new(0.9, 0.7, 0.3));
+        let metal = super::tint(&asset, &asset.metal_split(DielectricRange::Always(0.04)));
+        assert!((metal.pixels()[40] * LARGEST_TINT - Vec3::ONE).length() < 0.01);
+    }
+
+    #[test]
     fn members_of_a_package_are_aligned_and_whole() {
         assert_eq!(crc32(&crc_table(), b"123456789"), 0xCBF4_3926);
         let folder = tempfile::tempdir().unwrap();
@@ -285,7 +335,7 @@ mod tests {
         let end = bytes.len() - 22;
         assert_eq!(&bytes[end..end + 4], b"PK\x05\x06");
         let (count, mut entry) = (word(end + 10), long(end + 16));
-        assert_eq!((entry + long(end + 12), count), (end, 7));
+        assert_eq!((entry + long(end + 12), count), (end, 8));
         for _ in 0..count {
             assert_eq!(&bytes[entry..entry + 4], b"PK\x01\x02");
             let (size, name_length, local) = (long(entry + 24), word(entry + 28), long(entry + 42));

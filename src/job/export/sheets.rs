@@ -17,6 +17,8 @@ pub(super) const USD_FILES: &str = "\
 base_color.png   sRGB, metalness: diffuse reflectance over 1 - mean F, or F0 of what is metal, less what renderers
                  add by light between microfacets
 metallic.png     no curve, metalness
+tint.png         sRGB, metalness, times 4: by what F0 of the index of refraction is multiplied for the fitted one; readers of
+                 the metalness workflow pass over it, Blender does not
 diffuse.png      sRGB, specular: diffuse reflectance as fitted
 specular.png     sRGB, specular: F0 as fitted
 roughness.png    square root of the GGX width, no curve
