@@ -75,6 +75,11 @@ pub fn of_format(title: &str, files: &str, losses: &Losses) -> String {
     text
 }
 
+/// What other programs made of the demo, as a section of a format's sheet.
+pub fn of_proof(sentence: &str) -> String {
+    format!("\nPROOF\n{}", wrapped(sentence))
+}
+
 /// The sheet of the whole export.
 pub fn of_export(asset: &Asset, folders: &[&str]) -> String {
     let [distribution, shadowing] = asset.lobe.formulas();

@@ -2,9 +2,9 @@
 //!
 //! It holds the mesh, the maps and a few environments, already blurred by the fitted lobe for eight widths (split sum,
 //! Karis 2013), and a small viewer for WebGL 2. The sun of an environment is taken out of it: it shines on the lobe itself
-//! and casts shadows. What each vertex sees of the sky is baked with rays, in spherical harmonics: soft shadows follow the
-//! light as it turns. Light between surfaces is that of a place's own colour all around; sharp shadows of other lamps are not
-//! shown, and the page says so.
+//! and casts shadows from sixteen places of its disc. What each vertex sees of the sky is baked with rays, in spherical
+//! harmonics: soft shadows follow the light as it turns. Light between surfaces is that of a place's own colour all around,
+//! in a lobe that of the surface's mean colour; sharp shadows of other lamps are not shown, and the page says so.
 
 mod prefilter;
 mod transfer;
@@ -12,6 +12,7 @@ mod transfer;
 use super::asset::Asset;
 use super::sun::sun_of;
 use super::texture::{Curve, Texture};
+use crate::atlas::covered_texels;
 use crate::error::{Error, ErrorKind, Result};
 use crate::image::Image;
 use crate::light::Environment;
@@ -67,12 +68,24 @@ pub fn page(asset: &Asset, lights: &[(String, Environment)], photos: &[PagePhoto
     let document = json!({
         "name": asset.name, "hasLobe": asset.has_lobe, "lobe": asset.lobe, "mesh": mesh, "maps": maps, "lights": lights,
         "table": {"size": prefilter::TABLE_SIDE, "values": halves(table.into_iter().flatten())},
-        "levels": prefilter::LEVELS, "photos": photos,
+        "levels": prefilter::LEVELS, "photos": photos, "meanAlbedo": mean_albedo(asset).to_array(),
     });
     // No text of a file may end the script.
     let text = document.to_string().replace("</", "<\\/");
     let html = PAGE.replace("@TITLE@", &asset.name).replace("@VIEWER@", VIEWER).replace("@DOCUMENT@", &text);
     Ok(Page { beyond_maps: html.len() - maps_bytes, html })
+}
+
+/// Mean diffuse reflectance of the charts: what a place that is hidden from the sky has about it.
+fn mean_albedo(asset: &Asset) -> Vec3 {
+    let diffuse = &asset.maps.diffuse;
+    let covered = covered_texels(&asset.mesh, diffuse.width(), diffuse.height());
+    let (mut sum, mut count) = (Vec3::ZERO, 0.0);
+    for (rgb, _) in diffuse.pixels().iter().zip(covered.pixels()).filter(|(_, covered)| **covered) {
+        sum += *rgb;
+        count += 1.0;
+    }
+    sum / f32::max(count, 1.0)
 }
 
 /// Half floats as base64.
@@ -179,6 +192,8 @@ mod tests {
         let transfer = STANDARD.decode(data["mesh"]["transfer"].as_str().unwrap()).unwrap();
         assert_eq!(transfer.len(), 8 * asset.mesh.positions.len());
         assert_eq!(data["lights"][0]["harmonics"].as_array().unwrap().len(), 9);
+        let mean = data["meanAlbedo"][1].as_f64().unwrap();
+        assert!((mean - 0.3).abs() < 1e-6, "{mean}");
         // A flat square sees the whole sky.
         let normals = STANDARD.decode(data["mesh"]["normals"].as_str().unwrap()).unwrap();
         assert_eq!(&normals[..4], &[0, 0, 127, 127]);

@@ -26,7 +26,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::prepare::RunSettings;
 use page::write_page;
-use sheets::{BLENDER_FILES, GLB_FILES, MATERIALX_FILES, MITSUBA_FILES, TEXTURE_FILES, USD_FILES};
+use sheets::{BLENDER_FILES, GLB_FILES, MATERIALX_FILES, MITSUBA_FILES, TEXTURE_FILES, USD_FILES, proof_of};
 
 /// What an export is made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -83,7 +83,7 @@ impl Format {
             Format::Mitsuba => {
                 &[GGX, "one F0 and metalness stand for the specular map; scene_exact.xml with its plugin loses nothing"]
             }
-            Format::Blender => &[GGX, LAYER],
+            Format::Blender => &[GGX],
             Format::Materialx => &[GGX, LAYER],
             Format::Textures => &[
                 GGX,
@@ -383,7 +383,10 @@ fn write_format(format: Format, asset: &Asset, folder: &Path, textures: TextureF
         }
         Format::Blender => {
             let (held_share, metals) = blender::write(asset, folder)?;
-            ("Blender 4.2 to 5", BLENDER_FILES, with_metals(lobe, held_share, metals.as_ref()))
+            let losses = with_metals(lobe, held_share, metals.as_ref());
+            let of_one_shader =
+                "but for the shape of the lobe these hold for --one-shader; two shaders are the fitted model itself";
+            ("Blender 4.2 to 5", BLENDER_FILES, if asset.has_lobe { losses.and(of_one_shader) } else { losses })
         }
         Format::Materialx => {
             let (held_share, metals) = materialx::write(asset, folder)?;
@@ -395,7 +398,9 @@ fn write_format(format: Format, asset: &Asset, folder: &Path, textures: TextureF
             ("Texture set", TEXTURE_FILES, lobe.and_split(&texture_set::write(asset, folder, textures)?))
         }
     };
-    write_bytes(&folder.join("convention.txt"), sheet::of_format(title, files, &losses).as_bytes())?;
+    let proof = proof_of(format).filter(|_| asset.has_lobe).map(sheet::of_proof).unwrap_or_default();
+    let text = sheet::of_format(title, files, &losses) + &proof;
+    write_bytes(&folder.join("convention.txt"), text.as_bytes())?;
     Ok(losses)
 }
 

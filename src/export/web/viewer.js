@@ -15,6 +15,8 @@
   const words = (text) => new Uint16Array(bytes(text).buffer);
 
   // ---- Shaders
+  // Places on the sun's disc that shadows are cast from: together they make its penumbra.
+  const suns = 16;
   const common = `#version 300 es
     precision highp float;
     precision highp sampler2D;
@@ -51,16 +53,19 @@
       coordinate = uv;
       gl_Position = clip_from_world * vec4(world, 1.0);
     }`;
-  const surface_fragment = `${common}
-    precision highp sampler2DShadow;
+  const surface_fragment = `${common.replace('precision highp float;', `#define SUNS ${suns}\n    precision highp float;`)}
+    precision highp sampler2DArrayShadow;
     in vec3 world, direction; in vec2 coordinate; in float openness; in vec4 passed_a, passed_b;
     uniform vec3 eye;
     // The light in spherical harmonics about +y, turned, and the transfer that a byte of 127 stands for.
     uniform vec3 harmonics[9];
     uniform float largest;
-    uniform mat4 shadow_from_world;
-    uniform sampler2DShadow shadow_map;
+    // One for each place on the sun's disc.
+    uniform mat4 shadow_from_world[SUNS];
+    uniform sampler2DArrayShadow shadow_map;
     uniform float shadow_lift;
+    // Mean diffuse reflectance of the surface.
+    uniform vec3 mean_albedo;
     uniform bool is_ggx;
     uniform sampler2D diffuse_map, specular_map, width_map, table, irradiance_map;
     uniform sampler2D levels;
@@ -91,13 +96,15 @@
       // Never more than in the open, never less than a tenth of the even share.
       return clamp(open + sum, 0.1 * openness * open, open);
     }
-    // Share of the sun that a place sees: nine places of the map, each between four.
+    // Share of the sun's disc that a place sees.
     float sunlit(vec3 n) {
-      vec3 at = (shadow_from_world * vec4(world + shadow_lift * n, 1.0)).xyz * 0.5 + 0.5;
-      float texel = 1.0 / float(textureSize(shadow_map, 0).x), sum = 0.0;
-      for (int i = -1; i <= 1; i++)
-        for (int j = -1; j <= 1; j++) sum += texture(shadow_map, at + vec3(1.5 * texel * vec2(i, j), 0.0));
-      return sum / 9.0;
+      float sum = 0.0;
+      vec4 place = vec4(world + shadow_lift * n, 1.0);
+      for (int i = 0; i < SUNS; i++) {
+        vec3 at = (shadow_from_world[i] * place).xyz * 0.5 + 0.5;
+        sum += texture(shadow_map, vec4(at.xy, float(i), at.z));
+      }
+      return sum / float(SUNS);
     }
     // D G / (4 (n.i)(n.o)) of the fitted lobe.
     float lobe(float width, float i, float o, float h) {
@@ -134,7 +141,9 @@
         vec3 far = level(r, min(floor(index) + 1.0, level_count - 1.0));
         // Lagarde and de Rousiers 2014: what a closed place hides of a lobe.
         float open = clamp(pow(cosine + openness, exp2(-16.0 * width - 1.0)) - 1.0 + openness, 0.0, 1.0);
-        light += (f0 * ab.x + ab.y) * mix(near, far, fract(index)) * open;
+        // What is hidden of it shows the surface, lit as this place is.
+        vec3 around = mean_albedo * falling / (1.0 - (1.0 - openness) * mean_albedo);
+        light += (f0 * ab.x + ab.y) * mix(around, mix(near, far, fract(index)), open);
       }
       if (sun_share != vec3(0.0)) {
         vec3 reflected = albedo / PI;
@@ -255,19 +264,15 @@
       levels: floats(blurred[0].width, rows, stacked, gl.RGBA16F, gl.RGBA, gl.REPEAT),
     };
   });
-  const shadow_size = Math.min(2048, gl.getParameter(gl.MAX_TEXTURE_SIZE));
+  const shadow_size = Math.min(1024, gl.getParameter(gl.MAX_TEXTURE_SIZE));
   const shadow_map = gl.createTexture(), shadow_frame = gl.createFramebuffer();
-  gl.bindTexture(gl.TEXTURE_2D, shadow_map);
-  gl.texStorage2D(gl.TEXTURE_2D, 1, gl.DEPTH_COMPONENT24, shadow_size, shadow_size);
+  gl.bindTexture(gl.TEXTURE_2D_ARRAY, shadow_map);
+  gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, gl.DEPTH_COMPONENT24, shadow_size, shadow_size, suns);
   for (const [name, value] of [
     [gl.TEXTURE_COMPARE_MODE, gl.COMPARE_REF_TO_TEXTURE], [gl.TEXTURE_COMPARE_FUNC, gl.LEQUAL],
     [gl.TEXTURE_MIN_FILTER, gl.LINEAR], [gl.TEXTURE_MAG_FILTER, gl.LINEAR],
     [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE], [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE],
-  ]) gl.texParameteri(gl.TEXTURE_2D, name, value);
-  gl.bindFramebuffer(gl.FRAMEBUFFER, shadow_frame);
-  gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, shadow_map, 0);
-  gl.drawBuffers([gl.NONE]);
-  gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+  ]) gl.texParameteri(gl.TEXTURE_2D_ARRAY, name, value);
   const finer = gl.getExtension("EXT_texture_filter_anisotropic");
   const map = async (source, is_colour) => {
     const picture = new Image();
@@ -335,16 +340,27 @@
     return { eye, clip: product(projection, view) };
   }
 
-  // The sun under a turned light, and a view from it that holds the whole surface.
+  // The sun under a turned light, and views from places of its disc that hold the whole surface.
   function sun_of(light, turn) {
-    if (!light.sun) return { towards: [0, 1, 0], irradiance: [0, 0, 0], cosine: 2, matrix: new Array(16).fill(0) };
+    if (!light.sun) return { towards: [0, 1, 0], irradiance: [0, 0, 0], cosine: 2, matrices: new Array(16 * suns).fill(0) };
     const [x, y, z] = light.sun.towards, phi = Math.atan2(x, -z) - turn, level = Math.hypot(x, z);
     const towards = [level * Math.sin(phi), y, -level * Math.cos(phi)];
-    const right = unit(cross(Math.abs(y) > 0.99 ? [1, 0, 0] : [0, 1, 0], towards)), up = cross(towards, right);
+    const reach = Math.tan(Math.acos(light.sun.cosine)), right = across(towards), up = cross(towards, right);
+    const matrices = [];
+    for (let i = 0; i < suns; i++) {
+      // Evenly over the disc: each turned by the golden angle.
+      const radius_ = reach * Math.sqrt((i + 0.5) / suns), angle = 2.399963 * i;
+      const [a, b] = [radius_ * Math.cos(angle), radius_ * Math.sin(angle)];
+      matrices.push(...view_of_sun(unit(towards.map((value, k) => value + a * right[k] + b * up[k]))));
+    }
+    return { towards, irradiance: light.sun.irradiance, cosine: light.sun.cosine, matrices };
+  }
+  const across = (d) => unit(cross(Math.abs(d[1]) > 0.99 ? [1, 0, 0] : [0, 1, 0], d));
+  function view_of_sun(towards) {
+    const right = across(towards), up = cross(towards, right);
     const axes = [right, up, towards.map((value) => -value)].map((axis) => axis.map((value) => value / (1.01 * radius)));
-    const matrix = [0, 1, 2].flatMap((column) => [axes[0][column], axes[1][column], axes[2][column], 0]);
-    matrix.push(...axes.map((axis) => -dot(axis, centre)), 1);
-    return { towards, irradiance: light.sun.irradiance, cosine: light.sun.cosine, matrix };
+    return [...[0, 1, 2].flatMap((column) => [axes[0][column], axes[1][column], axes[2][column], 0]),
+      ...axes.map((axis) => -dot(axis, centre)), 1];
   }
 
   // Harmonics of a light that is turned as the maps are: what was at azimuth phi (from -z towards +x) goes to phi - turn.
@@ -419,6 +435,26 @@
     gl.bindTexture(gl.TEXTURE_2D, texture);
     gl.uniform1i(target.uniforms[name], unit_);
   }
+  let shadows_of = "";
+  function draw_shadows(sun) {
+    gl.bindFramebuffer(gl.FRAMEBUFFER, shadow_frame);
+    gl.drawBuffers([gl.NONE]);
+    gl.viewport(0, 0, shadow_size, shadow_size);
+    gl.useProgram(shadow.program);
+    gl.uniform3fv(shadow.uniforms.low, data.mesh.low);
+    gl.uniform3fv(shadow.uniforms.extent, data.mesh.extent);
+    gl.enable(gl.POLYGON_OFFSET_FILL);
+    gl.polygonOffset(2, 4);
+    for (let i = 0; i < suns; i++) {
+      gl.framebufferTextureLayer(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, shadow_map, 0, i);
+      gl.clear(gl.DEPTH_BUFFER_BIT);
+      gl.uniformMatrix4fv(shadow.uniforms.shadow_from_world, false, sun.matrices.slice(16 * i, 16 * i + 16));
+      gl.drawElements(gl.TRIANGLES, indices.length, gl.UNSIGNED_INT, 0);
+    }
+    gl.disable(gl.POLYGON_OFFSET_FILL);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.viewport(0, 0, canvas.width, canvas.height);
+  }
   function draw() {
     wanted = false;
     const photo = data.photos[chosen.view];
@@ -453,19 +489,10 @@
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
     if (light.sun) {
-      gl.bindFramebuffer(gl.FRAMEBUFFER, shadow_frame);
-      gl.viewport(0, 0, shadow_size, shadow_size);
-      gl.clear(gl.DEPTH_BUFFER_BIT);
-      gl.useProgram(shadow.program);
-      gl.uniform3fv(shadow.uniforms.low, data.mesh.low);
-      gl.uniform3fv(shadow.uniforms.extent, data.mesh.extent);
-      gl.uniformMatrix4fv(shadow.uniforms.shadow_from_world, false, sun.matrix);
-      gl.enable(gl.POLYGON_OFFSET_FILL);
-      gl.polygonOffset(2, 4);
-      gl.drawElements(gl.TRIANGLES, indices.length, gl.UNSIGNED_INT, 0);
-      gl.disable(gl.POLYGON_OFFSET_FILL);
-      gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-      gl.viewport(0, 0, canvas.width, canvas.height);
+      // Shadows move with the light alone.
+      const key = `${chosen.light} ${element("rotation").value}`;
+      if (key !== shadows_of) draw_shadows(sun);
+      shadows_of = key;
     }
     const set = (target) => {
       gl.useProgram(target.program);
@@ -490,8 +517,11 @@
     bind(2, "irradiance_map", light.irradiance, surface);
     bind(3, "table", table, surface);
     ["diffuse_map", "specular_map", "width_map"].forEach((name, i) => bind(4 + i, name, maps[i], surface));
-    bind(7, "shadow_map", shadow_map, surface);
-    gl.uniformMatrix4fv(surface.uniforms.shadow_from_world, false, sun.matrix);
+    gl.activeTexture(gl.TEXTURE7);
+    gl.bindTexture(gl.TEXTURE_2D_ARRAY, shadow_map);
+    gl.uniform1i(surface.uniforms.shadow_map, 7);
+    gl.uniformMatrix4fv(surface.uniforms["shadow_from_world[0]"], false, sun.matrices);
+    gl.uniform3fv(surface.uniforms.mean_albedo, data.meanAlbedo || [0.25, 0.25, 0.25]);
     gl.uniform1f(surface.uniforms.shadow_lift, (3 * radius) / shadow_size);
     gl.uniform1i(surface.uniforms.is_ggx, data.lobe === "ggx" ? 1 : 0);
     gl.drawElements(gl.TRIANGLES, indices.length, gl.UNSIGNED_INT, 0);

@@ -2,8 +2,8 @@
 
 use super::super::pictures::{light_of, matched};
 use super::super::shown::exposure_of;
-use super::sheets::WEB_FILES;
-use super::{ExportEvent, WEB_SHOWS};
+use super::sheets::{WEB_FILES, proof_of};
+use super::{ExportEvent, Format, WEB_SHOWS};
 use crate::error::{Finding, Result, Severity};
 use crate::export::asset::Asset;
 use crate::export::sheet::{self, Losses};
@@ -47,7 +47,9 @@ pub(super) fn write_page(
     }
     write_bytes(&folder.join("index.html"), page.html.as_bytes())?;
     let losses = Losses::default().and(WEB_SHOWS);
-    write_bytes(&folder.join("convention.txt"), sheet::of_format("Page", WEB_FILES, &losses).as_bytes())?;
+    let proof = proof_of(Format::Web).filter(|_| asset.has_lobe).map(sheet::of_proof).unwrap_or_default();
+    let text = sheet::of_format("Page", WEB_FILES, &losses) + &proof;
+    write_bytes(&folder.join("convention.txt"), text.as_bytes())?;
     Ok(losses)
 }
 

@@ -95,6 +95,9 @@ fn a_lobe_that_travels_loses_nothing_on_the_way() {
     // Roughness r = a^2 is written as sqrt(a).
     let roughness = file::read_grey(&output.join("blender/roughness.exr")).unwrap();
     assert!((roughness[(9, 9)] - 0.3f32.powf(0.25)).abs() < 1e-6);
+    // What is proven of a format stands in its sheet.
+    let own = std::fs::read_to_string(output.join("blender/convention.txt")).unwrap();
+    assert!(own.contains("\nPROOF\n") && own.contains("of the mean off"), "{own}");
     let sheet = std::fs::read_to_string(output.join("convention.txt")).unwrap();
     assert!(sheet.contains("D  GGX") && !sheet.contains("Blinn-Phong"), "{sheet}");
     // A name that no version knows is told, not guessed.
