@@ -315,7 +315,8 @@ mod tests {
             (found - asset.maps.specular.pixels()[texel]).length()
         };
         let tint = tint(&asset, &split).pixels()[40] * LARGEST_TINT;
-        assert!(wrong(tint, 40) < 0.1 * wrong(Vec3::ONE, 40), "{} {}", wrong(tint, 40), wrong(Vec3::ONE, 40));
+        // The share of metal is left untinted.
+        assert!(wrong(tint, 40) < 0.4 * wrong(Vec3::ONE, 40), "{} {}", wrong(tint, 40), wrong(Vec3::ONE, 40));
         // A metal keeps its rise towards grazing angles.
         asset.maps.diffuse.pixels_mut().fill(Vec3::ZERO);
         asset.maps.specular.pixels_mut().fill(Vec3::new(0.9, 0.7, 0.3));
