@@ -9,7 +9,6 @@ use crate::light::Environment;
 use crate::measured::coordinates::HalfDifference;
 use crate::neural::between::{MaterialMap, Part};
 use crate::neural::embedding::Embedding;
-use crate::neural::lobes::Reconstruction;
 use crate::neural::nodes::GridShape;
 use crate::neural::sampler::HalfVectorSampler;
 use crate::neural::{self, FlowModel, Trained, source};
@@ -65,7 +64,7 @@ impl Materials {
     /// # Errors
     /// `Stopped`.
     pub fn thumbnails(&self, side: usize, stop: &AtomicBool, tell: &dyn Fn(f32)) -> Result<Vec<RgbImage>> {
-        let model = FlowModel::with(Arc::clone(&self.trained), 1, SMALL, Reconstruction::default());
+        let model = FlowModel::with(Arc::clone(&self.trained), 1, SMALL);
         let mut pictures = Vec::new();
         for place in &self.map.places {
             if stop.load(Ordering::Relaxed) {

@@ -6,7 +6,7 @@
 //! share nothing, so each has its own best start.
 
 use super::cells::{counted_in_column, log_stored};
-use super::lobes::{CubeColumns, Reconstruction, log_densities, pull_back_codes};
+use super::lobes::{CubeColumns, log_densities, pull_back_codes, stored_value};
 use super::model::FlowModel;
 use super::warp::{AZIMUTH, DIFFERENCE, HALF};
 use super::weights::Trained;
@@ -94,23 +94,19 @@ impl Sample {
     }
 
     /// Mean squared difference of one channel for a lobe of these log densities at its best colour, and that colour.
-    fn best_colour(&self, log_density: &[f32], channel: usize, reconstruction: Reconstruction) -> (f64, f64) {
+    fn best_colour(&self, log_density: &[f32], channel: usize) -> (f64, f64) {
         let error = |colour: f64| -> f64 {
             // Every third point is enough to choose a start by.
             (0..self.weight.len())
                 .step_by(3)
                 .map(|index| {
-                    let stored = reconstruction.value(colour, f64::from(log_density[index])).0;
+                    let stored = stored_value(colour, f64::from(log_density[index])).0;
                     self.weight[index] * ((stored + LOG_FLOOR).ln() - self.log_stored[index][channel]).powi(2)
                 })
                 .sum()
         };
         // The error has one valley in the colour: golden sections.
-        let (mut low, mut high) = match reconstruction {
-            Reconstruction::Exponential => (-6.0, 4.0),
-            // There it is the logarithm of the mean stored value, hundreds for what is white.
-            Reconstruction::Product => (-6.0, 10.0),
-        };
+        let (mut low, mut high) = (-6.0, 4.0);
         for _ in 0..16 {
             let (a, b) = (high - 0.618 * (high - low), low + 0.618 * (high - low));
             if error(a) < error(b) { high = b } else { low = a }
@@ -120,9 +116,9 @@ impl Sample {
     }
 
     /// Error, logarithm of the best colour and row of each code of a library for one channel, the nearest first.
-    fn ranked(&self, densities: &[Vec<f32>], channel: usize, reconstruction: Reconstruction) -> Vec<(f64, f64, usize)> {
+    fn ranked(&self, densities: &[Vec<f32>], channel: usize) -> Vec<(f64, f64, usize)> {
         let of_row = |(row, density): (usize, &Vec<f32>)| {
-            let (error, colour) = self.best_colour(density, channel, reconstruction);
+            let (error, colour) = self.best_colour(density, channel);
             (error, colour, row)
         };
         let mut ranked: Vec<(f64, f64, usize)> = densities.iter().enumerate().map(of_row).collect();
@@ -159,7 +155,7 @@ pub(crate) fn nearest_codes(library: &Trained, table: &MeasuredBrdf, seed: u64) 
     let densities = log_densities(&library.flow, &library.codes, rows, &sample.columns);
     Ok([0, 1, 2].map(|channel| {
         // There is a first one: the library has rows.
-        let (_, colour, row) = sample.ranked(&densities, channel, Reconstruction::default())[0];
+        let (_, colour, row) = sample.ranked(&densities, channel)[0];
         (row, colour)
     }))
 }
@@ -176,7 +172,7 @@ fn start(model: &FlowModel, sample: &Sample) -> (Vec<f64>, [usize; 3]) {
     }
     let densities = log_densities(&trained.flow, &trained.codes, rows, &sample.columns);
     for channel in 0..3 {
-        let ranked = sample.ranked(&densities, channel, model.reconstruction());
+        let ranked = sample.ranked(&densities, channel);
         from[channel] = ranked[0].2;
         for lobe in 0..model.lobes() {
             // The best codes are often twins, channels of one material: go further down the list for later lobes.
@@ -213,7 +209,7 @@ fn descend(model: &FlowModel, sample: &Sample, start: Vec<f64>, settings: &FlowF
                 let parts: Vec<(f64, f64)> = (0..model.lobes())
                     .map(|lobe| {
                         let group = 3 * lobe + channel;
-                        model.reconstruction().value(colours[group], f64::from(densities[group][index]))
+                        stored_value(colours[group], f64::from(densities[group][index]))
                     })
                     .collect();
                 let stored: f64 = parts.iter().map(|part| part.0).sum();

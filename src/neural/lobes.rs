@@ -1,7 +1,7 @@
 //! From densities to reflectance: lobes of a flow, their codes and colours.
 //!
 //! The paper's equation 5 has reflectance proportional to the density; the code released with it learns densities of
-//! `log(1 + stored value)` and undoes the logarithm. Both are here, the second is what weights are trained for.
+//! `log(1 + stored value)` and undoes the logarithm. That is what weights are trained for, and all that is here.
 
 use super::batch::LARGEST_EXPONENT;
 use super::columns::{Nest, NestPoints};
@@ -9,26 +9,11 @@ use super::flow::Flow;
 use super::pass::Pass;
 use rayon::prelude::*;
 
-/// How a density becomes a stored value.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
-pub enum Reconstruction {
-    /// `expm1(exp(colour) p)`: the released code's, and what training aims at.
-    #[default]
-    Exponential,
-    /// `exp(colour) p`: equation 5 of the paper.
-    Product,
-}
-
-impl Reconstruction {
-    /// The stored value, and its derivatives by the colour's logarithm (equal to that by the density's).
-    pub fn value(self, log_colour: f64, log_density: f64) -> (f64, f64) {
-        let scaled = (log_colour + log_density).min(LARGEST_EXPONENT.ln()).exp();
-        match self {
-            Reconstruction::Exponential => (scaled.exp_m1(), scaled * scaled.exp()),
-            Reconstruction::Product => (scaled, scaled),
-        }
-    }
+/// The stored value of a density, `expm1(exp(colour) p)` as released, and its derivative by the colour's logarithm (equal
+/// to that by the density's).
+pub fn stored_value(log_colour: f64, log_density: f64) -> (f64, f64) {
+    let scaled = (log_colour + log_density).min(LARGEST_EXPONENT.ln()).exp();
+    (scaled.exp_m1(), scaled * scaled.exp())
 }
 
 /// Columns of the cube: each has coordinates of `theta_difference` and `phi_difference`, and the same number of

@@ -7,7 +7,7 @@
 //!
 //! Parameters: per lobe three codes (red, green, blue), then per lobe three logarithms of colours.
 
-use super::lobes::{CubeColumns, Reconstruction, log_densities, pull_back_codes};
+use super::lobes::{CubeColumns, log_densities, pull_back_codes, stored_value};
 use super::nodes::GridShape;
 use super::train::project_to_ball;
 use super::warp::{AZIMUTH, DIFFERENCE, HALF, to_cube};
@@ -33,24 +33,23 @@ pub struct FlowModel {
     trained: Arc<Trained>,
     lobes: usize,
     grid: GridShape,
-    reconstruction: Reconstruction,
     last: Mutex<Option<Decoded>>,
 }
 
 impl FlowModel {
     /// A model of `lobes` lobes (at least one) on the usual grid.
     pub fn new(trained: Arc<Trained>, lobes: usize) -> Self {
-        Self::with(trained, lobes, GridShape::default(), Reconstruction::default())
+        Self::with(trained, lobes, GridShape::default())
     }
 
     /// A model with a grid of its own; every side has at least two nodes.
-    pub fn with(trained: Arc<Trained>, lobes: usize, grid: GridShape, reconstruction: Reconstruction) -> Self {
+    pub fn with(trained: Arc<Trained>, lobes: usize, grid: GridShape) -> Self {
         let grid = GridShape {
             halves: grid.halves.max(2),
             differences: grid.differences.max(2),
             azimuths: grid.azimuths.max(2),
         };
-        FlowModel { trained, lobes: lobes.max(1), grid, reconstruction, last: Mutex::new(None) }
+        FlowModel { trained, lobes: lobes.max(1), grid, last: Mutex::new(None) }
     }
 
     /// The weights it stands on.
@@ -61,11 +60,6 @@ impl FlowModel {
     /// How many lobes there are.
     pub fn lobes(&self) -> usize {
         self.lobes
-    }
-
-    /// How its densities become reflectance.
-    pub fn reconstruction(&self) -> Reconstruction {
-        self.reconstruction
     }
 
     fn code_length(&self) -> usize {
@@ -116,7 +110,7 @@ impl FlowModel {
         let mut stored = vec![[0.0f32; 3]; columns.halves.len()];
         stored.par_iter_mut().enumerate().with_min_len(1024).for_each(|(index, value)| {
             for (group, density) in densities.iter().enumerate() {
-                value[group % 3] += self.reconstruction.value(colours[group], f64::from(density[index])).0 as f32;
+                value[group % 3] += stored_value(colours[group], f64::from(density[index])).0 as f32;
             }
         });
         stored
@@ -161,8 +155,7 @@ impl FlowModel {
                 let (index, node) = (slot * halves + half, column * halves + half);
                 for channel in 0..3 {
                     let parts = (0..self.lobes).map(|lobe| 3 * lobe + channel);
-                    let value =
-                        |group: usize| self.reconstruction.value(colours[group], f64::from(densities[group][index]));
+                    let value = |group: usize| stored_value(colours[group], f64::from(densities[group][index]));
                     let total: f64 = parts.clone().map(|group| value(group).0).sum();
                     for group in parts {
                         let own = f64::from(d_nodes[node][channel]) * value(group).1 / (1.0 + total);

@@ -11,7 +11,6 @@ use crate::neural::embedding::Embedding;
 use crate::neural::fit::{FlowFitSettings, fit_table};
 use crate::neural::flow::Flow;
 use crate::neural::library::{Library, subset};
-use crate::neural::lobes::Reconstruction;
 use crate::neural::nodes::GridShape;
 use crate::neural::sampler::HalfVectorSampler;
 use crate::neural::train::TrainSettings;
@@ -108,9 +107,6 @@ pub struct CodesOptions {
     /// Lobes, 1 to 3.
     #[arg(long, default_value_t = 3)]
     pub lobes: usize,
-    /// How densities become reflectance: as released with the paper, or its equation 5.
-    #[arg(long, value_enum, default_value_t)]
-    pub reconstruction: Reconstruction,
     /// Table of errors to write.
     #[arg(short, long)]
     pub output: Option<PathBuf>,
@@ -228,7 +224,7 @@ fn codes(options: &CodesOptions, json: bool) -> Result<()> {
         return Err(unknown("lobes", format!("{} lobes are not fitted", options.lobes), "take 1, 2 or 3"));
     }
     let trained = Arc::new(weights(options.weights.as_deref())?);
-    let model = FlowModel::with(Arc::clone(&trained), options.lobes, GridShape::default(), options.reconstruction);
+    let model = FlowModel::with(Arc::clone(&trained), options.lobes, GridShape::default());
     let mut rows = String::from(
         "material,trained_on,log_rmse,log10_rmse,cosine_rmse,library_log_rmse,largest_albedo,between_nodes_log_rmse\n",
     );

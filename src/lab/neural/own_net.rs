@@ -18,7 +18,7 @@ use crate::neural::architecture::Architecture;
 use crate::neural::cells::{Batch, CountedColumns};
 use crate::neural::columns::{Nest, NestPoints};
 use crate::neural::flow::Flow;
-use crate::neural::lobes::Reconstruction;
+use crate::neural::lobes::stored_value;
 use crate::neural::model::FlowModel;
 use crate::neural::pass::Pass;
 use crate::neural::train::project_to_ball;
@@ -229,7 +229,7 @@ fn evaluate(own: &Trained, columns: &CountedColumns, batch: &Batch) -> Found {
         for (channel, densities) in log_density.chunks_exact(cells.len()).enumerate() {
             let colour = f64::from(own.log_colours[channel]);
             for (&cell, &density) in cells.iter().zip(densities) {
-                let (stored, slope) = Reconstruction::default().value(colour, density);
+                let (stored, slope) = stored_value(colour, density);
                 let difference = (stored + LOG_FLOOR).ln() - f64::from(columns.log_stored[cell][channel]);
                 found.squared_error += scale * difference * difference;
                 let pull = 2.0 * scale * difference * slope / (stored + LOG_FLOOR);
