@@ -5,7 +5,7 @@
 //! that was found, as in [`evidence`](super::evidence): `1 - w (J J / s^2 + Q)^-1 w / w Q^-1 w` with `w` the blur at a
 //! direction less the mean of the sphere, summed over directions. What is left out: that the reflectance may be wrong.
 
-use super::evidence::{belief, cholesky, information};
+use super::evidence::posterior;
 use super::matrices::LightMatrix;
 use super::nodes::NodeTable;
 use super::prior::{LogLight, shares};
@@ -13,14 +13,12 @@ use super::problem::ObjectProblem;
 use crate::light::blur::{BANDS, BlurKernel};
 use std::f64::consts::{PI, TAU};
 
-/// Rows of the light at which this is asked: matrices of so many texels squared are factored.
+/// Rows of the light at which this is asked: its finest details are below the smallest blur.
 pub const ROWS: usize = 24;
 /// Directions at which blurred lights are looked at.
 const DIRECTIONS: usize = 24;
 /// A light blurred by an angle is the photo's when it takes away at least this share of its variance.
 const KNOWN: f64 = 0.5;
-/// The channel that stands for all three: they see the same geometry.
-const CHANNEL: usize = 1;
 
 /// How much photos tell of a light, from fine to coarse.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -35,17 +33,13 @@ impl LightBands {
     /// Of a small problem with its reflectance, around a light of its size. `None` where it cannot be computed.
     pub fn of(problem: &ObjectProblem, table: &NodeTable, light: &LogLight) -> Option<Self> {
         let matrix = LightMatrix::new(&problem.transport, table);
-        let mut prior = belief(light, CHANNEL);
-        let mut posterior = information(&matrix, &problem.likelihood, light, CHANNEL);
-        posterior.iter_mut().zip(&prior).for_each(|(sum, value)| *sum += value);
-        let texels = light.width * light.height;
-        cholesky(&mut prior, texels)?;
-        cholesky(&mut posterior, texels)?;
+        let posterior = posterior(&matrix, &problem.likelihood, light)?;
         let known = BANDS.map(|degrees| {
             let (mut left, mut all) = (0.0, 0.0);
             for weights in blurs(light.width, light.height, degrees) {
-                left += variance(&posterior, &weights);
-                all += variance(&prior, &weights);
+                let (before, after) = posterior.variances(&weights);
+                left += after;
+                all += before;
             }
             (1.0 - left / all.max(1e-300)).clamp(0.0, 1.0)
         });
@@ -89,19 +83,6 @@ fn blurs(width: usize, height: usize, degrees: f64) -> Vec<Vec<f64>> {
     (0..DIRECTIONS).map(of).collect()
 }
 
-/// `w H^-1 w` of a factored matrix: the squared length of what solves the lower triangle.
-fn variance(factor: &[f64], weights: &[f64]) -> f64 {
-    let size = weights.len();
-    let mut rest = weights.to_vec();
-    let mut sum = 0.0;
-    for (column, row) in factor.chunks_exact(size).enumerate() {
-        let own = rest[column] / row[column];
-        sum += own * own;
-        rest[column + 1..].iter_mut().zip(&row[column + 1..]).for_each(|(rest, value)| *rest -= own * value);
-    }
-    sum
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -110,15 +91,6 @@ mod tests {
     use crate::object::settings::ObjectSettings;
     use crate::object::{ObjectGeometry, ObjectPhoto, ObjectView};
     use glam::Vec3;
-
-    #[test]
-    fn the_variance_is_that_of_a_known_matrix() {
-        // [4 2; 2 3] has the inverse [3 -2; -2 4] / 8.
-        let mut square = vec![4.0, 2.0, 2.0, 3.0];
-        cholesky(&mut square, 2).unwrap();
-        assert!((variance(&square, &[1.0, 0.0]) - 3.0 / 8.0).abs() < 1e-12);
-        assert!((variance(&square, &[1.0, -1.0]) - 11.0 / 8.0).abs() < 1e-12);
-    }
 
     #[test]
     fn a_polished_ball_tells_finer_details_than_a_matt_one() {

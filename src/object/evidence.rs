@@ -13,8 +13,8 @@
 use super::light_step::LightObjective;
 use super::likelihood::Likelihood;
 use super::matrices::LightMatrix;
+use super::posterior::{Band, Posterior};
 use super::prior::{LogLight, shares};
-use crate::neural::product::{Rows, multiply};
 
 /// Standard deviation of what the model cannot explain, in natural logarithms.
 const DEVIATION: f64 = 0.1;
@@ -28,6 +28,8 @@ const PULL: f64 = 0.1;
 /// Weight of the tail of steps, in nats: a step costs `TAIL ln(1 + STIFFNESS step^2 / (2 TAIL))`. Suns and windows have
 /// edges of which a normal distribution knows nothing: it would have a blurred light and a mirror.
 const TAIL: f64 = 2.0;
+/// The channel that stands for all three: they see the same geometry.
+const CHANNEL: usize = 1;
 
 /// Minus the logarithm of the probability of the photo with the light summed out around `light`, in nats, up to a
 /// number that is the same for all reflectances. Infinite when it cannot be computed.
@@ -41,44 +43,15 @@ pub fn negative_log_evidence(matrix: &LightMatrix, likelihood: &Likelihood, ligh
     }
     let prior = LightBelief::new(light.width, light.height, TAIL);
     let energy: f64 = light.channels.iter().map(|channel| prior.energy(channel)).sum();
-    // The channels see the same geometry: one stands for all three.
-    let channel = 1;
-    let texels = matrix.texels();
-    let mut square = information(matrix, likelihood, light, channel);
-    prior.add_to(&light.channels[channel], &mut square);
-    let volume = cholesky(&mut square, texels).map_or(f64::INFINITY, |logarithm| 1.5 * logarithm);
-    residuals + energy + volume
+    let texels = light.channels[CHANNEL].as_slice();
+    let posterior = Posterior::new(prior.quadratic(texels), matrix, likelihood, light, CHANNEL, DEVIATION);
+    residuals + energy + posterior.map_or(f64::INFINITY, |posterior| 3.0 * posterior.half_log_determinant)
 }
 
-/// What the photo tells of the logarithm of one channel of a light, texel by texel: `J J / s^2`.
-pub(super) fn information(matrix: &LightMatrix, likelihood: &Likelihood, light: &LogLight, channel: usize) -> Vec<f64> {
-    let radiance = light.radiance();
-    let picture = matrix.forward(&radiance);
-    let mut rows = matrix.dense(channel);
-    let texels = matrix.texels();
-    for (index, (row, pixel)) in rows.chunks_exact_mut(texels).zip(&picture).enumerate() {
-        if likelihood.is_kept_bound(index, channel, pixel[channel]) {
-            // Brighter than what saturates says nothing of how much.
-            row.fill(0.0);
-            continue;
-        }
-        let by_log = 1.0 / (DEVIATION * (f64::from(pixel[channel]).max(0.0) + likelihood.epsilon));
-        for (value, radiance) in row.iter_mut().zip(&radiance[channel]) {
-            *value = (f64::from(*value * radiance) * by_log) as f32;
-        }
-    }
-    let mut gram = vec![0.0f32; texels * texels];
-    let left = Rows::new(&rows, matrix.pixels(), texels);
-    multiply(left.transpose(), left, &mut gram, false);
-    gram.into_iter().map(f64::from).collect()
-}
-
-/// What is believed of one channel of a light before any photo: the matrix `Q` of the quadratic that touches the belief.
-pub(super) fn belief(light: &LogLight, channel: usize) -> Vec<f64> {
-    let texels = light.width * light.height;
-    let mut square = vec![0.0; texels * texels];
-    LightBelief::new(light.width, light.height, TAIL).add_to(&light.channels[channel], &mut square);
-    square
+/// Belief and photo around a light, for questions to it.
+pub(super) fn posterior(matrix: &LightMatrix, likelihood: &Likelihood, light: &LogLight) -> Option<Posterior> {
+    let belief = LightBelief::new(light.width, light.height, TAIL).quadratic(&light.channels[CHANNEL]);
+    Posterior::new(belief, matrix, likelihood, light, CHANNEL, DEVIATION)
 }
 
 /// The same figure of an objective whose light is known: residuals alone, on the scale of nats.
@@ -91,6 +64,7 @@ struct LightBelief {
     edges: Vec<(usize, usize, f64)>,
     pull: Vec<f64>,
     tail: f64,
+    width: usize,
 }
 
 impl LightBelief {
@@ -109,7 +83,7 @@ impl LightBelief {
             }
         }
         let pull = shares.iter().map(|share| PULL * f64::from(*share) * texels as f64).collect();
-        LightBelief { edges, pull, tail }
+        LightBelief { edges, pull, tail, width }
     }
 
     fn energy(&self, logs: &[f32]) -> f64 {
@@ -124,46 +98,21 @@ impl LightBelief {
         0.5 * weight * f64::from(logs[a] - logs[b]).powi(2) / self.tail
     }
 
-    /// Adds the quadratic that touches the energy at `logs`.
-    fn add_to(&self, logs: &[f32], square: &mut [f64]) {
-        let texels = self.pull.len();
+    /// The quadratic that touches the energy at `logs`.
+    fn quadratic(&self, logs: &[f32]) -> Band {
+        let mut band = Band::new(self.pull.len(), self.width);
         for (texel, pull) in self.pull.iter().enumerate() {
-            square[texel * texels + texel] += pull;
+            band.add(texel, texel, *pull);
         }
         for edge in &self.edges {
             let (a, b, weight) = *edge;
             let weight = weight / (1.0 + self.over_tail(edge, logs));
-            square[a * texels + a] += weight;
-            square[b * texels + b] += weight;
-            square[a * texels + b] -= weight;
-            square[b * texels + a] -= weight;
+            band.add(a, a, weight);
+            band.add(b, b, weight);
+            band.add(a, b, -weight);
         }
+        band
     }
-}
-
-/// Factors a symmetric matrix by Cholesky's method and returns the logarithm of its determinant; `None` when it is not
-/// positive definite. Row `k` then holds column `k` of the factor, from its diagonal on.
-pub(super) fn cholesky(square: &mut [f64], size: usize) -> Option<f64> {
-    let mut sum = 0.0;
-    for column in 0..size {
-        let (above, below) = square.split_at_mut(column * size);
-        // Rows above hold the factor transposed: row k holds the entries of column k from its diagonal on.
-        let row = &mut below[..size];
-        for factor in above.chunks_exact(size) {
-            let scale = factor[column];
-            if scale != 0.0 {
-                row[column..].iter_mut().zip(&factor[column..]).for_each(|(value, other)| *value -= scale * other);
-            }
-        }
-        let pivot = row[column];
-        if !(pivot > 0.0) || !pivot.is_finite() {
-            return None;
-        }
-        sum += pivot.ln();
-        let scale = pivot.sqrt().recip();
-        row[column..].iter_mut().for_each(|value| *value *= scale);
-    }
-    Some(sum)
 }
 
 #[cfg(test)]
@@ -182,28 +131,6 @@ mod tests {
         // Small steps cost the same.
         logs[5 * width + 7] = 0.05;
         assert!((heavy.energy(&logs) / normal.energy(&logs) - 1.0).abs() < 0.01);
-        // What is added to a matrix is positive semidefinite: rows sum to the pull alone.
-        let mut square = vec![0.0; (width * height).pow(2)];
-        heavy.add_to(&logs, &mut square);
-        for (row, pull) in square.chunks_exact(width * height).zip(&heavy.pull) {
-            assert!((row.iter().sum::<f64>() - pull).abs() < 1e-9);
-        }
-    }
-
-    #[test]
-    fn the_determinant_is_that_of_a_known_matrix() {
-        // (2 on the diagonal, -1 beside it) of size n has the determinant n + 1.
-        let size = 30;
-        let mut square = vec![0.0; size * size];
-        for i in 0..size {
-            square[i * size + i] = 2.0;
-            if i + 1 < size {
-                square[i * size + i + 1] = -1.0;
-                square[(i + 1) * size + i] = -1.0;
-            }
-        }
-        assert!((cholesky(&mut square.clone(), size).unwrap() - 31f64.ln()).abs() < 1e-10);
-        square[0] = -1.0;
-        assert!(cholesky(&mut square, size).is_none());
+        assert!(heavy.quadratic(&logs).factor().is_some_and(f64::is_finite));
     }
 }

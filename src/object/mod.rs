@@ -36,6 +36,7 @@ pub mod outline;
 pub mod page;
 pub mod photo;
 pub mod picture;
+mod posterior;
 pub mod prior;
 pub mod problem;
 pub mod progress;
