@@ -6,13 +6,12 @@
 //! that make each step a walk through memory.
 
 use super::bands::LightBands;
-use super::light_step::{DeepTie, LightOutcome, LightTerms, NewtonBudget, first_order, newton, objective};
+use super::light_holder::LightHolder;
+use super::light_step::{LightOutcome, NewtonBudget, first_order, newton, objective};
 use super::matrices::{LightMatrix, NodeMatrix};
 use super::nodes::{NodeGrid, NodeTable};
 use super::observations::ObjectView;
-use super::prior::deep::DeepPrior;
-use super::prior::gradient::GradientPrior;
-use super::prior::{LightPriorKind, LogLight};
+use super::prior::LogLight;
 use super::problem::ObjectProblem;
 use super::progress::{ObjectEvent, ObjectiveRow, StepKind};
 use super::reflectance_step::{ReflectanceProblem, StepMemory};
@@ -32,8 +31,6 @@ const REFLECTANCE_PATIENCE: f64 = 1e-3;
 const KNOWN_LIGHT_PATIENCE: f64 = 1e-5;
 /// First-order steps without gain after which a round ends, as released.
 const FIRST_ORDER_PATIENCE: usize = 50;
-/// Width of an edge for the gradient prior, in natural logarithms.
-const EDGE_WIDTH: f32 = 0.05;
 
 /// What is known beforehand.
 #[derive(Clone, Debug, Default)]
@@ -134,7 +131,10 @@ pub fn estimate(
         (Some(light), _) => light.clone(),
         // The light found at low resolution is where the fine one begins.
         (None, Some(coarse)) => LogLight::of(&coarse.environment().resampled(width, height), 1e-12),
-        (None, None) => run.problem.even_light(&table),
+        (None, None) => {
+            let matrix = LightMatrix::new(&run.problem.transport, &table);
+            LightHolder::first_light(&run.problem, &matrix, settings)
+        }
     };
 
     watch(ObjectEvent::Stage("estimating"));
@@ -194,42 +194,6 @@ pub fn estimate(
         findings,
         seconds: began.elapsed().as_secs_f64(),
     })
-}
-
-/// What holds the light through all rounds.
-#[derive(Default)]
-pub(super) struct LightHolder {
-    terms: LightTerms,
-    deep: Option<DeepTie>,
-}
-
-impl LightHolder {
-    /// The priors that the settings ask for, for a light like `light`, beside what is known.
-    ///
-    /// # Errors
-    /// A size for which there is no net.
-    pub fn new(settings: &ObjectSettings, known: &Known, light: &LogLight) -> Result<Self> {
-        let (width, height) = (light.width, light.height);
-        let gradient =
-            |weight: f64| Some(GradientPrior::new(width, height, weight, EDGE_WIDTH)).filter(|_| weight > 0.0);
-        let mut terms = LightTerms::default();
-        let mut deep = None;
-        match settings.prior {
-            LightPriorKind::None => {}
-            LightPriorKind::Gradient => terms.gradient = gradient(settings.gradient_weight),
-            LightPriorKind::Deep => {
-                let mut prior = DeepPrior::new(width, height, settings.net_channels, settings.seed)?;
-                prior.offset = light.mean().map(|mean| mean as f32);
-                let (steps, rate) = (settings.net_steps, settings.net_rate);
-                let weight = match known.reflectance.is_some() {
-                    true => settings.net_weight,
-                    false => settings.net_weight_of_both,
-                };
-                deep = Some(DeepTie { prior, weight, net_steps: steps, rate });
-            }
-        }
-        Ok(LightHolder { terms, deep })
-    }
 }
 
 impl Run<'_> {

@@ -27,6 +27,7 @@ pub mod directions;
 pub mod evidence;
 pub mod geometry;
 pub mod joint;
+mod light_holder;
 pub mod light_step;
 pub mod likelihood;
 pub mod matrices;

@@ -2,7 +2,7 @@
 
 use super::likelihood::Likelihood;
 use super::matrices::LightMatrix;
-use super::nodes::{NodeGrid, NodeTable};
+use super::nodes::NodeGrid;
 use super::observations::{ObjectView, Observations};
 use super::prior::LogLight;
 use super::settings::ObjectSettings;
@@ -73,15 +73,7 @@ impl ObjectProblem {
 
     /// The even light under which pictures of a reflectance are as bright as the photos: the median of the ratios, per
     /// channel.
-    pub fn even_light(&self, table: &NodeTable) -> LogLight {
-        let directions = self.transport.directions();
-        let (width, height) = (directions.width, directions.height);
-        let matrix = LightMatrix::new(&self.transport, table);
-        self.even_light_through(&matrix, width, height)
-    }
-
-    /// [`ObjectProblem::even_light`] with the matrix at hand.
-    pub fn even_light_through(&self, matrix: &LightMatrix, width: usize, height: usize) -> LogLight {
+    pub fn even_light(&self, matrix: &LightMatrix, width: usize, height: usize) -> LogLight {
         let ones = LogLight::constant(width, height, [0.0; 3]);
         let picture = matrix.forward(&ones.radiance());
         let mut logs = [0.0; 3];

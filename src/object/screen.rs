@@ -85,7 +85,7 @@ pub fn screen(
             Some(matrix) => candidate.rank_under(problem, matrix),
             None => {
                 let matrix = LightMatrix::new(&problem.transport, &candidate.table);
-                let light = problem.even_light_through(&matrix, width, height);
+                let light = problem.even_light(&matrix, width, height);
                 candidate.light_through(problem, &matrix, &terms, light, TRIED_STEPS);
             }
         }

@@ -7,6 +7,13 @@ use crate::object::matrices::LightMatrix;
 use crate::object::prior::deep::DeepPrior;
 use crate::object::prior::{LogLight, shares};
 
+/// Steps of Adam in a block of [`DeepTie::warm`].
+const WARM_BLOCK: usize = 25;
+/// Blocks of it, at most.
+const WARM_BLOCKS: usize = 12;
+/// A block that leaves more than this share of the squared difference is the last.
+const WARM_PATIENCE: f64 = 0.93;
+
 /// The deep prior's part in alternation with Newton: its net, and the pull between it and the light.
 #[derive(Clone, Debug)]
 pub struct DeepTie {
@@ -47,6 +54,20 @@ impl DeepTie {
     /// Fits the net to a light.
     pub fn follow(&mut self, light: &LogLight) {
         self.prior.fit(&light.channels, &shares(light.width, light.height), self.net_steps, self.rate);
+    }
+
+    /// Fits a net that knows nothing to the light that an estimation begins with, until it comes no nearer: an untrained
+    /// one would pull that light to nothing.
+    pub fn warm(&mut self, light: &LogLight) {
+        let shares = shares(light.width, light.height);
+        let mut before = f64::INFINITY;
+        for _ in 0..WARM_BLOCKS {
+            let error = self.prior.fit(&light.channels, &shares, WARM_BLOCK, self.rate);
+            if !(error < WARM_PATIENCE * before) {
+                break;
+            }
+            before = error;
+        }
     }
 
     /// The light as the net has it.
