@@ -191,13 +191,12 @@ pub fn object(options: &ObjectOptions, json: bool) -> Result<()> {
         }
         let spread = split::SplitSpread::of(&found.candidates);
         println!(
-            "began as {}; picture within {:.3} in logarithms; as well by {}; {:.1} s: {}",
+            "began as {}; picture within {:.3} in logarithms; {}; {:.1} s: {}",
             found.start,
             found.picture_log_rmse,
-            match spread.starts.len().saturating_sub(1) {
-                0 => "no other start".into(),
-                1 => "another start".into(),
-                others => format!("{others} other starts"),
+            match (found.candidates.len(), spread.light.or(spread.reflectance)) {
+                (count, Some(apart)) => format!("{count} starts were followed and end {apart:.2} apart"),
+                _ => "one start".into(),
             },
             found.seconds,
             options.output.display()

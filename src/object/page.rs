@@ -124,8 +124,8 @@ pub fn facts(estimate: &Estimate, model: &str, gauge: &Gauge, spread: &SplitSpre
         ("geometric mean of the light, R · G · B", three(gauge.light_mean)),
         ("largest directional albedo, R · G · B", three(gauge.largest_albedo)),
         ("starts that explain the photo as well", spread.starts.join(", ")),
-        ("their spread in the light (RMS, natural)", known(spread.light)),
-        ("their spread in the reflectance (RMS, natural)", known(spread.reflectance)),
+        ("spread of the starts followed in the light (RMS, natural)", known(spread.light)),
+        ("the same in the reflectance", known(spread.reflectance)),
     ];
     if let Some(seen) = &estimate.light_seen {
         rows.push(("directions the photos tell next to nothing of", format!("{:.0} %", 100.0 * seen.unseen_share)));

@@ -8,7 +8,8 @@ use super::nodes::{NodeGrid, NodeTable};
 use super::prior::{LogLight, shares};
 use super::screen::Candidate;
 
-/// Starts whose evidence is within so many nats of the best are held for as good.
+/// Starts whose evidence is within so many nats of the best are listed as good. How far off a result may be is another
+/// question: pixels are not as independent as evidence counts them, and wrong starts were hundreds of nats ahead.
 const AS_GOOD: f64 = 12.0;
 
 /// The level of a light, per channel, and the range that physics leaves for it.
@@ -65,34 +66,33 @@ pub fn albedo(grid: &NodeGrid, table: &NodeTable, theta: f32) -> [f64; 3] {
     sums.map(|sum| sum * std::f64::consts::PI / (rows * columns) as f64)
 }
 
-/// How far apart starts are that explain the photo about as well.
+/// How far apart the starts end that were followed: a measure of what the photo leaves open.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SplitSpread {
-    /// Names of these starts, the best first.
+    /// Names of those that explain the photo about as well, the best first.
     pub starts: Vec<String>,
     /// Root mean square over the sphere of the spread of the logarithm of light, its level per channel taken out;
-    /// natural units. `None` where it is not known: fewer than two starts are as good, or the light is given.
+    /// natural units. `None` where it is not known: fewer than two starts were followed, or the light is given.
     pub light: Option<f64>,
     /// The same of the reflectance at the nodes.
     pub reflectance: Option<f64>,
 }
 
 impl SplitSpread {
-    /// The spread of the starts that were followed. One start that is ahead of all others does not make the split sure: it
-    /// says nothing of how far light and reflectance may be off together.
+    /// The spread of the starts that were followed, all of them: one that is ahead of the others does not make the split
+    /// sure. The model has no start for most materials, and the best of a library is off as the next ones are.
     pub fn of(candidates: &[Candidate]) -> Self {
         let Some(best) = candidates.first() else { return SplitSpread::default() };
-        let good: Vec<&Candidate> =
-            candidates.iter().filter(|candidate| candidate.evidence <= best.evidence + AS_GOOD).collect();
-        let starts = good.iter().map(|candidate| candidate.name.clone()).collect();
-        let lights: Vec<&LogLight> = good.iter().filter_map(|candidate| candidate.light.as_ref()).collect();
+        let good = candidates.iter().filter(|candidate| candidate.evidence <= best.evidence + AS_GOOD);
+        let starts = good.map(|candidate| candidate.name.clone()).collect();
+        let lights: Vec<&LogLight> = candidates.iter().filter_map(|candidate| candidate.light.as_ref()).collect();
         let light = lights.first().and_then(|first| {
             let weights = shares(first.width, first.height);
             let log = |light: &&LogLight| light.channels.iter().flatten().map(|&log| f64::from(log)).collect();
             let maps: Vec<Vec<f64>> = lights.iter().map(log).collect();
             spread(&maps, |index| f64::from(weights[index % weights.len()]), weights.len())
         });
-        let tables: Vec<Vec<f64>> = good
+        let tables: Vec<Vec<f64>> = candidates
             .iter()
             .map(|candidate| {
                 let channel =

@@ -16,18 +16,16 @@ pub fn show(ui: &mut Ui, model: &mut Model) {
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         let (spread, gauge) = (&outcome.spread, &outcome.gauge);
         heading(ui, "Ambiguity");
-        ui.label(match spread.starts.len() {
-            0 => "The initializations were not optimized to the end".into(),
-            1 => {
-                "One initialization alone explains the photo; all others have Δ log-evidence of 12 nats or more".into()
-            }
-            count => {
-                let of = |what: &str, spread: Option<f64>| {
-                    spread.map(|spread| format!("{spread:.2} in the logarithm of the {what}"))
-                };
-                let both = [of("environment", spread.light), of("reflectance", spread.reflectance)];
-                let both = both.into_iter().flatten().collect::<Vec<_>>().join(" and by ");
-                format!("{count} initializations explain the photo about equally well: they differ by {both}")
+        let of = |what: &str, spread: Option<f64>| {
+            spread.map(|spread| format!("{spread:.2} in the logarithm of the {what}"))
+        };
+        let both = [of("environment", spread.light), of("reflectance", spread.reflectance)];
+        let both = both.into_iter().flatten().collect::<Vec<_>>().join(" and by ");
+        ui.label(match (spread.starts.len(), both.is_empty()) {
+            (0, _) => "The initializations were not optimized to the end".into(),
+            (_, true) => "One initialization was optimized".into(),
+            (count, false) => {
+                format!("Initializations differ by {both}; {count} of them explain the photo about equally well")
             }
         });
         let [red, green, blue] = gauge.largest_factor;
