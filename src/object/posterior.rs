@@ -32,7 +32,7 @@ impl Band {
         self.values[row * (self.band + 1) + self.band + column - row] += value;
     }
 
-    /// Rows `column` of the band from there to the diagonal.
+    /// Columns `from..to` of a row of the band.
     fn row(&self, row: usize, from: usize, to: usize) -> &[f64] {
         let begin = row * (self.band + 1) + self.band;
         &self.values[begin + from - row..begin + to - row]
@@ -97,19 +97,23 @@ pub(super) struct Posterior {
 impl Posterior {
     /// Of a belief and what the photo tells of one channel of a light. `None` when it is not positive definite.
     pub fn new(
-        mut belief: Band,
+        belief: Band,
         matrix: &LightMatrix,
         likelihood: &Likelihood,
         light: &LogLight,
         channel: usize,
         deviation: f64,
     ) -> Option<Self> {
+        let slopes = slopes_by_texel(matrix, likelihood, light, channel, deviation);
+        Self::of(belief, slopes, matrix.pixels())
+    }
+
+    /// Of a belief and slopes over the deviation: a row a texel, `count` pixels in each.
+    fn of(mut belief: Band, mut seen: Vec<f32>, count: usize) -> Option<Self> {
         let of_belief = belief.factor()?;
-        let count = matrix.pixels();
-        let mut seen = slopes_by_texel(matrix, likelihood, light, channel, deviation);
         belief.solve_lower(&mut seen, count);
         let mut gram = vec![0.0f32; count * count];
-        let rows = Rows::new(&seen, matrix.texels(), count);
+        let rows = Rows::new(&seen, belief.size, count);
         multiply(rows.transpose(), rows, &mut gram, false);
         let mut pixels: Vec<f64> = gram.into_iter().map(f64::from).collect();
         (0..count).for_each(|pixel| pixels[pixel * count + pixel] += 1.0);
@@ -190,6 +194,7 @@ fn cholesky(square: &mut [f64], size: usize) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::random::SequentialRandom;
 
     #[test]
     fn determinants_and_solutions_are_those_of_known_matrices() {
@@ -219,5 +224,46 @@ mod tests {
         let mut negative = Band::new(3, 1);
         negative.add(0, 0, -1.0);
         assert!(negative.factor().is_none());
+    }
+    #[test]
+    fn determinant_and_variances_are_those_of_the_whole_square() {
+        let (texels, count, width) = (24, 7, 5);
+        let mut random = SequentialRandom::new(2);
+        let mut number = || f64::from(random.next_number()) - 0.5;
+        let mut band = Band::new(texels, width);
+        let mut whole = vec![0.0; texels * texels];
+        for a in 0..texels {
+            for b in a..(a + width + 1).min(texels) {
+                let value = if a == b { 3.0 } else { 0.4 * number() };
+                band.add(a, b, value);
+                whole[a * texels + b] = value;
+                whole[b * texels + a] = value;
+            }
+        }
+        let mut belief = whole.clone();
+        let seen: Vec<f32> = (0..texels * count).map(|_| (3.0 * number()) as f32).collect();
+        for (a, row) in whole.chunks_exact_mut(texels).enumerate() {
+            for (b, value) in row.iter_mut().enumerate() {
+                *value +=
+                    (0..count).map(|p| f64::from(seen[a * count + p]) * f64::from(seen[b * count + p])).sum::<f64>();
+            }
+        }
+        let weights: Vec<f64> = (0..texels).map(|_| number()).collect();
+        let posterior = Posterior::of(band, seen, count).unwrap();
+        let half = 0.5 * cholesky(&mut whole, texels).unwrap();
+        assert!((posterior.half_log_determinant - half).abs() < 1e-4 * half.abs());
+        cholesky(&mut belief, texels).unwrap();
+        let variance = |factor: &[f64]| {
+            let mut rest = weights.clone();
+            let mut sum = 0.0;
+            for (column, row) in factor.chunks_exact(texels).enumerate() {
+                let own = rest[column] / row[column];
+                sum += own * own;
+                (column + 1..texels).for_each(|later| rest[later] -= own * row[later]);
+            }
+            sum
+        };
+        let (before, after) = posterior.variances(&weights);
+        assert!((before / variance(&belief) - 1.0).abs() < 1e-4 && (after / variance(&whole) - 1.0).abs() < 1e-3);
     }
 }
