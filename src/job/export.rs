@@ -26,7 +26,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::prepare::RunSettings;
 use page::write_page;
-use sheets::{BLENDER_FILES, GLB_FILES, MATERIALX_FILES, MITSUBA_FILES, TEXTURE_FILES, USD_FILES, proof_of};
+use sheets::{BLENDER_FILES, GLB_FILES, MATERIALX_FILES, MITSUBA_FILES, TEXTURE_FILES, USD_FILES, write_sheet};
 
 /// What an export is made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -398,9 +398,7 @@ fn write_format(format: Format, asset: &Asset, folder: &Path, textures: TextureF
             ("Texture set", TEXTURE_FILES, lobe.and_split(&texture_set::write(asset, folder, textures)?))
         }
     };
-    let proof = proof_of(format).filter(|_| asset.has_lobe).map(sheet::of_proof).unwrap_or_default();
-    let text = sheet::of_format(title, files, &losses) + &proof;
-    write_bytes(&folder.join("convention.txt"), text.as_bytes())?;
+    write_sheet(format, (title, files), &losses, asset, folder)?;
     Ok(losses)
 }
 

@@ -23,6 +23,7 @@ struct ViewGain {
 
 /// Gains by squares, row by row of the atlas.
 pub struct SquareGains {
+    size_texels: usize,
     across: usize,
     views: usize,
     squares: Vec<Vec<ViewGain>>,
@@ -48,11 +49,18 @@ impl SquareGains {
             };
             sums.chunks(views.max(1)).map(of_square).collect::<Vec<_>>()
         });
-        Self { across, views, squares: squares.collect() }
+        Self { size_texels, across, views, squares: squares.collect() }
+    }
+
+    /// The texels of squares whose mean gain is one of these.
+    pub fn texels_where(&self, is_chosen: impl Fn(&ClusteredMean) -> bool) -> Vec<bool> {
+        let squares: Vec<bool> = self.means().iter().map(is_chosen).collect();
+        let (size, across) = (self.size_texels, self.across);
+        (0..size * size).map(|texel| squares[texel / size / SQUARE * across + texel % size / SQUARE]).collect()
     }
 
     /// The mean gain a pixel of each square with those around it, row by row; a mean without pixels where no view sees any.
-    pub fn means(&self) -> Vec<ClusteredMean> {
+    fn means(&self) -> Vec<ClusteredMean> {
         let reach = |middle: usize| middle.saturating_sub(REACH)..(middle + REACH + 1).min(self.across);
         let of_row = |row: usize| {
             let mut sums = vec![(0u32, 0.0f64); self.views];
@@ -71,5 +79,37 @@ impl SquareGains {
             (0..self.across).map(of_square)
         };
         (0..self.across).into_par_iter().flat_map_iter(of_row).collect()
+    }
+}
+
+#[cfg(all(test, feature = "cli"))]
+mod tests {
+    use super::super::refine::tests::{SIZE, photographed};
+    use super::super::solver::Solver;
+    use super::*;
+
+    #[test]
+    fn a_square_is_judged_by_the_pixels_of_those_around_it() {
+        let (solver, _) = photographed(|_| [1.0; 3]);
+        let Solver { scene, .. } = &solver;
+        let pixels = Pixels::of(scene);
+        let across = SIZE.div_ceil(SQUARE);
+        let mut count = vec![0.0; across * across];
+        for pixel in 0..pixels.count() {
+            let texel = pixels.texel(pixel) as usize;
+            count[texel / SIZE / SQUARE * across + texel % SIZE / SQUARE] += 1.0;
+        }
+        let gains = SquareGains::new(SIZE, &pixels, |pixel| f64::from(pixels.pixel(pixel).view));
+        for (square, mean) in gains.means().iter().enumerate() {
+            let near = |other: &usize| {
+                (other / across).abs_diff(square / across) <= 1 && (other % across).abs_diff(square % across) <= 1
+            };
+            let around: f64 = (0..across * across).filter(near).map(|other| count[other]).sum();
+            assert_eq!(mean.pixels(), around);
+            assert!(mean.mean() <= (pixels.views() - 1) as f64 && mean.views() <= pixels.views());
+        }
+        let seen = gains.texels_where(|mean| mean.pixels() > 0.0);
+        assert!((0..pixels.count()).all(|pixel| seen[pixels.texel(pixel) as usize]));
+        assert!(gains.texels_where(|_| false).iter().all(|chosen| !chosen));
     }
 }

@@ -6,7 +6,7 @@
 //! under it. The surface is cut into small squares of texels, and one goes on from the dielectric unless the photos that show it
 //! agree that its pixels are better explained as they were found; all of it only if the whole objective is less then.
 
-use super::agreement::{SQUARE, SquareGains};
+use super::agreement::SquareGains;
 use super::choice::clustered::ClusteredMean;
 use super::descent::{Descent, FIRST_STEPS, Place, difference};
 use super::estimate::START_TEXEL;
@@ -86,20 +86,18 @@ impl Descent<'_> {
     /// that was found which has to be told by the photos. Beliefs are left out here: lobes of tiles differ from texel to texel
     /// by what widths, which have not moved yet, will make good, and one material everywhere has no differences at all.
     fn plain_texels(&self, found: &Place, plain: &Place, by: &Learned) -> Vec<bool> {
-        let size = self.scene.settings.map_size;
         let by_plain = Learned::of(self.pixels, &plain.sight, plain.learned.as_ref()).with_noise_of(by);
         let gain =
             |pixel: usize| by.nats(self.pixels, &found.sight, pixel) - by_plain.nats(self.pixels, &plain.sight, pixel);
         let is_plain = |gain: &ClusteredMean| gain.pixels() > 0.0 && gain.mean() > -gain.standard_error();
-        let squares: Vec<bool> = SquareGains::new(size, self.pixels, gain).means().iter().map(is_plain).collect();
-        let across = size.div_ceil(SQUARE);
-        (0..size * size).map(|texel| squares[texel / size / SQUARE * across + texel % size / SQUARE]).collect()
+        SquareGains::new(self.scene.settings.map_size, self.pixels, gain).texels_where(is_plain)
     }
 }
 
 #[cfg(all(test, feature = "cli"))]
 #[allow(clippy::unwrap_used)]
 mod tests {
+    use super::super::agreement::SQUARE;
     use super::super::refine::tests::{SIZE, photographed};
     use super::super::sight::Lit;
     use super::super::solver::Solver;

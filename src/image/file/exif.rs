@@ -79,9 +79,7 @@ pub fn is_raw(bytes: &[u8]) -> bool {
 /// before they read one.
 pub fn claims_more_than_it_holds(bytes: &[u8]) -> bool {
     let Some((tiff, directory)) = Tiff::open(bytes) else { return false };
-    let entries = (0..usize::from(tiff.u16(directory).unwrap_or(0))).map(|entry| 2 + 12 * entry + 4);
-    let mut counts = entries.map_while(|offset| tiff.u32(directory.checked_add(offset)?));
-    counts.any(|count| count as usize > bytes.len())
+    tiff.entries(directory).filter_map(|entry| tiff.u32(entry + 4)).any(|count| count as usize > bytes.len())
 }
 
 /// The bytes of a TIFF with offsets of four bytes.
@@ -113,12 +111,14 @@ impl<'a> Tiff<'a> {
         Some(if self.little_endian { u32::from_le_bytes(bytes) } else { u32::from_be_bytes(bytes) })
     }
 
+    /// Where the entries of a directory begin.
+    fn entries(&self, directory: usize) -> impl Iterator<Item = usize> {
+        (0..usize::from(self.u16(directory).unwrap_or(0))).map_while(move |entry| directory.checked_add(2 + 12 * entry))
+    }
+
     /// The number `index` of a tag in a directory.
     fn number(&self, directory: usize, tag: u16, index: usize) -> Option<f64> {
-        let entries = usize::from(self.u16(directory)?);
-        let entry = (0..entries)
-            .map_while(|entry| directory.checked_add(2 + 12 * entry))
-            .find(|&entry| self.u16(entry) == Some(tag))?;
+        let entry = self.entries(directory).find(|&entry| self.u16(entry) == Some(tag))?;
         let kind = self.u16(entry + 2)?;
         let size = match kind {
             1 | 7 => 1,

@@ -2,11 +2,11 @@
 
 use super::super::pictures::{light_of, matched};
 use super::super::shown::exposure_of;
-use super::sheets::{WEB_FILES, proof_of};
+use super::sheets::{WEB_FILES, write_sheet};
 use super::{ExportEvent, Format, WEB_SHOWS};
 use crate::error::{Finding, Result, Severity};
 use crate::export::asset::Asset;
-use crate::export::sheet::{self, Losses};
+use crate::export::sheet::Losses;
 use crate::export::web::PagePhoto;
 use crate::export::{RunResult, web};
 use crate::files::write_bytes;
@@ -47,9 +47,7 @@ pub(super) fn write_page(
     }
     write_bytes(&folder.join("index.html"), page.html.as_bytes())?;
     let losses = Losses::default().and(WEB_SHOWS);
-    let proof = proof_of(Format::Web).filter(|_| asset.has_lobe).map(sheet::of_proof).unwrap_or_default();
-    let text = sheet::of_format("Page", WEB_FILES, &losses) + &proof;
-    write_bytes(&folder.join("convention.txt"), text.as_bytes())?;
+    write_sheet(Format::Web, ("Page", WEB_FILES), &losses, asset, folder)?;
     Ok(losses)
 }
 

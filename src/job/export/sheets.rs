@@ -1,6 +1,11 @@
 //! What the files of each format are and what their numbers mean, as their sheets say it; and how the demo came out elsewhere.
 
 use super::Format;
+use crate::error::Result;
+use crate::export::asset::Asset;
+use crate::export::sheet::{self, Losses};
+use crate::files::write_bytes;
+use std::path::Path;
 
 pub(super) const GLB_FILES: &str = "\
 *.glb            mesh (+y up), material, textures, the sun as a directional light where the environment has one
@@ -62,9 +67,21 @@ index.html       opens in any browser with WebGL 2, without a network; holds mes
                  drag turns, wheel zooms, Ctrl and drag moves, Shift and drag turns the light
                  index.html#light=1&rotation=90&exposure=0.5&backdrop=0&view=0&wipe=1 opens it so";
 
+/// Writes the sheet of a format: its files, what they lose, and how the demo came out elsewhere where there is a lobe.
+pub(super) fn write_sheet(
+    format: Format,
+    (title, files): (&str, &str),
+    losses: &Losses,
+    asset: &Asset,
+    folder: &Path,
+) -> Result<()> {
+    let proof = proof_of(format).filter(|_| asset.has_lobe).map(sheet::of_proof).unwrap_or_default();
+    write_bytes(&folder.join("convention.txt"), (sheet::of_format(title, files, losses) + &proof).as_bytes())
+}
+
 /// How far another program's picture of the demo was from the path tracer's: `patina-lab proof`, guide `export`. `None` where
 /// nothing renders the format.
-pub(super) fn proof_of(format: Format) -> Option<&'static str> {
+fn proof_of(format: Format) -> Option<&'static str> {
     Some(match format {
         Format::Glb => {
             "the demo in Cycles, imported by Blender 4.5: 2.6 and 3.6 % of the mean off under two lights (root mean square, \
