@@ -90,6 +90,9 @@ pub struct ViewFootprints {
 pub struct FootprintSettings {
     /// Width and height of the maps in texels.
     pub map_size: usize,
+    /// Levels of the maps, each half as wide and high as the one before, whose texels are listed one level after another. A
+    /// sample reads the finest on which it is less than two texels from the next. 1: the maps alone.
+    pub levels: usize,
     /// Root of the number of samples of a pixel, at first.
     pub coarse_side: usize,
     /// The same where those at first and the corners do not agree.
@@ -98,7 +101,7 @@ pub struct FootprintSettings {
 
 impl FootprintSettings {
     /// One ray a pixel, through its middle.
-    pub const COARSE: FootprintSettings = FootprintSettings { map_size: 512, coarse_side: 1, fine_side: 1 };
+    pub const COARSE: FootprintSettings = FootprintSettings { map_size: 512, levels: 1, coarse_side: 1, fine_side: 1 };
 }
 
 impl Default for FootprintSettings {

@@ -28,16 +28,22 @@ pub struct LobePlace<'a> {
     pub normal_variance: f32,
 }
 
+/// The width of a lobe of this microfacet width over normals of this variance.
+///
+/// Slopes of the normalised Blinn-Phong distribution have a variance of `a^2 / (1 - a^2)` over both axes (with the exponent
+/// `2/a^2 - 2`, one over it along each); that of the normals is added. Widths up to 1 stay below it. After Toksvig 2005
+/// ("Mipmapping normal maps"), with the variance taken from the geometry in place of a map.
+#[inline(always)]
+pub fn width_through(width: f32, normal_variance: f32) -> f32 {
+    let added = normal_variance * (1.0 - width * width).max(0.0);
+    ((width * width + added) / (1.0 + added)).sqrt()
+}
+
 impl LobePlace<'_> {
-    /// The width of the lobe as the footprint sees it, for one of this microfacet width.
-    ///
-    /// Slopes of the normalised Blinn-Phong distribution have a variance of `a^2 / (1 - a^2)` over both axes (with the
-    /// exponent `2/a^2 - 2`, one over it along each); that of the normals is added. Widths up to 1 stay below it. After
-    /// Toksvig 2005 ("Mipmapping normal maps"), with the variance taken from the geometry in place of a map.
+    /// The width of the lobe as the footprint sees it, for one of this microfacet width: [`width_through`].
     #[inline(always)]
     pub fn width_seen(&self, width: f32) -> f32 {
-        let added = self.normal_variance * (1.0 - width * width).max(0.0);
-        ((width * width + added) / (1.0 + added)).sqrt()
+        width_through(width, self.normal_variance)
     }
 
     /// Derivative of the logarithm of [`LobePlace::width_seen`] by that of the width.

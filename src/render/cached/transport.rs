@@ -237,6 +237,14 @@ impl CachedTransport {
         sum
     }
 
+    /// Turns `seen` to what a point of the grid sees, and returns the visible shares of the hats there.
+    #[inline]
+    pub fn seen_from(&self, grid_point: u32, light: &LightPlanes, at: &PointLight, seen: &mut SeenLight) -> &[u8] {
+        let shares = self.visibility.of(grid_point as usize);
+        seen.turn_to(grid_point, light, shares, (self.surroundings.as_ref(), &at.leaving));
+        shares
+    }
+
     /// Where the lobe of a shading point is integrated, under a light and among surface that sends this. `seen` is kept from
     /// place to place, as long as `light` and `at` are the same.
     #[inline]
@@ -247,8 +255,7 @@ impl CachedTransport {
         at: &PointLight,
         seen: &'a mut SeenLight,
     ) -> LobePlace<'a> {
-        let shares = self.visibility.of(point.lobe_point as usize);
-        seen.turn_to(point.lobe_point, light, shares, (self.surroundings.as_ref(), &at.leaving));
+        let shares = self.seen_from(point.lobe_point, light, at, seen);
         LobePlace {
             normal: point.normal,
             to_viewer: point.to_viewer,

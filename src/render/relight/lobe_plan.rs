@@ -1,179 +1,193 @@
-//! At which shading points of a view lobes are integrated, and how the others interpolate between them.
+//! Where the lobes of a view are integrated, and how its shading points interpolate between these places.
 //!
-//! `S0 - S5` and `S5` change slowly over smooth surface: they are taken at the corners of squares of pixels and
-//! interpolated, before F0 is multiplied in. Where the corners do not speak for a pixel (another surface, a normal or a
-//! width that is not about their mean) it has an integral of its own. What a light sends is not asked, so that the plan
+//! `S0 - S5` and `S5` change slowly over smooth surface, and what hides the light is known at points of the grid alone. So
+//! they are taken at the points of the grid that the view shows, at even steps of the logarithm of the width, and interpolated
+//! in both, before F0 is multiplied in. Where these points do not speak for a shading point (a normal that is not their mean,
+//! surface that turns by much of a lobe from one to the next, a grazing view) it has an integral of its own; so do all of a
+//! view that shows about as many points of the grid as shading points. What a light sends is not asked, so that the plan
 //! serves all of them.
 
-use crate::render::cached::{ShadingPoint, ViewFootprints, VisibilityGrid};
-use crate::scene::Camera;
+use crate::render::cached::lobe_place::{LobePlace, LobeSums};
+use crate::render::cached::lobe_sum::{lobe_alone, lobe_sums};
+use crate::render::cached::{CachedTransport, LightPlanes, PointLight, SeenLight, ShadingPoint, ViewFootprints};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Pixels from corner to corner.
-const SPACING: usize = 2;
-/// How far a normal may lie from the mean of those at the corners, as a share of the lobe's microfacet width.
+/// How far a normal may lie from the mean of those at the points of the grid, as a share of the lobe's microfacet width.
 const NORMAL_TOLERANCE: f32 = 0.05;
-/// How far the logarithm of a width may lie from that mean.
-const WIDTH_TOLERANCE: f32 = 0.05;
-/// Points with integrals, at most: beyond it tolerances are doubled.
-const MOST_POINTS: usize = 60_000;
-/// How often they are doubled, at most; then whatever corner there is speaks.
+/// How far the half vector of a point of the grid may lie from a shading point's, as a share of that width.
+const SPREAD_TOLERANCE: f32 = 0.5;
+/// Least cosine between a normal and the viewer: beyond it lobes change too fast.
+const LEAST_COSINE: f32 = 0.1;
+/// Step between the logarithms of widths. Half way between two a lobe's peak errs by 2 %.
+const LOG_WIDTH_STEP: f32 = 0.2;
+/// Steps from the narrowest width to 1.
+const STEPS: usize = 25;
+/// Shading points with integrals of their own, at most: beyond it tolerances are doubled.
+const MOST_ALONE: usize = 60_000;
+/// How often they are doubled, at most; then the points of the grid speak for all that is not seen at a grazing angle.
 const MOST_DOUBLINGS: usize = 4;
-const NO_POINT: u32 = u32::MAX;
+const NO_PLACE: u32 = u32::MAX;
 
-/// Four places in a list and their weights, which sum to 1.
-type Tap = ([u32; 4], [f32; 4]);
+/// A point of the grid as the view shows it.
+struct Place {
+    grid_point: u32,
+    to_viewer: Vec3,
+    /// The first and the last step of widths.
+    steps: [u8; 2],
+    /// Where its sums begin.
+    first_sum: usize,
+}
 
-/// Where lobes are integrated, and what each shading point makes of that.
+/// Where lobes are integrated.
+#[derive(Default)]
 pub struct LobePlan {
-    /// Shading points with integrals, those of one point of the grid together.
-    pub points: Vec<u32>,
-    /// Of each shading point: places in `points`, and weights. Empty without lobes.
-    taps: Vec<Tap>,
+    places: Vec<Place>,
+    /// Number of their sums.
+    sums: usize,
+    /// Of each point of the grid: its place, or [`NO_PLACE`].
+    of_grid: Vec<u32>,
+    /// Of each shading point: the width that the view sees.
+    widths: Vec<f32>,
+    /// Shading points with integrals of their own, those of one point of the grid together.
+    alone: Vec<u32>,
+    is_alone: Vec<bool>,
+}
+
+/// The step before a width, and how far the next one is weighed.
+#[inline]
+fn tap(width: f32) -> (u8, f32) {
+    let at = (width.ln() / LOG_WIDTH_STEP + STEPS as f32).clamp(0.0, STEPS as f32);
+    let low = (at as usize).min(STEPS - 1);
+    (low as u8, at - low as f32)
 }
 
 impl LobePlan {
-    /// A plan without lobes.
-    pub fn empty() -> Self {
-        LobePlan { points: Vec::new(), taps: Vec::new() }
-    }
-
-    /// The plan of a view.
-    pub fn of(footprints: &ViewFootprints, materials: &[[f32; 7]], grid: &VisibilityGrid, camera: &Camera) -> Self {
-        let corners = Corners::new(footprints, materials, grid, camera);
-        let mut taps = Vec::new();
+    /// The plan of a view from `eye`, whose shading points see lobes of these widths.
+    pub fn of(footprints: &ViewFootprints, widths: Vec<f32>, transport: &CachedTransport, eye: Vec3) -> Self {
+        let points = &footprints.points;
+        let mut is_alone = Vec::new();
         for doubling in 0..=MOST_DOUBLINGS {
             let factor = if doubling == MOST_DOUBLINGS { f32::INFINITY } else { (1 << doubling) as f32 };
-            let points = footprints.points.par_iter().enumerate().with_min_len(1024);
-            taps = points.map(|(index, point)| corners.tap(index as u32, point, factor)).collect();
-            // Those at corners are among them.
-            let alone = taps.iter().filter(|(_, weights)| weights[0] == 1.0).count();
-            if alone <= MOST_POINTS {
+            let is_spoken_for = |(point, &width): (&ShadingPoint, &f32)| {
+                is_spoken_for(footprints, transport, eye, point, width, factor)
+            };
+            let each = points.par_iter().zip(&widths).with_min_len(1024);
+            is_alone = each.map(|own| !is_spoken_for(own)).collect();
+            if is_alone.iter().filter(|&&is_alone| is_alone).count() <= MOST_ALONE {
                 break;
             }
         }
+        // The first and the last step that is asked for at each point of the grid.
+        let nothing = [u8::MAX, 0];
+        let mut steps = vec![nothing; transport.grid.points.len()];
+        let mut spoken_for = 0;
+        for (index, point) in points.iter().enumerate().filter(|&(index, _)| !is_alone[index]) {
+            let (low, _) = tap(widths[index]);
+            spoken_for += 1;
+            for &(grid_point, _) in footprints.lit_of(point) {
+                let [first, last] = &mut steps[grid_point as usize];
+                (*first, *last) = ((*first).min(low), (*last).max(low + 1));
+            }
+        }
+        if 2 * steps.iter().filter(|steps| **steps != nothing).count() > spoken_for && points.len() <= MOST_ALONE {
+            is_alone.fill(true);
+            steps.fill(nothing);
+        }
+        let (mut places, mut sums, mut of_grid) = (Vec::new(), 0, vec![NO_PLACE; steps.len()]);
+        for (grid_point, steps) in steps.into_iter().enumerate().filter(|(_, steps)| *steps != nothing) {
+            of_grid[grid_point] = places.len() as u32;
+            let to_viewer = (eye - transport.grid.points[grid_point].position).normalize_or(Vec3::Y);
+            places.push(Place { grid_point: grid_point as u32, to_viewer, steps, first_sum: sums });
+            sums += usize::from(steps[1] - steps[0]) + 1;
+        }
         // Lobes of one point of the grid look into the same surroundings: they come one after another.
-        let mut is_used = vec![false; footprints.points.len()];
-        taps.iter().flat_map(used).for_each(|point| is_used[point as usize] = true);
-        let mut points: Vec<u32> =
-            (0..footprints.points.len() as u32).filter(|&point| is_used[point as usize]).collect();
-        points.sort_by_key(|&point| footprints.points[point as usize].lobe_point);
-        let mut place = vec![0u32; footprints.points.len()];
-        points.iter().enumerate().for_each(|(at, &point)| place[point as usize] = at as u32);
-        taps.par_iter_mut().for_each(|(index, _)| *index = index.map(|point| place[point as usize]));
-        LobePlan { points, taps }
+        let mut alone: Vec<u32> = (0..points.len() as u32).filter(|&index| is_alone[index as usize]).collect();
+        alone.sort_by_key(|&index| points[index as usize].lobe_point);
+        LobePlan { places, sums, of_grid, widths, alone, is_alone }
     }
 
-    /// The integrals at a shading point, from those at the points of the plan.
-    #[inline]
-    pub fn at(&self, index: usize, sums: &[[f32; 6]]) -> [f32; 6] {
-        let mut mean = [0.0f32; 6];
-        let Some((places, weights)) = self.taps.get(index) else { return mean };
-        for (&place, &weight) in places.iter().zip(weights) {
-            if weight > 0.0 {
-                for (mean, value) in mean.iter_mut().zip(&sums[place as usize]) {
-                    *mean += weight * value;
-                }
+    /// Lobes that are integrated.
+    pub fn lobes(&self) -> usize {
+        self.sums + self.alone.len()
+    }
+
+    /// The integrals at all shading points of the view under a light, among surface that sends this; none without lobes.
+    pub fn integrals(
+        &self,
+        footprints: &ViewFootprints,
+        transport: &CachedTransport,
+        (light, at): (&LightPlanes, &PointLight),
+    ) -> Vec<LobeSums> {
+        let of_place = |seen: &mut SeenLight, own: &Place| {
+            let shares = transport.seen_from(own.grid_point, light, at, seen);
+            let normal = transport.grid.points[own.grid_point as usize].shading_normal;
+            let place = LobePlace { normal, to_viewer: own.to_viewer, shares, seen, normal_variance: 0.0 };
+            let [first, last] = own.steps.map(usize::from);
+            let width = |index| ((first + index) as f32 - STEPS as f32) * LOG_WIDTH_STEP;
+            let widths: [f32; STEPS + 1] = std::array::from_fn(|index| width(index).exp());
+            let (mut sums, count) = ([LobeSums::default(); STEPS + 1], last - first + 1);
+            lobe_sums(&transport.basis, &place, &widths[..count], &mut sums[..count]);
+            sums.into_iter().take(count)
+        };
+        let places = self.places.par_iter().with_min_len(16);
+        let sums: Vec<LobeSums> = places.map_init(SeenLight::default, of_place).flatten_iter().collect();
+        let own = |seen: &mut SeenLight, &index: &u32| {
+            let point = ShadingPoint { normal_variance: 0.0, ..footprints.points[index as usize] };
+            let place = transport.lobe_place(&point, light, at, seen);
+            lobe_alone(&transport.basis, &place, self.widths[index as usize])
+        };
+        let of_alone: Vec<LobeSums> =
+            self.alone.par_iter().with_min_len(64).map_init(SeenLight::default, own).collect();
+        let between = |index: usize| match self.is_alone[index] {
+            true => LobeSums::default(),
+            false => self.between(footprints.lit_of(&footprints.points[index]), self.widths[index], &sums),
+        };
+        let mut made: Vec<LobeSums> = (0..self.widths.len()).into_par_iter().with_min_len(1024).map(between).collect();
+        self.alone.iter().zip(of_alone).for_each(|(&index, own)| made[index as usize] = own);
+        made
+    }
+
+    /// The integrals at a shading point from those at the points of the grid around it.
+    fn between(&self, around: &[(u32, f32)], width: f32, sums: &[LobeSums]) -> LobeSums {
+        let (step, share) = tap(width);
+        let mut mean = LobeSums::default();
+        for &(grid_point, weight) in around {
+            let place = &self.places[self.of_grid[grid_point as usize] as usize];
+            let at = place.first_sum + usize::from(step - place.steps[0]);
+            for c in 0..3 {
+                mean.base[c] += weight * (sums[at].base[c] * (1.0 - share) + sums[at + 1].base[c] * share);
+                mean.grazing[c] += weight * (sums[at].grazing[c] * (1.0 - share) + sums[at + 1].grazing[c] * share);
             }
         }
         mean
     }
 }
 
-/// The points of a tap that count.
-fn used((points, weights): &Tap) -> impl Iterator<Item = u32> {
-    let (points, weights) = (*points, *weights);
-    (0..4).filter(move |&k| weights[k] > 0.0).map(move |k| points[k])
-}
-
-/// What is known at the corners of squares of pixels.
-struct Corners<'a> {
-    footprints: &'a ViewFootprints,
-    materials: &'a [[f32; 7]],
-    grid: &'a VisibilityGrid,
-    /// The shading point with the largest share of each corner's pixel, or [`NO_POINT`].
-    of_corner: Vec<u32>,
-    across: usize,
-    down: usize,
-    width: usize,
+/// Whether the points of the grid around a shading point speak for its lobe.
+fn is_spoken_for(
+    footprints: &ViewFootprints,
+    transport: &CachedTransport,
     eye: Vec3,
-    pixel_angle: f32,
-}
-
-impl<'a> Corners<'a> {
-    fn new(
-        footprints: &'a ViewFootprints,
-        materials: &'a [[f32; 7]],
-        grid: &'a VisibilityGrid,
-        camera: &Camera,
-    ) -> Self {
-        let (width, height) = (footprints.width, footprints.height);
-        let (across, down) = (width.div_ceil(SPACING), height.div_ceil(SPACING));
-        let mut of_corner = vec![NO_POINT; across * down];
-        for (index, point) in footprints.points.iter().enumerate() {
-            let (row, column) = (point.pixel as usize / width, point.pixel as usize % width);
-            if row % SPACING == 0 && column % SPACING == 0 {
-                let corner = &mut of_corner[row / SPACING * across + column / SPACING];
-                if *corner == NO_POINT || footprints.points[*corner as usize].share < point.share {
-                    *corner = index as u32;
-                }
-            }
+    point: &ShadingPoint,
+    width: f32,
+    factor: f32,
+) -> bool {
+    // A piece that is little of its pixel may err more.
+    let allowed = width * factor / point.share.max(0.05).sqrt();
+    let mut normal = Vec3::ZERO;
+    for &(grid_point, weight) in footprints.lit_of(point) {
+        let on_grid = &transport.grid.points[grid_point as usize];
+        let to_viewer = (eye - on_grid.position).normalize_or(Vec3::Y);
+        if to_viewer.dot(on_grid.shading_normal) < LEAST_COSINE {
+            return false;
         }
-        let (eye, pixel_angle) = (camera.position_in_world(), camera.pixel_angle_radians());
-        Corners { footprints, materials, grid, of_corner, across, down, width, eye, pixel_angle }
+        let turned = (on_grid.shading_normal - point.normal).length() + 0.5 * (to_viewer - point.to_viewer).length();
+        if turned > SPREAD_TOLERANCE * allowed {
+            return false;
+        }
+        normal += on_grid.shading_normal * weight;
     }
-
-    fn position(&self, point: &ShadingPoint) -> Vec3 {
-        self.grid.points[point.lobe_point as usize].position
-    }
-
-    /// What a shading point interpolates; itself where its corners do not speak for it.
-    fn tap(&self, index: u32, point: &ShadingPoint, factor: f32) -> Tap {
-        let alone = ([index; 4], [1.0, 0.0, 0.0, 0.0]);
-        let (row, column) = (point.pixel as usize / self.width, point.pixel as usize % self.width);
-        let (low_row, low_column) = (row / SPACING, column / SPACING);
-        let share = |at: usize| (at % SPACING) as f32 / SPACING as f32;
-        let (down, right) = (share(row), share(column));
-        let position = self.position(point);
-        let reach = 3.0 * SPACING as f32 * self.pixel_angle * (position - self.eye).length();
-        let mut tap: Tap = ([index; 4], [0.0; 4]);
-        let (mut total, mut normal, mut log_width) = (0.0f32, Vec3::ZERO, 0.0f32);
-        for k in 0..4 {
-            let (corner_row, corner_column) =
-                ((low_row + k / 2).min(self.down - 1), (low_column + k % 2).min(self.across - 1));
-            let weight = (if k / 2 == 1 { down } else { 1.0 - down }) * if k % 2 == 1 { right } else { 1.0 - right };
-            let corner = self.of_corner[corner_row * self.across + corner_column];
-            if corner == NO_POINT || weight <= 0.0 {
-                continue;
-            }
-            let other = &self.footprints.points[corner as usize];
-            // Of the same piece of surface: it faces the same way and lies in the same plane, nearly.
-            let offset = self.position(other) - position;
-            let is_near = offset.dot(point.normal).abs() <= 0.25 * offset.length() + 0.1 * reach;
-            // And it looks into the same surroundings: shadows end between points of the grid.
-            let sees_the_same = other.lobe_point == point.lobe_point;
-            if other.normal.dot(point.normal) < 0.8 || !is_near || !sees_the_same {
-                continue;
-            }
-            (tap.0[k], tap.1[k]) = (corner, weight);
-            total += weight;
-            normal += other.normal * weight;
-            log_width += self.materials[corner as usize][6] * weight;
-        }
-        // Extrapolated, a lobe errs more than between corners.
-        if total < 0.999 {
-            return alone;
-        }
-        let own = self.materials[index as usize][6];
-        // A piece that is little of its pixel may err more.
-        let allowed = factor / point.share.max(0.05).sqrt();
-        let angle = 2.0 * (0.5 * (normal.normalize_or_zero() - point.normal).length()).min(1.0).asin();
-        let width = (own.exp().powi(2) + point.normal_variance).sqrt();
-        if angle > NORMAL_TOLERANCE * width * allowed || (log_width / total - own).abs() > WIDTH_TOLERANCE * allowed {
-            return alone;
-        }
-        tap.1 = tap.1.map(|weight| weight / total);
-        tap
-    }
+    let angle = 2.0 * (0.5 * (normal.normalize_or_zero() - point.normal).length()).min(1.0).asin();
+    angle <= NORMAL_TOLERANCE * allowed
 }

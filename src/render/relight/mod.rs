@@ -2,15 +2,16 @@
 //!
 //! [`RelitView`] holds what a camera sees of the surface (footprints of [`super::cached`]) with its materials. A light is
 //! then a sum: diffuse light comes from the points of the grid, as in the fit; the lobe, which costs most, is integrated at
-//! some shading points alone and interpolated between them ([`lobe_plan`]), before F0 of each pixel is multiplied in.
+//! those points and at some shading points alone and interpolated ([`LobePlan`]), before F0 of each pixel is multiplied in.
 //!
 //! Its picture is that of [`CachedTransport::picture`](super::cached::CachedTransport::picture) but for that interpolation,
 //! and for lights finer than the hats of the cache, which are averaged. `patina-lab bench studio --parts relight` prints the
 //! error of both against the path tracer. Nothing is random; nothing depends on the number of threads.
 
-pub mod lobe_plan;
+mod lobe_plan;
 
-use super::cached::{CachedTransport, FootprintSettings, SeenLight, ViewFootprints};
+use super::cached::lobe_place::width_through;
+use super::cached::{CachedTransport, FootprintSettings, ViewFootprints};
 use super::surface::Surface;
 use crate::image::{Image, RgbImage};
 use crate::light::Environment;
@@ -36,7 +37,7 @@ pub struct RelitView {
 pub struct RelitPicture {
     /// Linear radiance.
     pub radiance: RgbImage,
-    /// Shading points at which lobes were integrated.
+    /// Lobes that were integrated.
     pub lobe_points: usize,
 }
 
@@ -51,8 +52,9 @@ impl RelitView {
         settings: &FootprintSettings,
         stop: &AtomicBool,
     ) -> Option<Self> {
+        let settings = FootprintSettings { levels: levels_of(settings.map_size), ..*settings };
         let goes_on = |_: u32, _: Vec2| !stop.load(Ordering::Relaxed);
-        let footprints = ViewFootprints::trace_where(surface, &transport.grid, camera, settings, Some(&goes_on));
+        let footprints = ViewFootprints::trace_where(surface, &transport.grid, camera, &settings, Some(&goes_on));
         if stop.load(Ordering::Relaxed) {
             return None;
         }
@@ -60,18 +62,22 @@ impl RelitView {
             .map(|row| footprints.points.partition_point(|point| (point.pixel as usize) < row * camera.width))
             .collect();
         let view =
-            RelitView { camera: *camera, footprints, row_starts, materials: Vec::new(), lobes: LobePlan::empty() };
+            RelitView { camera: *camera, footprints, row_starts, materials: Vec::new(), lobes: LobePlan::default() };
         Some(view.with_texels(transport, texels))
     }
 
     /// The same view of other maps of the same size.
     pub fn with_texels(mut self, transport: &CachedTransport, texels: &[Material<f32>]) -> Self {
-        let material = |point| CachedTransport::material_of(&self.footprints, point, texels);
+        let texels = chain(texels);
+        let material = |point| CachedTransport::material_of(&self.footprints, point, &texels);
         self.materials = self.footprints.points.par_iter().with_min_len(1024).map(material).collect();
-        self.lobes = match transport.settings.lobe_strength > 0.0 {
-            true => LobePlan::of(&self.footprints, &self.materials, &transport.grid, &self.camera),
-            false => LobePlan::empty(),
-        };
+        self.lobes = LobePlan::default();
+        if transport.settings.lobe_strength > 0.0 {
+            let points = self.footprints.points.iter().zip(&self.materials);
+            let widths = points.map(|(point, material)| width_through(material[6].exp(), point.normal_variance));
+            let eye = self.camera.position_in_world();
+            self.lobes = LobePlan::of(&self.footprints, widths.collect(), transport, eye);
+        }
         self
     }
 
@@ -100,21 +106,7 @@ impl RelitView {
             return None;
         }
         let footprints = &self.footprints;
-        let sums: Vec<[f32; 6]> = self
-            .lobes
-            .points
-            .par_iter()
-            .with_min_len(64)
-            .map_init(SeenLight::default, |seen, &index| {
-                let point = &footprints.points[index as usize];
-                let place = transport.lobe_place(point, &light, &at, seen);
-                let width = self.materials[index as usize][6].exp();
-                let mut sums = [Default::default()];
-                super::cached::lobe_sum::lobe_sums(basis, &place, &[width], &mut sums);
-                let [base, grazing] = [sums[0].base, sums[0].grazing];
-                [base[0], base[1], base[2], grazing[0], grazing[1], grazing[2]]
-            })
-            .collect();
+        let lobes = self.lobes.integrals(footprints, transport, (&light, &at));
         if stop.load(Ordering::Relaxed) {
             return None;
         }
@@ -125,11 +117,9 @@ impl RelitView {
             for index in self.row_starts[row]..self.row_starts[row + 1] {
                 let (point, material) = (&footprints.points[index], &self.materials[index]);
                 let arriving = CachedTransport::interpolate(&at.arriving, footprints, point);
-                let lobe = self.lobes.at(index, &sums);
-                let radiance = [0, 1, 2].map(|c| {
-                    let reflected = material[3 + c] * lobe[c] + lobe[3 + c];
-                    material[c] * arriving[c] + strength * reflected
-                });
+                let specular = [material[3], material[4], material[5]];
+                let reflected = lobes.get(index).map_or([0.0; 3], |lobe| lobe.radiance(specular));
+                let radiance = [0, 1, 2].map(|c| material[c] * arriving[c] + strength * reflected[c]);
                 pixels[point.pixel as usize - row * width] += Vec3::from_array(radiance) * point.share;
             }
             if background_visible {
@@ -142,8 +132,35 @@ impl RelitView {
                 }
             }
         });
-        Some(RelitPicture { radiance: Image::from_pixels(width, height, pixels), lobe_points: self.lobes.points.len() })
+        Some(RelitPicture { radiance: Image::from_pixels(width, height, pixels), lobe_points: self.lobes.lobes() })
     }
+}
+
+/// Levels of maps of this size: halved down to 64 texels, or to an odd size.
+fn levels_of(map_size: usize) -> usize {
+    1 + (0..).take_while(|level| (map_size >> level).is_multiple_of(2) && map_size >> level > 64).count()
+}
+
+/// The texels of square maps, and after them those of each coarser level: means of four.
+fn chain(texels: &[Material<f32>]) -> Vec<Material<f32>> {
+    let mut made = texels.to_vec();
+    let mut side = texels.len().isqrt();
+    let mut first = 0;
+    for _ in 1..levels_of(side) {
+        let finer = &made[first..];
+        let mean = |texel: usize| {
+            let upper = 2 * (texel / (side / 2)) * side + 2 * (texel % (side / 2));
+            let mut mean = Material::default();
+            [upper, upper + 1, upper + side, upper + side + 1]
+                .iter()
+                .for_each(|&child| mean.add_scaled(&finer[child], 0.25));
+            mean
+        };
+        let coarser: Vec<Material<f32>> = (0..finer.len() / 4).into_par_iter().map(mean).collect();
+        (first, side) = (made.len(), side / 2);
+        made.extend(coarser);
+    }
+    made
 }
 
 #[cfg(test)]
@@ -197,5 +214,37 @@ mod tests {
             once.pixels().iter().zip(own.radiance.pixels()).any(|(with, without)| with.length() > without.length())
         );
         assert!(view.lit(&transport, &truth.environment, &reflectance, true, &AtomicBool::new(true)).is_none());
+    }
+
+    #[test]
+    fn maps_seen_from_afar_are_averaged_over_a_pixel() {
+        let settings = DemoSettings { views: 1, held_out: 0, width: 160, height: 120, map_size: 512, seed: 1 };
+        let scene = build(&settings).unwrap().scene;
+        let surface = Surface::new(scene.mesh.clone()).unwrap();
+        let grid = crate::render::cached::VisibilityGrid::new(&surface, 64);
+        let camera = scene.views[0].camera.shrunk(4);
+        // No two texels are alike.
+        let mut random = crate::math::random::SequentialRandom::new(3);
+        let texels: Vec<Material<f32>> = (0..512 * 512)
+            .map(|_| Material { diffuse: [random.next_number(); 3], specular: [0.04; 3], log_width: -1.0 })
+            .collect();
+        let seen = |settings: FootprintSettings, texels: &[Material<f32>]| -> Vec<f32> {
+            let traced = ViewFootprints::trace(&surface, &grid, &camera, &settings);
+            let mut picture = vec![0.0; traced.width * traced.height];
+            for point in &traced.points {
+                picture[point.pixel as usize] += point.share * CachedTransport::material_of(&traced, point, texels)[0];
+            }
+            picture
+        };
+        let whole = FootprintSettings { map_size: 512, coarse_side: 32, fine_side: 32, levels: 1 };
+        let truth = seen(whole, &texels);
+        let error = |own: Vec<f32>| own.iter().zip(&truth).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
+        let few = FootprintSettings { map_size: 512, ..FootprintSettings::default() };
+        let levels = levels_of(512);
+        let with_levels = error(seen(FootprintSettings { levels, ..few }, &chain(&texels)));
+        let without = error(seen(few, &texels));
+        println!("{with_levels} with levels, {without} without");
+        assert_eq!(levels, 4);
+        assert!(with_levels < 0.5 * without, "{with_levels} {without}");
     }
 }

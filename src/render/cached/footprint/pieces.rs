@@ -121,7 +121,11 @@ pub(super) fn pieces_of_pixel(
                 }
                 (Seen::Back, _) => continue,
             };
-            let tap = TextureTap::at(point.uv, 0, settings.map_size, settings.map_size);
+            let texels_apart = point.uv_per_length * settings.map_size as f32 * reach / (REACH_PIXELS * side as f32);
+            let level = (texels_apart.max(1.0).log2() as usize).min(settings.levels.max(1) - 1);
+            let map_size = settings.map_size >> level;
+            let first: u32 = (0..level).map(|finer| (settings.map_size >> finer).pow(2) as u32).sum();
+            let tap = TextureTap::at(point.uv, level as u32, map_size, map_size);
             let index = match pieces.iter().position(|piece| piece.has(&point, reach)) {
                 Some(index) => index,
                 None => {
@@ -143,7 +147,8 @@ pub(super) fn pieces_of_pixel(
             piece.normal += point.shading_normal;
             piece.to_viewer -= direction;
             piece.places.push(point);
-            piece.texels.extend(tap.index.into_iter().zip(tap.weight).filter(|&(_, weight)| weight > 0.0));
+            let texels = tap.index.map(|texel| first + texel).into_iter().zip(tap.weight);
+            piece.texels.extend(texels.filter(|&(_, weight)| weight > 0.0));
         }
         for piece in pieces.iter_mut() {
             piece.share = piece.samples as f32 / total as f32;
