@@ -16,6 +16,7 @@ use super::surface::Surface;
 use crate::image::{Image, RgbImage};
 use crate::light::Environment;
 use crate::material::Material;
+use crate::material::texels::{PyramidWeights, TexelPyramid};
 use crate::scene::Camera;
 use glam::{Vec2, Vec3};
 use lobe_plan::LobePlan;
@@ -141,26 +142,11 @@ fn levels_of(map_size: usize) -> usize {
     1 + (0..).take_while(|level| (map_size >> level).is_multiple_of(2) && map_size >> level > 64).count()
 }
 
-/// The texels of square maps, and after them those of each coarser level: means of four.
+/// The texels of square maps, and after them those of each coarser level: means of four, wherever charts are.
 fn chain(texels: &[Material<f32>]) -> Vec<Material<f32>> {
-    let mut made = texels.to_vec();
-    let mut side = texels.len().isqrt();
-    let mut first = 0;
-    for _ in 1..levels_of(side) {
-        let finer = &made[first..];
-        let mean = |texel: usize| {
-            let upper = 2 * (texel / (side / 2)) * side + 2 * (texel % (side / 2));
-            let mut mean = Material::default();
-            [upper, upper + 1, upper + side, upper + side + 1]
-                .iter()
-                .for_each(|&child| mean.add_scaled(&finer[child], 0.25));
-            mean
-        };
-        let coarser: Vec<Material<f32>> = (0..finer.len() / 4).into_par_iter().map(mean).collect();
-        (first, side) = (made.len(), side / 2);
-        made.extend(coarser);
-    }
-    made
+    let side = texels.len().isqrt();
+    let weights = PyramidWeights::new(&Image::filled(side, side, true), levels_of(side));
+    TexelPyramid::from_base(texels.to_vec(), &weights).levels.into_iter().flat_map(|level| level.texels).collect()
 }
 
 #[cfg(test)]
