@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # Drives the real window under Xvfb as a person would, by keys, and takes a picture of every panel.
 #
-#   bash tests/studio_screenshots.sh OUT [SCENE] [SECONDS OF FIT] [smoke]
+#   bash tests/studio_screenshots.sh OUT [SCENE] [SECONDS OF FIT] [smoke|strip]
 #
-# With `smoke` it opens, fits, relights and closes, in a minute or so.
+# With `smoke` it opens, fits, relights and closes, in a minute or so. With `strip` it takes one picture of the window at 1, 2,
+# 5, 10, 20 and 30 s after opening, as many after starting a fit, and one at its end, and lays them out in `strip.png`.
 #
 # With README_PICTURES=screenshots the README's pictures of the window are made of them.
 #
@@ -65,6 +66,23 @@ for _ in $(seq 120); do
   sleep 0.5
 done
 xdotool windowfocus "$window"
+# Pictures at these seconds after a moment, of which the first may have passed.
+at_seconds() { # name, moment in seconds since 1970
+  for second in 1 2 5 10 20 30; do
+    left=$(echo "$2 + $second - $(date +%s.%N)" | bc)
+    case "$left" in -*) left=0 ;; esac
+    picture "$(printf '%s_%02d_s' "$1" "$second")" "$left"
+  done
+}
+if [ "${4:-}" = strip ]; then
+  at_seconds strip_open "$(date +%s.%N)"
+  wait_for_title ' - Patina' 600
+  act 'Start fit'
+  at_seconds strip_fit "$(date +%s.%N)"
+  wait_for_title 'Finished' 1800
+  picture strip_fit_end 2
+  montage +label "$out"/strip_open_*.png "$out"/strip_fit_*.png -resize 640x -tile 4x -geometry +4+4 "$out/strip.png"
+else
 picture 01_welcome 2
 wait_for_title ' - Patina' 600
 picture 02_scene_is_read 3
@@ -77,6 +95,7 @@ done
 wait_for_title "fitting|Finished" 300
 sleep "$fit_seconds"
 picture 03_fitting
+fi
 if [ "${4:-}" = smoke ]; then
   act 'Environment panel'; picture 04_environment
   act 'Scores panel'; picture 05_scores
@@ -86,7 +105,7 @@ if [ "${4:-}" = smoke ]; then
   wait_for_title 'Stopped|Finished' 300
   picture 08_stopped
 fi
-if [ "${4:-}" != smoke ]; then
+if [ "${4:-}" != smoke ] && [ "${4:-}" != strip ]; then
 act 'Diffuse'; picture 04_stage_diffuse
 act 'Roughness'; picture 05_stage_roughness
 act 'Shaded'

@@ -91,7 +91,8 @@ pub struct FootprintSettings {
     /// Width and height of the maps in texels.
     pub map_size: usize,
     /// Levels of the maps, each half as wide and high as the one before, whose texels are listed one level after another. A
-    /// sample reads the finest on which it is less than two texels from the next. 1: the maps alone.
+    /// lookup reads the finest on which it is less than two texels from the next, and where texels are finer than samples
+    /// there are more lookups than samples. 1: the maps alone, one lookup a sample.
     pub levels: usize,
     /// Root of the number of samples of a pixel, at first.
     pub coarse_side: usize,
@@ -102,6 +103,11 @@ pub struct FootprintSettings {
 impl FootprintSettings {
     /// One ray a pixel, through its middle.
     pub const COARSE: FootprintSettings = FootprintSettings { map_size: 512, levels: 1, coarse_side: 1, fine_side: 1 };
+
+    /// The level for lookups so many texels of the maps apart. Rounded down: there are several lookups a pixel.
+    fn level(&self, texels_apart: f32) -> usize {
+        (texels_apart.max(1.0).log2() as usize).min(self.levels.max(1) - 1)
+    }
 }
 
 impl Default for FootprintSettings {

@@ -74,6 +74,28 @@ impl LightBasis {
         }
     }
 
+    /// The basis whose hats are pairs of these, each of a row and the one below it; as it is where rows are odd.
+    pub fn with_rows_joined(&self) -> Self {
+        if !self.height.is_multiple_of(2) {
+            return self.clone();
+        }
+        let joined = |plane: &Vec<f32>| -> Vec<f32> {
+            let rows = plane[..self.count()].chunks_exact(2 * self.width).map(|rows| rows.split_at(self.width));
+            let sums = rows.flat_map(|(upper, lower)| upper.iter().zip(lower).map(|(a, b)| a + b));
+            let mut made: Vec<f32> = sums.collect();
+            made.resize(made.len().next_multiple_of(WIDEST), 0.0);
+            made
+        };
+        let moment = self.moment.each_ref().map(joined);
+        let mut direction = moment.clone();
+        for texel in 0..self.count() / 2 {
+            let own = Vec3::from_array([0, 1, 2].map(|axis| moment[axis][texel])).normalize_or(Vec3::Y);
+            (0..3).for_each(|axis| direction[axis][texel] = own[axis]);
+        }
+        let solid_angle = joined(&self.solid_angle);
+        LightBasis { width: self.width, height: self.height / 2, moment, direction, solid_angle }
+    }
+
     /// Number of texels.
     pub fn count(&self) -> usize {
         self.width * self.height
@@ -108,6 +130,22 @@ impl LightBasis {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn joined_rows_have_the_solid_angles_and_moments_of_both() {
+        let basis = LightBasis::new(64, 32);
+        let joined = basis.with_rows_joined();
+        assert_eq!((joined.width, joined.height, joined.padded()), (64, 16, 1024));
+        for (fine, coarse) in
+            basis.moment.iter().chain([&basis.solid_angle]).zip(joined.moment.iter().chain([&joined.solid_angle]))
+        {
+            let [fine, coarse] = [fine, coarse].map(|plane| plane.iter().map(|&value| f64::from(value)).sum::<f64>());
+            assert!((fine - coarse).abs() < 1e-4, "{fine} {coarse}");
+        }
+        let between = (basis.direction_of(5 * 64 + 7) + basis.direction_of(4 * 64 + 7)).normalize_or(Vec3::Y);
+        assert!(joined.direction_of(2 * 64 + 7).dot(between) > 0.9999);
+        assert_eq!(LightBasis::new(8, 5).with_rows_joined().height, 5);
+    }
 
     #[test]
     fn hats_cover_the_sphere_once_and_give_the_irradiance_of_a_constant_light() {

@@ -3,10 +3,10 @@
 //!
 //! To a lobe both are alike, and all pixels that show the point look into the same: it is put together once a point.
 
-use super::light_basis::LightPlanes;
+use super::light_basis::{LightBasis, LightPlanes};
 use super::points::NO_POINT;
 use super::surroundings::{Hiding, Surroundings};
-use crate::math::vector::{Vector, versions};
+use crate::math::vector::{Vector, WIDEST, versions};
 use glam::Vec4;
 
 /// Radiance that a point sees in each hat, times the share of the hat. It is kept from place to place as long as they belong
@@ -73,6 +73,24 @@ impl SeenLight {
         self.texels.clear();
         let texels = red.iter().zip(green).zip(blue).map(|((&red, &green), &blue)| Vec4::new(red, green, blue, 0.0));
         self.texels.extend(texels);
+    }
+
+    /// Fills `joined` with what is seen in pairs of hats, each of a row of `basis` and the one below it: their mean by solid
+    /// angle, for sums over [`LightBasis::with_rows_joined`] alone.
+    pub fn join_rows(&self, basis: &LightBasis, joined: &mut SeenLight) {
+        joined.point = NO_POINT;
+        let rows = 2 * basis.width;
+        let solid_angles =
+            || basis.solid_angle[..basis.count()].chunks_exact(rows).map(|rows| rows.split_at(basis.width));
+        for (plane, made) in self.channels.iter().zip(&mut joined.channels) {
+            made.clear();
+            for (seen, (weight, other)) in plane[..basis.count()].chunks_exact(rows).zip(solid_angles()) {
+                let (upper, lower) = seen.split_at(basis.width);
+                let pairs = upper.iter().zip(lower).zip(weight.iter().zip(other));
+                made.extend(pairs.map(|((a, b), (&weight, &other))| (a * weight + b * other) / (weight + other)));
+            }
+            made.resize(made.len().next_multiple_of(WIDEST), 0.0);
+        }
     }
 
     /// Turns to a point that sees `shares` of a light's hats, where points send `leaving` to others.

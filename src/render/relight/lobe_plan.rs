@@ -7,7 +7,7 @@
 //! view that shows about as many points of the grid as shading points. What a light sends is not asked, so that the plan
 //! serves all of them.
 
-use crate::render::cached::lobe_place::{LobePlace, LobeSums};
+use crate::render::cached::lobe_place::{LobePlace, LobeSums, wide_from};
 use crate::render::cached::lobe_sum::{lobe_alone, lobe_sums};
 use crate::render::cached::{CachedTransport, LightPlanes, PointLight, SeenLight, ShadingPoint, ViewFootprints};
 use glam::Vec3;
@@ -52,6 +52,11 @@ pub struct LobePlan {
     /// Shading points with integrals of their own, those of one point of the grid together.
     alone: Vec<u32>,
     is_alone: Vec<bool>,
+}
+
+/// Microfacet width of a step.
+fn width_of(step: usize) -> f32 {
+    ((step as f32 - STEPS as f32) * LOG_WIDTH_STEP).exp()
 }
 
 /// The step before a width, and how far the next one is weighed.
@@ -119,19 +124,30 @@ impl LobePlan {
         transport: &CachedTransport,
         (light, at): (&LightPlanes, &PointLight),
     ) -> Vec<LobeSums> {
-        let of_place = |seen: &mut SeenLight, own: &Place| {
+        let basis = &transport.basis;
+        let joined_basis = basis.with_rows_joined();
+        let is_joined = joined_basis.height < basis.height;
+        let first_joined =
+            (0..=STEPS).take_while(|&step| !is_joined || width_of(step) < wide_from(&joined_basis)).count();
+        let of_place = |(seen, joined): &mut (SeenLight, SeenLight), own: &Place| {
             let shares = transport.seen_from(own.grid_point, light, at, seen);
             let normal = transport.grid.points[own.grid_point as usize].shading_normal;
             let place = LobePlace { normal, to_viewer: own.to_viewer, shares, seen, normal_variance: 0.0 };
             let [first, last] = own.steps.map(usize::from);
-            let width = |index| ((first + index) as f32 - STEPS as f32) * LOG_WIDTH_STEP;
-            let widths: [f32; STEPS + 1] = std::array::from_fn(|index| width(index).exp());
+            let widths: [f32; STEPS + 1] = std::array::from_fn(|index| width_of(first + index));
             let (mut sums, count) = ([LobeSums::default(); STEPS + 1], last - first + 1);
-            lobe_sums(&transport.basis, &place, &widths[..count], &mut sums[..count]);
+            // Lobes for which hats of twice the height are narrow enough are summed over these.
+            let fine = first_joined.clamp(first, last + 1) - first;
+            lobe_sums(basis, &place, &widths[..fine], &mut sums[..fine]);
+            if fine < count {
+                seen.join_rows(basis, joined);
+                let place = LobePlace { seen: joined, ..place };
+                lobe_sums(&joined_basis, &place, &widths[fine..count], &mut sums[fine..count]);
+            }
             sums.into_iter().take(count)
         };
         let places = self.places.par_iter().with_min_len(16);
-        let sums: Vec<LobeSums> = places.map_init(SeenLight::default, of_place).flatten_iter().collect();
+        let sums: Vec<LobeSums> = places.map_init(Default::default, of_place).flatten_iter().collect();
         let own = |seen: &mut SeenLight, &index: &u32| {
             let point = ShadingPoint { normal_variance: 0.0, ..footprints.points[index as usize] };
             let place = transport.lobe_place(&point, light, at, seen);

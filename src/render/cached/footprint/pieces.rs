@@ -5,11 +5,22 @@ use crate::material::TextureTap;
 use crate::render::Surface;
 use crate::render::surface::SurfacePoint;
 use crate::scene::Camera;
-use glam::{Vec2, Vec3};
+use glam::{Mat2, Vec2, Vec3};
 use rayon::prelude::*;
 
 /// Samples whose normals have at least this cosine are one piece of surface.
 const ONE_PIECE: f32 = 0.97;
+
+/// Lookups of the maps along each side of a pixel, at most.
+const MOST_LOOKUPS: f32 = 8.0;
+
+/// The texels of a lookup on a level of square maps, and their weights.
+fn texels_at(uv: Vec2, level: usize, map_size: usize) -> impl Iterator<Item = (u32, f32)> {
+    let first: u32 = (0..level).map(|finer| (map_size >> finer).pow(2) as u32).sum();
+    let side = map_size >> level;
+    let tap = TextureTap::at(uv, level as u32, side, side);
+    tap.index.map(|texel| first + texel).into_iter().zip(tap.weight).filter(|&(_, weight)| weight > 0.0)
+}
 
 /// Samples of a pixel on one piece of surface, summed.
 pub(super) struct Piece {
@@ -85,6 +96,44 @@ impl Piece {
         (1.0 - mean.length_squared()).max(0.0) * count * count / (count * count - 1.0)
     }
 
+    /// Takes texels from evenly over the pixel that the piece covers, as far as its samples tell where it lies on the maps:
+    /// a few rays pick from texels that are finer than pixels, and lookups cost less than rays.
+    fn cover_texels(&mut self, settings: &FootprintSettings) {
+        let Some([middle, across, along]) = self.pixel_on_maps() else { return };
+        let [columns, rows] = [across, along].map(|side| side.length() * settings.map_size as f32);
+        if columns.max(rows) <= settings.coarse_side as f32 {
+            return;
+        }
+        let level = settings.level(columns.max(rows) / MOST_LOOKUPS);
+        let [columns, rows] = [columns, rows].map(|texels| texels.ceil().clamp(2.0, MOST_LOOKUPS) as usize);
+        self.texels.clear();
+        for row in 0..rows {
+            let from_middle = along * ((row as f32 + 0.5) / rows as f32 - 0.5);
+            for column in 0..columns {
+                let uv = middle + from_middle + across * ((column as f32 + 0.5) / columns as f32 - 0.5);
+                self.texels.extend(texels_at(uv, level, settings.map_size));
+            }
+        }
+    }
+
+    /// The texture coordinate of the middle of the pixel that the piece covers, and by how much it changes across and along
+    /// the pixel: a plane through its samples, by least squares. `None` where they do not span one.
+    fn pixel_on_maps(&self) -> Option<[Vec2; 3]> {
+        let count = self.places.len() as f32;
+        let samples = self.places.iter().enumerate();
+        let from_middle = samples.map(|(sample, place)| (place_in_pixel(sample, self.places.len()) - 0.5, place.uv));
+        let mean_uv = self.places.iter().map(|place| place.uv).sum::<Vec2>() / count;
+        let mean_place = from_middle.clone().map(|(place, _)| place).sum::<Vec2>() / count;
+        let (mut squares, mut by_uv) = (Mat2::ZERO, Mat2::ZERO);
+        for (place, uv) in from_middle {
+            let place = place - mean_place;
+            squares += Mat2::from_cols(place * place.x, place * place.y);
+            by_uv += Mat2::from_cols((uv - mean_uv) * place.x, (uv - mean_uv) * place.y);
+        }
+        let slopes = by_uv * squares.try_inverse()?;
+        Some([mean_uv - slopes * mean_place, slopes.x_axis, slopes.y_axis])
+    }
+
     fn has(&self, point: &SurfacePoint, reach: f32) -> bool {
         let reach = self.reach.max(reach);
         self.first.shading_normal.dot(point.shading_normal) > ONE_PIECE
@@ -121,11 +170,6 @@ pub(super) fn pieces_of_pixel(
                 }
                 (Seen::Back, _) => continue,
             };
-            let texels_apart = point.uv_per_length * settings.map_size as f32 * reach / (REACH_PIXELS * side as f32);
-            let level = (texels_apart.max(1.0).log2() as usize).min(settings.levels.max(1) - 1);
-            let map_size = settings.map_size >> level;
-            let first: u32 = (0..level).map(|finer| (settings.map_size >> finer).pow(2) as u32).sum();
-            let tap = TextureTap::at(point.uv, level as u32, map_size, map_size);
             let index = match pieces.iter().position(|piece| piece.has(&point, reach)) {
                 Some(index) => index,
                 None => {
@@ -147,8 +191,8 @@ pub(super) fn pieces_of_pixel(
             piece.normal += point.shading_normal;
             piece.to_viewer -= direction;
             piece.places.push(point);
-            let texels = tap.index.map(|texel| first + texel).into_iter().zip(tap.weight);
-            piece.texels.extend(texels.filter(|&(_, weight)| weight > 0.0));
+            let texels_apart = point.uv_per_length * settings.map_size as f32 * reach / (REACH_PIXELS * side as f32);
+            piece.texels.extend(texels_at(point.uv, settings.level(texels_apart), settings.map_size));
         }
         for piece in pieces.iter_mut() {
             piece.share = piece.samples as f32 / total as f32;
@@ -162,6 +206,12 @@ pub(super) fn pieces_of_pixel(
             _ => false,
         };
         if agree || side >= settings.fine_side {
+            if let [piece] = pieces.as_mut_slice()
+                && piece.samples == total
+                && settings.levels > 1
+            {
+                piece.cover_texels(settings);
+            }
             return escaped as f32 / total as f32;
         }
         side = settings.fine_side;
