@@ -5,8 +5,7 @@
 //! [`seen_at`]; a pixel's own state says whether it is evidence.
 
 use super::cursor::{seen_at, texel_of_uv};
-use crate::math::luminance;
-use crate::math::sphere::direction_of_texel;
+use crate::light::environment::brightest_direction;
 use crate::render::picture::PictureSettings;
 use crate::render::progressive::PictureTracer;
 use crate::render::surface::SurfacePoint;
@@ -140,7 +139,9 @@ pub fn texel_record(
         .iter()
         .enumerate()
         .flat_map(|(index, &first)| directions[index..].iter().map(move |&second| angle_degrees(first, second)));
-    let highlight = brightest_direction(parameters)
+    let light_size = parameters.environment_size;
+    let light = parameters.light.iter().map(|&radiance| Vec3::from_array(radiance));
+    let highlight = brightest_direction(light, light_size.0, light_size.1)
         .filter(|light| light.dot(point.shading_normal) > 0.0)
         .map_or(f32::NAN, |light| {
             least(directions.iter().map(|&view| angle_degrees(point.shading_normal, view + light)))
@@ -179,17 +180,4 @@ fn least(values: impl Iterator<Item = f32>) -> f32 {
 /// The largest value; NaN without any.
 fn largest(values: impl Iterator<Item = f32>) -> f32 {
     values.fold(f32::NAN, f32::max)
-}
-
-/// Direction of the texel of the light with the highest luminance; `None` for a black light.
-fn brightest_direction(parameters: &Parameters<f32>) -> Option<Vec3> {
-    let (width, height) = parameters.environment_size;
-    let mut best = (0.0, None);
-    for (index, &radiance) in parameters.light.iter().enumerate() {
-        let own = luminance(Vec3::from_array(radiance));
-        if own > best.0 {
-            best = (own, Some(index));
-        }
-    }
-    best.1.map(|index| direction_of_texel(index / width, index % width, width, height))
 }

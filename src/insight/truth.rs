@@ -3,8 +3,9 @@
 use crate::error::{Error, ErrorKind, Result};
 use crate::image::{Image, RgbImage};
 use crate::light::Environment;
+use crate::light::environment::brightest_direction;
 use crate::material::MaterialMaps;
-use crate::math::{luminance, sphere};
+use crate::math::sphere;
 use glam::Vec3;
 
 /// An error and its scale-aligned twin.
@@ -109,11 +110,12 @@ pub fn environment_errors(fitted: &Environment, truth: &Environment) -> Result<E
     let mean: f64 = weights.iter().map(|&(i, w)| w * f64::from(truth.pixels()[i].element_sum()) / 3.0).sum::<f64>();
     let epsilon = (1e-3 * mean / total).max(f64::MIN_POSITIVE);
 
+    let brightest = |of: &RgbImage| brightest_direction(of.pixels().iter().copied(), width, height);
     Ok(EnvironmentErrors {
         relative_l2: weighted_error(fitted, truth, &weights, Norm::RelativeToTruth),
         log_rmse: log_error(fitted, truth, &weights, epsilon),
-        brightest_angle_degrees: brightest_direction(fitted)
-            .zip(brightest_direction(truth))
+        brightest_angle_degrees: brightest(fitted)
+            .zip(brightest(truth))
             .map(|(a, b)| f64::from(a.angle_between(b)).to_degrees()),
     })
 }
@@ -176,18 +178,6 @@ fn log_error(fitted: &RgbImage, truth: &RgbImage, weights: &[(usize, f64)], epsi
         aligned += (second / total - mean * mean).max(0.0) / 3.0;
     }
     ErrorPair { raw: raw.sqrt(), aligned: aligned.sqrt(), scale }
-}
-
-/// Direction of the texel with the highest luminance; `None` for a black map.
-fn brightest_direction(radiance: &RgbImage) -> Option<Vec3> {
-    let (width, height) = (radiance.width(), radiance.height());
-    let mut best = (0.0, None);
-    for (index, &pixel) in radiance.pixels().iter().enumerate() {
-        if luminance(pixel) > best.0 {
-            best = (luminance(pixel), Some(index));
-        }
-    }
-    best.1.map(|index| sphere::direction_of_texel(index / width, index % width, width, height))
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::{Image, RgbImage, file};
+use crate::math::luminance;
 use crate::math::sphere::{self, BilinearTap};
 use glam::{DVec3, Vec3};
 use std::path::Path;
@@ -112,6 +113,11 @@ impl Environment {
         (self.power() / (4.0 * std::f64::consts::PI)).as_vec3()
     }
 
+    /// Direction of the texel with the highest luminance; `None` for a black map.
+    pub fn brightest_direction(&self) -> Option<Vec3> {
+        brightest_direction(self.radiance.pixels().iter().copied(), self.width(), self.height())
+    }
+
     /// Irradiance of a surface with this unit normal: the integral of the bilinear radiance times the cosine over the
     /// hemisphere, by the midpoint rule on at least 256 rows (error below 1e-3 of the largest part, measured).
     pub fn irradiance(&self, normal: Vec3) -> DVec3 {
@@ -131,6 +137,14 @@ impl Environment {
         }
         sum
     }
+}
+
+/// Direction of the texel with the highest luminance among row-major texels of an environment of this size; `None` where all
+/// are black.
+pub fn brightest_direction(texels: impl Iterator<Item = Vec3>, width: usize, height: usize) -> Option<Vec3> {
+    let lit = texels.map(luminance).enumerate().filter(|(_, own)| *own > 0.0);
+    let (index, _) = lit.reduce(|best, next| if next.1 > best.1 { next } else { best })?;
+    Some(sphere::direction_of_texel(index / width, index % width, width, height))
 }
 
 /// Radiance of a tap into row-major texels.

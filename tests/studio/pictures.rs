@@ -4,7 +4,7 @@
 use super::adapter::{has_adapter, rendered};
 use super::object::write_sphere_photo;
 use super::support::{Key, Modifiers, Role, TestStudio, finished_run};
-use eframe::egui::{Event, PointerButton, Pos2, Rect};
+use eframe::egui::{Event, PointerButton, Pos2, Rect, vec2};
 use egui_kittest::Harness;
 use image::RgbaImage;
 use patina::object::starts::ModelKind;
@@ -91,6 +91,43 @@ fn once(studio: &mut TestStudio, name: &str, rect: Rect, is_so: impl Fn(&[[u8; 3
         std::thread::sleep(std::time::Duration::from_millis(30));
     }
     panic!("{name}: the picture did not become what it should; {}", studio.log());
+}
+
+#[test]
+fn the_sun_is_dragged_and_two_balls_show_the_light() {
+    if !has_adapter() {
+        return;
+    }
+    let mut studio = drawn([1440.0, 900.0], 1.0);
+    studio.click_role(Role::RadioButton, "Noon sky");
+    studio.frames(3);
+    let (from, turn) = (studio.control("Sun").rect().center(), studio.number("Rotation"));
+    let button = |pos, pressed| {
+        let (button, modifiers) = (PointerButton::Primary, Modifiers::NONE);
+        Event::PointerButton { pos, button, pressed, modifiers }
+    };
+    // The sun of noon stands over the stage: it goes along its border.
+    let to = from + vec2(60.0, 0.0);
+    studio.harness.event(Event::PointerMoved(from));
+    studio.frames(1);
+    studio.harness.event(button(from, true));
+    for share in [0.3, 0.7, 1.0] {
+        studio.harness.event(Event::PointerMoved(from + share * (to - from)));
+        studio.frames(2);
+    }
+    studio.harness.event(button(to, false));
+    studio.frames(3);
+    let at = studio.control("Sun").rect().center();
+    assert_ne!(studio.number("Rotation"), turn);
+    assert!((at - to).length() < 8.0, "the sun follows the hand: {at:?} in place of {to:?}");
+    // A light without a sun has no handle.
+    studio.click_role(Role::RadioButton, "Overcast sky");
+    studio.frames(3);
+    assert!(studio.controls("Sun").is_empty() && studio.controls("Chrome ball").is_empty());
+    studio.click("Reference balls");
+    studio.frames(3);
+    studio.control("Chrome ball");
+    studio.control("Grey ball, 18 %");
 }
 
 #[test]

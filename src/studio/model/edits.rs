@@ -41,6 +41,8 @@ pub struct Relight {
     pub as_background: bool,
     /// Whether a ground under the surface catches its shadow.
     pub ground: bool,
+    /// Whether a chrome and a grey ball show the light over the stage.
+    pub balls: bool,
     /// Hour and latitude of [`LightName::Day`].
     pub day: Day,
 }
@@ -56,6 +58,7 @@ impl Default for Relight {
             matched: true,
             as_background: true,
             ground: false,
+            balls: false,
             day: Day::default(),
         }
     }

@@ -69,6 +69,8 @@ fn controls(ui: &mut Ui, model: &mut Model) {
         act_switch(ui, model, Act::LightBackground, "Background", on);
         ui.checkbox(&mut model.edits.relight.ground, "Ground plane")
             .on_hover_text("Show the shadow of the object on a level ground; path-traced images only");
+        ui.checkbox(&mut model.edits.relight.balls, "Reference balls")
+            .on_hover_text("Show a chrome ball and a grey one in this environment");
         act_button(ui, model, Act::FittedLight);
     });
     ui.horizontal_wrapped(|ui| {

@@ -1,6 +1,7 @@
 //! The stage panel: what is drawn from the model, and what the mouse does to it.
 
 mod frame;
+mod gauges;
 mod relit;
 mod traced;
 
@@ -20,6 +21,7 @@ use crate::studio::stage::{self, Layer, Stage, StageFrame};
 use crate::studio::theme;
 use egui::{Align2, Color32, CursorIcon, FontId, Pos2, Rect, Response, Stroke, StrokeKind, Ui, pos2, vec2};
 use frame::FrameCache;
+use gauges::Gauges;
 use glam::Vec2;
 use relit::Relit;
 use std::time::Instant;
@@ -35,6 +37,7 @@ pub struct StageMemory {
     cache: FrameCache,
     traced: Traced,
     relit: Relit,
+    gauges: Gauges,
     dragging: Option<Dragging>,
     last_moved: Option<Instant>,
     last_eye: Option<Eye>,
@@ -111,6 +114,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut StageMemory) {
     let response = response.on_hover_cursor(CursorIcon::Crosshair);
     interact(ui, model, memory, &frame, &response);
     decorate(ui, model, &frame, response.rect, &traced.caption);
+    gauges::show(ui, model, &mut memory.gauges, (&frame, response.rect, settled));
     colour_bar(ui, &frame, response.rect);
 }
 
