@@ -1,14 +1,17 @@
 //! Mitsuba 3: a scene with the nearest built-in BSDF, the same with the exact lobe, and the lobe as a Python plugin.
 //!
-//! `scene.xml` uses `principled`, which every Mitsuba has. `scene_exact.xml` uses the BSDF `patina` of
+//! `scene.xml` is the sum of `diffuse` and `principled`, which every Mitsuba has: `principled` alone has one F0 for all that
+//! is no metal and one colour for both parts. Mitsuba has no sum but `blendbsdf`, a weighted mean: each part's reflectance is
+//! over its weight, so beyond 1 in the diffuse one. As a metal `principled` is Schlick's rise from the F0 of its base colour. `scene_exact.xml` uses the BSDF `patina` of
 //! `patina_lobe.py`: import that module after choosing a variant, then load the scene. Maps are OpenEXR read raw; the
 //! environment is on nodes, see [`super::environment_file`].
 
-use super::asset::{Asset, DielectricRange, MetalSplit};
+use super::asset::Asset;
 use super::environment_file::on_nodes;
 use super::ply;
 use crate::error::Result;
 use crate::files::write_bytes;
+use crate::image::RgbImage;
 use crate::image::file::{write_exr_grey, write_exr_rgb};
 use crate::material::LobeModel;
 use glam::Vec3;
@@ -16,40 +19,40 @@ use std::path::Path;
 
 /// The plugin.
 const PLUGIN: &str = include_str!("python/patina_lobe.py");
+/// Weight of the lobe in the mean of both parts: its rise towards grazing angles ends at this in place of 1, so nearly 1.
+const WEIGHT_OF_LOBE: f32 = 0.9;
 /// Vertical field of view of the camera that is set up, in degrees.
 const FIELD_OF_VIEW: f32 = 40.0;
 
-/// Writes everything into a folder; gives what base colour and metalness lost, where there is a lobe.
+/// Writes everything into a folder.
 ///
 /// # Errors
 /// Files that cannot be written.
-pub fn write(asset: &Asset, folder: &Path) -> Result<Option<MetalSplit>> {
+pub fn write(asset: &Asset, folder: &Path) -> Result<()> {
     ply::write(&folder.join("mesh.ply"), &asset.mesh)?;
     write_exr_rgb(&folder.join("diffuse.exr"), &asset.maps.diffuse)?;
     if let Some(light) = &asset.light {
         write_exr_rgb(&folder.join("environment_nodes.exr"), &on_nodes(&light.whole).radiance)?;
     }
-    let split = asset.has_lobe.then(|| {
-        // A plain renderer has one F0 for all that is no metal: a low one, above which metalness makes up the rest.
-        asset.metal_split(DielectricRange::Always(asset.f0_quantile(0.1).clamp(1e-4, 0.16)))
-    });
-    if let Some(split) = &split {
+    if asset.has_lobe {
         write_exr_rgb(&folder.join("specular.exr"), &asset.maps.specular)?;
         write_exr_grey(&folder.join("roughness.exr"), &asset.maps.roughness)?;
-        write_exr_rgb(&folder.join("base_color.exr"), &split.base_colour)?;
-        write_exr_grey(&folder.join("metallic.exr"), &split.metallic)?;
+        let over = |map: &RgbImage, weight: f32| map.map(|rgb| *rgb / weight);
+        write_exr_rgb(&folder.join("diffuse_part.exr"), &over(&asset.maps.diffuse, 1.0 - WEIGHT_OF_LOBE))?;
+        write_exr_rgb(&folder.join("lobe_part.exr"), &over(&asset.maps.specular, WEIGHT_OF_LOBE))?;
         write_exr_grey(&folder.join("roughness_ggx.exr"), &asset.perceptual_roughness())?;
     }
     write_bytes(&folder.join("patina_lobe.py"), PLUGIN.as_bytes())?;
-    let built_in = match &split {
-        Some(split) => two_sided(&format!(
-            "<bsdf type=\"principled\">\n{}{}{}        <float name=\"specular\" value=\"{}\"/>\n      </bsdf>",
-            bitmap("base_color", "base_color.exr"),
-            bitmap("metallic", "metallic.exr"),
+    let built_in = match asset.has_lobe {
+        true => two_sided(&format!(
+            "<bsdf type=\"blendbsdf\">\n        <float name=\"weight\" value=\"{WEIGHT_OF_LOBE}\"/>\n        \
+             <bsdf type=\"diffuse\">\n{}        </bsdf>\n        <bsdf type=\"principled\">\n{}{}        \
+             <float name=\"metallic\" value=\"1\"/>\n        </bsdf>\n      </bsdf>",
+            bitmap("reflectance", "diffuse_part.exr"),
+            bitmap("base_color", "lobe_part.exr"),
             bitmap("roughness", "roughness_ggx.exr"),
-            split.dielectric_f0 / 0.08,
         )),
-        None => two_sided(&format!("<bsdf type=\"diffuse\">\n{}      </bsdf>", bitmap("reflectance", "diffuse.exr"))),
+        false => two_sided(&format!("<bsdf type=\"diffuse\">\n{}      </bsdf>", bitmap("reflectance", "diffuse.exr"))),
     };
     write_bytes(&folder.join("scene.xml"), scene(asset, &built_in).as_bytes())?;
     // The plugin is two-sided itself: it knows the triangle's normal.
@@ -67,7 +70,7 @@ pub fn write(asset: &Asset, folder: &Path) -> Result<Option<MetalSplit>> {
         false => built_in,
     };
     write_bytes(&folder.join("scene_exact.xml"), scene(asset, &exact).as_bytes())?;
-    Ok(split)
+    Ok(())
 }
 
 fn bitmap(name: &str, file: &str) -> String {
@@ -125,7 +128,7 @@ mod tests {
                 asset.light = None;
             }
             let place = folder.path().join(format!("{has_lobe}{has_light}"));
-            assert_eq!(write(&asset, &place).unwrap().is_some(), has_lobe);
+            write(&asset, &place).unwrap();
             for name in ["scene.xml", "scene_exact.xml"] {
                 let text = std::fs::read_to_string(place.join(name)).unwrap();
                 tags_are_balanced(&text);
@@ -135,10 +138,20 @@ mod tests {
                 }
                 assert_eq!(text.contains("type=\"patina\""), has_lobe && name == "scene_exact.xml");
                 assert_eq!(text.contains("envmap"), has_light);
+                assert_eq!(text.contains("blendbsdf"), has_lobe && name == "scene.xml");
             }
         }
         let place = folder.path().join("truetrue");
         assert_eq!(file::read_rgb(&place.join("diffuse.exr")).unwrap(), small_asset(true).maps.diffuse);
         assert_eq!(file::read_grey(&place.join("roughness.exr")).unwrap(), small_asset(true).maps.roughness);
+        // Each part times its weight is what was fitted.
+        for (name, weight, map) in [
+            ("diffuse_part.exr", 1.0 - WEIGHT_OF_LOBE, &small_asset(true).maps.diffuse),
+            ("lobe_part.exr", WEIGHT_OF_LOBE, &small_asset(true).maps.specular),
+        ] {
+            let part = file::read_rgb(&place.join(name)).unwrap();
+            let pairs = part.pixels().iter().zip(map.pixels());
+            assert!(pairs.into_iter().all(|(part, whole)| (*part * weight - *whole).length() < 1e-6), "{name}");
+        }
     }
 }

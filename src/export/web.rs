@@ -24,7 +24,13 @@ use glam::Vec3;
 use serde_json::{Value, json};
 
 const PAGE: &str = include_str!("web/page.html");
-const VIEWER: &str = include_str!("web/viewer.js");
+/// The viewer: shaders, cameras, and what draws with them.
+const VIEWER: &str = concat!(
+    "\"use strict\";\n",
+    include_str!("web/shaders.js"),
+    include_str!("web/cameras.js"),
+    include_str!("web/viewer.js")
+);
 /// What a page may hold beyond its maps, in bytes.
 pub const LARGEST_BEYOND_MAPS: usize = 8_000_000;
 

@@ -80,9 +80,10 @@ impl Format {
         match self {
             Format::Glb => &[GGX, LAYER, "the environment lies beside the file, not in it"],
             Format::Usd => &[GGX, OF_METALNESS],
-            Format::Mitsuba => {
-                &[GGX, "one F0 and metalness stand for the specular map; scene_exact.xml with its plugin loses nothing"]
-            }
+            Format::Mitsuba => &[
+                GGX,
+                "its lobe hides itself a little more where it is wide; scene_exact.xml with its plugin loses nothing",
+            ],
             Format::Blender => &[GGX],
             Format::Materialx => &[GGX, LAYER],
             Format::Textures => &[
@@ -372,12 +373,13 @@ fn write_format(format: Format, asset: &Asset, folder: &Path, textures: TextureF
             ("USD", USD_FILES, losses)
         }
         Format::Mitsuba => {
-            let split = mitsuba::write(asset, folder)?;
-            let losses = match &split {
-                Some(split) => {
-                    lobe.and_split(split).and("these hold for scene.xml; scene_exact.xml is the fitted model itself")
-                }
-                None => lobe,
+            mitsuba::write(asset, folder)?;
+            let losses = match asset.has_lobe {
+                true => lobe.and(
+                    "of scene.xml: shadowing of its lobe does not know that what is hidden from one side is often hidden from \
+                     the other too, and its rise towards grazing angles ends at 0.9; scene_exact.xml is the fitted model itself",
+                ),
+                false => lobe,
             };
             ("Mitsuba 3", MITSUBA_FILES, losses)
         }

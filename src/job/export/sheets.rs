@@ -31,7 +31,8 @@ specular.png     sRGB, specular: F0 as fitted
 roughness.png    square root of the GGX width, no curve
 environment.exr  the whole light, linear; left border -z, +z in the centre (OpenEXR's latitude-longitude)";
 pub(super) const MITSUBA_FILES: &str = "\
-scene.xml        principled BSDF: base_color.exr, metallic.exr, roughness_ggx.exr (square root of the GGX width)
+scene.xml        sum of a diffuse BSDF and of `principled` as a metal, by blendbsdf of weight 0.9: diffuse_part.exr is
+                 diffuse over 0.1, lobe_part.exr F0 over 0.9; roughness_ggx.exr (square root of the GGX width)
 scene_exact.xml  the fitted model, BSDF `patina` of patina_lobe.py: diffuse.exr, specular.exr (F0), roughness.exr (a^2)
                  import mitsuba as mi; mi.set_variant(\"llvm_ad_rgb\"); import patina_lobe; mi.load_file(...)
 environment_nodes.exr  the light on nodes, poles included: interpolated there it is the fitted one exactly

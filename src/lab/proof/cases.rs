@@ -4,7 +4,7 @@ use super::lights::{self, ProofLight};
 use super::{BOUNCES, ProofOptions, ProofView};
 use crate::error::{Error, Result};
 use crate::export::{RunFolder, RunResult};
-use crate::image::file::read_rgb;
+use crate::image::file::{read_rgb, write_exr_rgb};
 use crate::image::{Image, RgbImage};
 use crate::job::export::{ExportOptions, Format, export};
 use crate::job::pictures::{parameters_of, relit};
@@ -105,7 +105,13 @@ impl Case {
                 .collect();
             Reference { picture: Noisy { mean: traced.radiance, variance: traced.variance }, counted, wrong }
         };
-        let references = views.iter().enumerate().map(reference).collect();
+        let references: Vec<Reference> = views.iter().enumerate().map(reference).collect();
+        for (view, reference) in views.iter().zip(&references) {
+            write_exr_rgb(&folder.join(format!("reference_{}.exr", view.name)), &reference.picture.mean)?;
+            if let Some(variance) = &reference.picture.variance {
+                write_exr_rgb(&folder.join(format!("reference_{}_variance.exr", view.name)), variance)?;
+            }
+        }
         Ok(Case { name: name.into(), lobe, light, folder, references })
     }
 

@@ -73,7 +73,7 @@ fn start(options: &ProofOptions, name: &str, views: &[ProofView], tasks: Vec<Val
 pub fn mitsuba(options: &ProofOptions, cases: &[Case], views: &[ProofView]) -> Result<()> {
     let mut tasks = Vec::new();
     for case in cases {
-        for (scene, program) in [("scene.xml", "mitsuba_principled"), ("scene_exact.xml", "mitsuba_exact")] {
+        for (scene, program) in [("scene.xml", "mitsuba_built_in"), ("scene_exact.xml", "mitsuba_exact")] {
             tasks.push(json!({
                 "scene": case.export("mitsuba").join(scene), "out": case.stem(program),
                 "samples": options.samples / GROUPS, "repeats": GROUPS,

@@ -4,8 +4,9 @@ use super::cases::{Case, Noisy, Reference};
 use super::figures::{Figures, ZScores, figures, plain_rmse, side_by_side, z_scores};
 use super::lights;
 use crate::error::Result;
-use crate::image::file;
+use crate::image::{RgbImage, file};
 use crate::material::LobeModel;
+use glam::Vec3;
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -18,6 +19,9 @@ pub const LARGEST_Z: f64 = 1.15;
 pub const LARGEST_SHARE_ABOVE_3: f64 = 0.01;
 /// A light as it is comes at least so many times nearer than one that is turned.
 pub const LEAST_ADVANTAGE: f64 = 3.0;
+
+/// The page for browsers among the programs.
+const PAGE: &str = "page";
 
 /// One comparison.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -154,17 +158,21 @@ impl<'a> Judged<'a> {
     /// # Errors
     /// As of [`Judged::pictures`].
     pub fn page(&mut self, case: &Case, pictures: &[Noisy]) -> Result<()> {
+        let cut_of = |picture: &mut RgbImage| picture.pixels_mut().iter_mut().for_each(|rgb| *rgb = rgb.min(Vec3::ONE));
         let cut: Vec<Reference> = case
             .references
             .iter()
             .map(|reference| {
                 let mut cut = reference.clone();
-                cut.picture.mean.pixels_mut().iter_mut().for_each(|rgb| *rgb = rgb.min(glam::Vec3::ONE));
+                cut_of(&mut cut.picture.mean);
+                cut.wrong.iter_mut().for_each(cut_of);
                 cut
             })
             .collect();
-        let figures = self.figures_of(case, "page", &cut, pictures)?;
-        self.add(Row { program: "page".into(), case: case.name.clone(), figures, z: None, turned: None, bar: None });
+        let figures = self.figures_of(case, PAGE, &cut, pictures)?;
+        let turned = (case.light.name == lights::TEXEL).then(|| least_turned(&cut, pictures));
+        let bar = turned.and_then(|_| bar_of(PAGE, case, &figures, None, turned));
+        self.add(Row { program: PAGE.into(), case: case.name.clone(), figures, z: None, turned, bar });
         Ok(())
     }
 
