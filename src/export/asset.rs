@@ -146,6 +146,19 @@ impl MetalSplit {
     }
 }
 
+/// The index of refraction that colours of F0 are written over where a renderer lays the lobe over its diffuse part by the
+/// index alone (Cycles): at that of the largest F0 it takes more from diffuse light at grazing angles than the lobe gives.
+/// Readers that follow the text of glTF have Schlick's rise whatever the index.
+pub const LOW_IOR: f64 = 1.3;
+
+impl Dielectric {
+    /// What [`Dielectric::colour`] is multiplied by so that F0 is the same over another index.
+    pub fn factor_over(&self, ior: f64) -> f32 {
+        let f0 = |ior: f64| ((ior - 1.0) / (ior + 1.0)).powi(2);
+        (f0(self.ior) / f0(ior)) as f32
+    }
+}
+
 /// F0 in the words of a dielectric.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dielectric {
@@ -334,6 +347,8 @@ pub(super) mod tests {
         for (colour, specular) in colour.pixels().iter().zip(asset.maps.specular.pixels()) {
             assert!((*colour * f0 - *specular).abs().max_element() < 1e-5);
         }
+        let low = ((LOW_IOR - 1.0) / (LOW_IOR + 1.0)).powi(2) as f32;
+        assert!((asset.dielectric().factor_over(LOW_IOR) * low - f0).abs() < 1e-6);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! Its material is the fitted model, a Diffuse BSDF plus a Principled BSDF that is all lobe; maps of one Principled BSDF alone
 //! lie beside, since Cycles lays that one's lobe over its diffuse part and darkens it towards grazing angles.
 
-use super::asset::{Asset, GRAZING_OF_VIEWS, MetalSplit};
+use super::asset::{Asset, Dielectric, GRAZING_OF_VIEWS, LOW_IOR, MetalSplit};
 use super::environment_file::with_x_in_the_centre;
 use crate::error::{Error, ErrorKind, Result};
 use crate::files::write_bytes;
@@ -26,23 +26,18 @@ pub fn write(asset: &Asset, folder: &Path) -> Result<(f64, Option<MetalSplit>)> 
         None => asset.diffuse_under_fresnel(GRAZING_OF_VIEWS),
     };
     write_exr_rgb(&folder.join("diffuse.exr"), &asset.maps.diffuse)?;
-    let mut ior = 1.5;
     if asset.has_lobe {
         write_exr_rgb(&folder.join("specular.exr"), &asset.maps.specular)?;
         write_exr_rgb(&folder.join("base_color.exr"), &base_colour)?;
-        let tint = match &metals {
+        let dielectric = match &metals {
             Some(split) => {
-                ior = split.ior();
                 write_exr_grey(&folder.join("metallic.exr"), &split.metallic)?;
-                split.specular_colour.clone()
+                Dielectric { ior: split.ior(), colour: split.specular_colour.clone() }
             }
-            None => {
-                let dielectric = asset.dielectric();
-                ior = dielectric.ior;
-                dielectric.colour
-            }
+            None => asset.dielectric(),
         };
-        write_exr_rgb(&folder.join("specular_tint.exr"), &tint)?;
+        let factor = dielectric.factor_over(LOW_IOR);
+        write_exr_rgb(&folder.join("specular_tint.exr"), &dielectric.colour.map(|colour| *colour * factor))?;
         write_exr_grey(&folder.join("roughness.exr"), &asset.perceptual_roughness())?;
     }
     super::obj::write(&folder.join("mesh.obj"), &asset.mesh)?;
@@ -50,7 +45,7 @@ pub fn write(asset: &Asset, folder: &Path) -> Result<(f64, Option<MetalSplit>)> 
         write_exr_rgb(&folder.join("environment.exr"), &with_x_in_the_centre(&light.whole).radiance)?;
     }
     let facts = serde_json::json!({
-        "name": asset.name, "ior": ior, "has_lobe": asset.has_lobe, "has_metals": metals.is_some(),
+        "name": asset.name, "ior": LOW_IOR, "has_lobe": asset.has_lobe, "has_metals": metals.is_some(),
         "has_environment": asset.light.is_some(),
     });
     let text = serde_json::to_string_pretty(&facts)

@@ -1,9 +1,10 @@
 //! One GLB file: mesh, material and textures, and the sun where the light has one.
 //!
 //! Laid out by the glTF 2.0 specification with `KHR_materials_ior`, `KHR_materials_specular` and `KHR_lights_punctual`
-//! as ratified. F0 is `((ior - 1) / (ior + 1))^2` times the specular colour, so that no reader needs an index of zero.
+//! as ratified. F0 is `((ior - 1) / (ior + 1))^2` times factor and texture of the specular colour, so that no reader needs an
+//! index of zero.
 
-use super::asset::{Asset, Dielectric, GRAZING_OF_HALF_VECTORS, MetalSplit};
+use super::asset::{Asset, Dielectric, GRAZING_OF_HALF_VECTORS, LOW_IOR, MetalSplit};
 use super::texture::{Curve, Texture};
 use crate::error::{Error, ErrorKind, Result};
 use crate::image::Image;
@@ -72,14 +73,17 @@ pub fn glb(asset: &Asset, sixteen_bits: bool) -> Result<Glb> {
     let mut extensions_used = vec!["KHR_materials_specular"];
     let material_extensions = if asset.has_lobe {
         extensions_used.push("KHR_materials_ior");
-        let Dielectric { ior, colour } = match &metals {
+        let dielectric = match &metals {
             Some(split) => Dielectric { ior: split.ior(), colour: split.specular_colour.clone() },
             None => asset.dielectric(),
         };
-        let colour = texture(&colour, Curve::Srgb, "specular_colour", &mut binary)?;
+        // Beyond 1, which the extension allows: F0 is the lesser of 1 and the product.
+        let factor = dielectric.factor_over(LOW_IOR);
+        let colour = texture(&dielectric.colour, Curve::Srgb, "specular_colour", &mut binary)?;
         json!({
-            "KHR_materials_ior": {"ior": ior},
-            "KHR_materials_specular": {"specularFactor": 1.0, "specularColorTexture": colour},
+            "KHR_materials_ior": {"ior": LOW_IOR},
+            "KHR_materials_specular": {
+                "specularFactor": 1.0, "specularColorFactor": [factor, factor, factor], "specularColorTexture": colour},
         })
     } else {
         json!({"KHR_materials_specular": {"specularFactor": 0.0}})
@@ -204,6 +208,13 @@ mod tests {
         &binary[number("byteOffset")..number("byteOffset") + number("byteLength")]
     }
 
+    /// F0 where the texture of the specular colour is white.
+    fn largest_f0(material: &Value) -> f32 {
+        let ior = material["extensions"]["KHR_materials_ior"]["ior"].as_f64().unwrap();
+        let factor = material["extensions"]["KHR_materials_specular"]["specularColorFactor"][0].as_f64().unwrap();
+        (((ior - 1.0) / (ior + 1.0)).powi(2) * factor) as f32
+    }
+
     #[test]
     fn what_is_written_is_what_a_reader_finds() {
         let asset = small_asset(true);
@@ -233,8 +244,7 @@ mod tests {
             file::read_rgb(&path).unwrap()
         };
         let material = &document["materials"][0];
-        let ior = material["extensions"]["KHR_materials_ior"]["ior"].as_f64().unwrap();
-        let f0 = ((ior - 1.0) / (ior + 1.0)).powi(2) as f32;
+        let f0 = largest_f0(material);
         for (read, own) in image("specular_colour").pixels().iter().zip(asset.maps.specular.pixels()) {
             assert!((*read * f0 - *own).abs().max_element() < 1e-4, "{read} {own}");
         }
@@ -274,8 +284,7 @@ mod tests {
         let (document, _) = parts(&file.bytes);
         let material = &document["materials"][0];
         assert_eq!(material["pbrMetallicRoughness"]["metallicFactor"], 1.0);
-        let ior = material["extensions"]["KHR_materials_ior"]["ior"].as_f64().unwrap();
-        assert!((ior - 1.788_789).abs() < 1e-4, "{ior}");
+        assert!((largest_f0(material) - 0.08).abs() < 1e-5, "{}", largest_f0(material));
         let split = file.metals.unwrap();
         assert!(split.metallic.pixels()[..64].iter().all(|metal| *metal > 0.99));
         assert!(split.metallic.pixels()[64..].iter().all(|metal| *metal == 0.0));

@@ -26,8 +26,9 @@ use std::path::Path;
 pub fn write(asset: &Asset, folder: &Path, sixteen_bits: bool) -> Result<(f64, Option<MetalSplit>)> {
     let png = |texture: Texture, curve: Curve| texture.png(curve, sixteen_bits);
     let mut files = vec![("textures/diffuse.png", png(Texture::Rgb(&asset.maps.diffuse), Curve::Srgb)?)];
-    let split =
-        asset.has_lobe.then(|| asset.metal_split(DielectricRange::Always(asset.f0_quantile(0.1).clamp(0.02, 0.16))));
+    let split = asset
+        .has_lobe
+        .then(|| asset.metal_split(DielectricRange::Always(asset.f0_quantile(0.1).clamp(LOWEST_F0, HIGHEST_F0))));
     let mut held_share = 0.0;
     if let Some(split) = &split {
         let (base_colour, held) =
@@ -57,6 +58,10 @@ pub fn write(asset: &Asset, folder: &Path, sixteen_bits: bool) -> Result<(f64, O
     Ok((held_share, split))
 }
 
+/// F0 of what is no metal: low, since Cycles takes from diffuse light by the index of refraction alone; metalness makes up
+/// the rest.
+const LOWEST_F0: f32 = 0.005;
+const HIGHEST_F0: f32 = 0.01;
 /// The largest factor of F0 that a tint holds; the texture is over it.
 const LARGEST_TINT: f32 = 4.0;
 

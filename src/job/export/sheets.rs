@@ -13,7 +13,8 @@ pub(super) const GLB_FILES: &str = "\
   metalness      blue of the second texture, no curve; used where the surface has metals (F0 above 0.16), else 0:
                  base colour is then F0 of what is metal, less what renderers add by light between microfacets
   roughness      square root of the GGX width; green of the second texture, no curve
-  F0             ((ior - 1) / (ior + 1))^2 times the specular colour (sRGB): KHR_materials_ior, KHR_materials_specular
+  F0             ((ior - 1) / (ior + 1))^2 times factor and texture (sRGB) of the specular colour: KHR_materials_ior,
+                 KHR_materials_specular
   sun            colour times intensity = irradiance facing it, in the environment's radiance times steradian; Blender:
                  import with the lighting mode Unitless
 environment.*    the whole light, linear; +x in the centre, as three.js and Blender look for it. Either this or the
