@@ -186,10 +186,10 @@ pub fn forecast(options: &ExportOptions) -> Result<Forecast> {
     let width = options.size.unwrap_or(header.width);
     let height = (width * header.height).div_ceil(header.width.max(1)).max(1);
     // Bytes a texel: the result (32), its filled copy (28) and distances (12) while it is read; the asset (28), converted
-    // maps (28) and encoded files (42) while it is written. Vertices count little.
+    // maps (52, for GLB, the most) and encoded files (46) while it is written. Vertices count little.
     let (read, written) = ((header.width * header.height) as u64, (width * height) as u64);
     let mesh_bytes = std::fs::metadata(folder.file("mesh.obj")).map_or(0, |facts| facts.len());
-    let peak_bytes = (72 * read).max(98 * written) + 3 * mesh_bytes;
+    let peak_bytes = (72 * read).max(126 * written) + 3 * mesh_bytes;
     let per_channel = options.textures.bytes_per_channel() as u64;
     let packed = if options.textures == TextureFormat::Png8 { 1 } else { 2 };
     let disk_of = |format: &Format| {
