@@ -114,11 +114,16 @@ pub const LARGEST_SPECULAR: f32 = 0.08;
 /// F0 above which a texel speaks for metals: no common dielectric but gems reflects so much.
 const METAL_F0: f32 = 0.16;
 
+/// The index of refraction of an F0.
+pub fn ior_of(f0: f32) -> f64 {
+    let root = f64::from(f0).sqrt();
+    (1.0 + root) / (1.0 - root)
+}
+
 impl MetalSplit {
     /// Index of refraction of the largest F0 of what is no metal.
     pub fn ior(&self) -> f64 {
-        let root = f64::from(self.dielectric_f0).sqrt();
-        (1.0 + root) / (1.0 - root)
+        ior_of(self.dielectric_f0)
     }
 
     /// The base colour for a renderer that weighs diffuse light by one minus a mean of Fresnel's factor, as

@@ -6,7 +6,7 @@
 //! specular colour; Blender multiplies F0 of what is no metal by it, so it holds what one F0 and metalness leave wrong.
 //! Texture coordinates point up, as in Patina; the dome light's left border looks along -z, as in Patina.
 
-use super::asset::{Asset, DielectricRange, GRAZING_OF_HALF_VECTORS, MetalSplit};
+use super::asset::{Asset, DielectricRange, GRAZING_OF_HALF_VECTORS, LARGEST_SPECULAR, MetalSplit, ior_of};
 use super::environment_file::smooth;
 use super::texture::{Curve, Texture};
 use crate::error::{Error, ErrorKind, Result};
@@ -26,9 +26,10 @@ use std::path::Path;
 pub fn write(asset: &Asset, folder: &Path, sixteen_bits: bool) -> Result<(f64, Option<MetalSplit>)> {
     let png = |texture: Texture, curve: Curve| texture.png(curve, sixteen_bits);
     let mut files = vec![("textures/diffuse.png", png(Texture::Rgb(&asset.maps.diffuse), Curve::Srgb)?)];
-    let split = asset
-        .has_lobe
-        .then(|| asset.metal_split(DielectricRange::Always(asset.f0_quantile(0.1).clamp(LOWEST_F0, HIGHEST_F0))));
+    let split = asset.has_lobe.then(|| asset.metal_split(DielectricRange::UpTo(LARGEST_SPECULAR)));
+    // Of all that is no metal, for readers that pass over its colour; low, since Cycles takes from diffuse light by the
+    // index of refraction alone.
+    let one_f0 = asset.f0_quantile(0.5).clamp(LARGEST_SPECULAR / LARGEST_TINT, HIGHEST_F0);
     let mut held_share = 0.0;
     if let Some(split) = &split {
         let (base_colour, held) =
@@ -36,7 +37,7 @@ pub fn write(asset: &Asset, folder: &Path, sixteen_bits: bool) -> Result<(f64, O
         held_share = held;
         files.push(("textures/base_color.png", png(Texture::Rgb(&base_colour), Curve::Srgb)?));
         files.push(("textures/metallic.png", png(Texture::Grey(&split.metallic), Curve::Linear)?));
-        files.push(("textures/tint.png", png(Texture::Rgb(&tint(asset, split)), Curve::Srgb)?));
+        files.push(("textures/tint.png", png(Texture::Rgb(&tint(asset, split, one_f0)), Curve::Srgb)?));
         files.push(("textures/specular.png", png(Texture::Rgb(&asset.maps.specular), Curve::Srgb)?));
         files.push(("textures/roughness.png", png(Texture::Grey(&asset.perceptual_roughness()), Curve::Linear)?));
     }
@@ -49,7 +50,7 @@ pub fn write(asset: &Asset, folder: &Path, sixteen_bits: bool) -> Result<(f64, O
         let path = folder.join(name);
         files.push((name, std::fs::read(&path).map_err(|source| Error::reading(&path, source))?));
     }
-    let stage = stage(asset, split.as_ref().map(MetalSplit::ior)).into_bytes();
+    let stage = stage(asset, split.as_ref().map(|_| ior_of(one_f0))).into_bytes();
     let name = format!("{}.usda", asset.name);
     write_bytes(&folder.join(&name), &stage)?;
     let mut members: Vec<(&str, &[u8])> = vec![(&name, &stage)];
@@ -58,21 +59,19 @@ pub fn write(asset: &Asset, folder: &Path, sixteen_bits: bool) -> Result<(f64, O
     Ok((held_share, split))
 }
 
-/// F0 of what is no metal: low, since Cycles takes from diffuse light by the index of refraction alone; metalness makes up
-/// the rest.
-const LOWEST_F0: f32 = 0.005;
-const HIGHEST_F0: f32 = 0.01;
+/// The highest F0 that an index of refraction is chosen for.
+const HIGHEST_F0: f32 = 0.03;
 /// The largest factor of F0 that a tint holds; the texture is over it.
 const LARGEST_TINT: f32 = 4.0;
 
-/// By what F0 of what is no metal is multiplied so that, with the metal's share, it is the fitted one; over its largest.
+/// By what `one_f0`, that of what is no metal, is multiplied so that, with the metal's share, it is the fitted one; over its largest.
 /// Where all is metal it is 1: a renderer that tints metals too would dim them towards grazing angles.
-fn tint(asset: &Asset, split: &MetalSplit) -> RgbImage {
+fn tint(asset: &Asset, split: &MetalSplit, one_f0: f32) -> RgbImage {
     let texels = asset.maps.specular.pixels().iter().zip(split.base_colour.pixels()).zip(split.metallic.pixels());
     let pixels = texels
         .map(|((f0, base), &metal)| {
             let share = (1.0 - metal).max(1e-3);
-            let wanted = (*f0 - *base * metal) / (share * split.dielectric_f0.max(1e-6));
+            let wanted = (*f0 - *base * metal) / (share * one_f0);
             Vec3::ONE.lerp(wanted.clamp(Vec3::ZERO, Vec3::splat(LARGEST_TINT)), 1.0 - metal) / LARGEST_TINT
         })
         .collect();
@@ -319,13 +318,13 @@ mod tests {
             let found = base * metal + tint * split.dielectric_f0 * (1.0 - metal);
             (found - asset.maps.specular.pixels()[texel]).length()
         };
-        let tint = tint(&asset, &split).pixels()[40] * LARGEST_TINT;
+        let tint = tint(&asset, &split, 0.04).pixels()[40] * LARGEST_TINT;
         // The share of metal is left untinted.
         assert!(wrong(tint, 40) < 0.4 * wrong(Vec3::ONE, 40), "{} {}", wrong(tint, 40), wrong(Vec3::ONE, 40));
         // A metal keeps its rise towards grazing angles.
         asset.maps.diffuse.pixels_mut().fill(Vec3::ZERO);
         asset.maps.specular.pixels_mut().fill(Vec3::new(0.9, 0.7, 0.3));
-        let metal = super::tint(&asset, &asset.metal_split(DielectricRange::Always(0.04)));
+        let metal = super::tint(&asset, &asset.metal_split(DielectricRange::Always(0.04)), 0.04);
         assert!((metal.pixels()[40] * LARGEST_TINT - Vec3::ONE).length() < 0.01);
     }
 

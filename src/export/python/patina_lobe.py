@@ -98,10 +98,10 @@ class PatinaLobe(mi.BSDF):
         return dr.select(dr.dot(si.to_local(si.n), si.wi) < 0, mi.Float(-1.0), mi.Float(1.0))
 
     @staticmethod
-    def is_lit(si, side, view, light):
-        # Both directions lie above the triangle too, not only above the smooth normal.
-        normal = si.to_local(si.n) * side
-        return (view.z > 0) & (light.z > 0) & (dr.dot(normal, light) > 0)
+    def is_lit(si, view, light):
+        # Both directions lie above the triangle too, not only above the smooth normal. They are mirrored on the back, so that
+        # the normal is not.
+        return (view.z > 0) & (light.z > 0) & (dr.dot(si.to_local(si.n), light) > 0)
 
     def sample(self, ctx, si, sample1, sample2, active=True):
         side = self.side(si)
@@ -122,7 +122,7 @@ class PatinaLobe(mi.BSDF):
         half = mi.Vector3f(sine * cos_phi, sine * sin_phi, cosine)
         mirrored = 2.0 * dr.dot(view, half) * half - view
         light = dr.select(takes_lobe, mirrored, mi.warp.square_to_cosine_hemisphere(sample2))
-        active = active & self.is_lit(si, side, view, light)
+        active = active & self.is_lit(si, view, light)
         density = self.density(material, view, light)
         active &= density > 0
         drawn = dr.zeros(mi.BSDFSample3f)
@@ -138,7 +138,7 @@ class PatinaLobe(mi.BSDF):
     def between(self, function, si, wo, active):
         side = self.side(si)
         view, light = si.wi * side, wo * side
-        lit = active & self.is_lit(si, side, view, light)
+        lit = active & self.is_lit(si, view, light)
         return dr.select(lit, function(self.material(si, active), view, light), 0.0)
 
     def eval(self, ctx, si, wo, active=True):
