@@ -150,8 +150,8 @@ mod tests {
             ("lobe_part.exr", WEIGHT_OF_LOBE, &small_asset(true).maps.specular),
         ] {
             let part = file::read_rgb(&place.join(name)).unwrap();
-            let pairs = part.pixels().iter().zip(map.pixels());
-            assert!(pairs.into_iter().all(|(part, whole)| (*part * weight - *whole).length() < 1e-6), "{name}");
+            let mut pairs = part.pixels().iter().zip(map.pixels());
+            assert!(pairs.all(|(part, whole)| (*part * weight - *whole).length() < 1e-6), "{name}");
         }
     }
 }
