@@ -71,13 +71,20 @@ impl Asset {
         })
     }
 
+    /// F0 of what is no metal, of all where metals are not set apart.
+    pub fn dielectric_beside(&self, metals: Option<&MetalSplit>) -> Dielectric {
+        match metals {
+            Some(split) => Dielectric { ior: split.ior(), colour: split.specular_colour.clone() },
+            None => self.dielectric(),
+        }
+    }
+
     /// Reflectance F0 as an index of refraction and a colour at most 1 that F0 of that index is multiplied by.
     pub fn dielectric(&self) -> Dielectric {
         let largest = self.maps.specular.pixels().iter().map(|f0| f0.max_element()).fold(0.0, f32::max);
-        let f0 = f64::from(largest).clamp(f64::from(LEAST_F0), 0.98);
-        let ior = (1.0 + f0.sqrt()) / (1.0 - f0.sqrt());
-        let scale = (1.0 / f0) as f32;
-        Dielectric { ior, colour: self.maps.specular.map(|specular| (*specular * scale).min(Vec3::ONE)) }
+        let f0 = largest.clamp(LEAST_F0, 0.98);
+        let scale = 1.0 / f0;
+        Dielectric { ior: ior_of(f0), colour: self.maps.specular.map(|specular| (*specular * scale).min(Vec3::ONE)) }
     }
 
     /// The diffuse map for a renderer that weighs its diffuse part by one minus a mean of Fresnel's factor: divided by
@@ -120,6 +127,11 @@ pub fn ior_of(f0: f32) -> f64 {
     (1.0 + root) / (1.0 - root)
 }
 
+/// F0 of an index of refraction (Fresnel's equations at normal incidence).
+pub fn f0_of(ior: f64) -> f64 {
+    ((ior - 1.0) / (ior + 1.0)).powi(2)
+}
+
 impl MetalSplit {
     /// Index of refraction of the largest F0 of what is no metal.
     pub fn ior(&self) -> f64 {
@@ -159,8 +171,7 @@ pub const LOW_IOR: f64 = 1.3;
 impl Dielectric {
     /// What [`Dielectric::colour`] is multiplied by so that F0 is the same over another index.
     pub fn factor_over(&self, ior: f64) -> f32 {
-        let f0 = |ior: f64| ((ior - 1.0) / (ior + 1.0)).powi(2);
-        (f0(self.ior) / f0(ior)) as f32
+        (f0_of(self.ior) / f0_of(ior)) as f32
     }
 }
 
@@ -348,11 +359,11 @@ pub(super) mod tests {
     fn a_dielectric_says_the_same_f0() {
         let asset = small_asset(true);
         let Dielectric { ior, colour } = asset.dielectric();
-        let f0 = ((ior - 1.0) / (ior + 1.0)).powi(2) as f32;
+        let f0 = f0_of(ior) as f32;
         for (colour, specular) in colour.pixels().iter().zip(asset.maps.specular.pixels()) {
             assert!((*colour * f0 - *specular).abs().max_element() < 1e-5);
         }
-        let low = ((LOW_IOR - 1.0) / (LOW_IOR + 1.0)).powi(2) as f32;
+        let low = f0_of(LOW_IOR) as f32;
         assert!((asset.dielectric().factor_over(LOW_IOR) * low - f0).abs() < 1e-6);
     }
 

@@ -3,7 +3,7 @@
 //! Its material is the fitted model, a Diffuse BSDF plus a Principled BSDF that is all lobe; maps of one Principled BSDF alone
 //! lie beside, since Cycles lays that one's lobe over its diffuse part and darkens it towards grazing angles.
 
-use super::asset::{Asset, Dielectric, GRAZING_OF_VIEWS, LOW_IOR, MetalSplit};
+use super::asset::{Asset, GRAZING_OF_VIEWS, LOW_IOR, MetalSplit};
 use super::environment_file::with_x_in_the_centre;
 use crate::error::{Error, ErrorKind, Result};
 use crate::files::write_bytes;
@@ -29,13 +29,10 @@ pub fn write(asset: &Asset, folder: &Path) -> Result<(f64, Option<MetalSplit>)> 
     if asset.has_lobe {
         write_exr_rgb(&folder.join("specular.exr"), &asset.maps.specular)?;
         write_exr_rgb(&folder.join("base_color.exr"), &base_colour)?;
-        let dielectric = match &metals {
-            Some(split) => {
-                write_exr_grey(&folder.join("metallic.exr"), &split.metallic)?;
-                Dielectric { ior: split.ior(), colour: split.specular_colour.clone() }
-            }
-            None => asset.dielectric(),
-        };
+        if let Some(split) = &metals {
+            write_exr_grey(&folder.join("metallic.exr"), &split.metallic)?;
+        }
+        let dielectric = asset.dielectric_beside(metals.as_ref());
         let factor = dielectric.factor_over(LOW_IOR);
         write_exr_rgb(&folder.join("specular_tint.exr"), &dielectric.colour.map(|colour| *colour * factor))?;
         write_exr_grey(&folder.join("roughness.exr"), &asset.perceptual_roughness())?;

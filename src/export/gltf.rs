@@ -4,7 +4,7 @@
 //! as ratified. F0 is `((ior - 1) / (ior + 1))^2` times factor and texture of the specular colour, so that no reader needs an
 //! index of zero.
 
-use super::asset::{Asset, Dielectric, GRAZING_OF_HALF_VECTORS, LOW_IOR, MetalSplit};
+use super::asset::{Asset, GRAZING_OF_HALF_VECTORS, LOW_IOR, MetalSplit};
 use super::texture::{Curve, Texture};
 use crate::error::{Error, ErrorKind, Result};
 use crate::image::Image;
@@ -73,10 +73,7 @@ pub fn glb(asset: &Asset, sixteen_bits: bool) -> Result<Glb> {
     let mut extensions_used = vec!["KHR_materials_specular"];
     let material_extensions = if asset.has_lobe {
         extensions_used.push("KHR_materials_ior");
-        let dielectric = match &metals {
-            Some(split) => Dielectric { ior: split.ior(), colour: split.specular_colour.clone() },
-            None => asset.dielectric(),
-        };
+        let dielectric = asset.dielectric_beside(metals.as_ref());
         // Beyond 1, which the extension allows: F0 is the lesser of 1 and the product.
         let factor = dielectric.factor_over(LOW_IOR);
         let colour = texture(&dielectric.colour, Curve::Srgb, "specular_colour", &mut binary)?;

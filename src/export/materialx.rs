@@ -20,10 +20,7 @@ pub fn write(asset: &Asset, folder: &Path) -> Result<(f64, Option<MetalSplit>)> 
     };
     write_exr_rgb(&folder.join("base_color.exr"), &base_colour)?;
     write_exr_grey(&folder.join("specular_roughness.exr"), &asset.perceptual_roughness())?;
-    let dielectric = asset.has_lobe.then(|| match &metals {
-        Some(split) => Dielectric { ior: split.ior(), colour: split.specular_colour.clone() },
-        None => asset.dielectric(),
-    });
+    let dielectric = asset.has_lobe.then(|| asset.dielectric_beside(metals.as_ref()));
     if let Some(split) = &metals {
         write_exr_grey(&folder.join("base_metalness.exr"), &split.metallic)?;
     }

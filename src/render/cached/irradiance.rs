@@ -1,6 +1,9 @@
 //! Diffuse light at a point: a masked sum over the hats of the light, its row and its transpose.
 //!
 //! `E = 1/pi ∑_j share_j max(0, n . moment_j) L_j`: what a white Lambert surface sends back. It is linear in the light.
+//!
+//! Over the same hats `V = 1/pi ∑_j share_j moment_j L_j` is the vector irradiance over pi (Arvo 1994, "The irradiance Jacobian
+//! for partially occluded polyhedral sources"): `V . n` is `E`, and to first order that of surface whose normal is near.
 
 use super::light_basis::LightBasis;
 use crate::math::vector::{Vector, versions};
@@ -11,6 +14,9 @@ versions! {
     /// `E` per channel of a point with this unit normal and these visible shares, under a light in planes of the basis.
     pub fn irradiance(basis: &LightBasis, normal: Vec3, shares: &[u8], light: &[Vec<f32>; 3]) -> [f32; 3]
         = irradiance_in;
+    /// Vector irradiance over pi per channel: times the normal it is [`irradiance`].
+    pub fn vector_irradiance(basis: &LightBasis, normal: Vec3, shares: &[u8], light: &[Vec<f32>; 3]) -> [Vec3; 3]
+        = vector_in;
     /// The transpose of [`irradiance`]: adds the derivative by the light, given that by `E`.
     pub fn irradiance_backward(
         basis: &LightBasis,
@@ -23,16 +29,20 @@ versions! {
     pub fn add_irradiance_row(basis: &LightBasis, normal: Vec3, shares: &[u8], scale: f32, row: &mut [f32]) = row_in;
 }
 
-/// `share (n . moment)+` of the next hats, in units of 1/255; `None` when all lie below the horizon.
+/// `n . moment` of the next hats; `None` when all lie below the horizon.
 #[inline(always)]
-fn weights<V: Vector>(basis: &LightBasis, normal: [V; 3], shares: &[u8], at: usize) -> Option<V> {
+fn cosines<V: Vector>(basis: &LightBasis, normal: [V; 3], at: usize) -> Option<V> {
     let [x, y, z] = &basis.moment;
     let cosine = normal[0].mul(V::load(&x[at..at + V::LANES]));
     let cosine = normal[1].mul_add(V::load(&y[at..at + V::LANES]), cosine);
     let cosine = normal[2].mul_add(V::load(&z[at..at + V::LANES]), cosine);
-    if !cosine.any_positive() {
-        return None;
-    }
+    cosine.any_positive().then_some(cosine)
+}
+
+/// `share (n . moment)+` of the next hats, in units of 1/255; `None` when all lie below the horizon.
+#[inline(always)]
+fn weights<V: Vector>(basis: &LightBasis, normal: [V; 3], shares: &[u8], at: usize) -> Option<V> {
+    let cosine = cosines(basis, normal, at)?;
     Some(cosine.max(V::splat(0.0)).mul(V::load_bytes(&shares[at..at + V::LANES])))
 }
 
@@ -47,6 +57,29 @@ fn irradiance_in<V: Vector>(basis: &LightBasis, normal: Vec3, shares: &[u8], lig
         }
     }
     sums.map(|sum| sum.sum() * (FRAC_1_PI / 255.0))
+}
+
+#[inline(always)]
+fn vector_in<V: Vector>(basis: &LightBasis, normal: Vec3, shares: &[u8], light: &[Vec<f32>; 3]) -> [Vec3; 3] {
+    let normal = normal.to_array().map(V::splat);
+    let mut sums = [[V::splat(0.0); 3]; 3];
+    for at in (0..basis.padded()).step_by(V::LANES) {
+        let Some(cosine) = cosines(basis, normal, at) else { continue };
+        let share = cosine.where_positive(V::load_bytes(&shares[at..at + V::LANES]), V::splat(0.0));
+        for (channel, sums) in sums.iter_mut().enumerate() {
+            let radiance = share.mul(V::load(&light[channel][at..at + V::LANES]));
+            for (axis, sum) in sums.iter_mut().enumerate() {
+                *sum = radiance.mul_add(V::load(&basis.moment[axis][at..at + V::LANES]), *sum);
+            }
+        }
+    }
+    let mut vectors = [Vec3::ZERO; 3];
+    for (vector, sums) in vectors.iter_mut().zip(&sums) {
+        for (axis, sum) in sums.iter().enumerate() {
+            vector[axis] = sum.sum() * (FRAC_1_PI / 255.0);
+        }
+    }
+    vectors
 }
 
 #[inline(always)]
@@ -89,6 +122,8 @@ mod tests {
         let d_light = [plane(), plane(), plane()];
         for normal in [Vec3::Y, Vec3::new(0.36, 0.48, -0.8), Vec3::NEG_X] {
             let fast = irradiance(&basis, normal, &shares, &light);
+            let vectors = vector_irradiance(&basis, normal, &shares, &light);
+            let plain_vectors = vector_in::<Plain>(&basis, normal, &shares, &light);
             let plain = irradiance_in::<Plain>(&basis, normal, &shares, &light);
             let truth: [f64; 3] = [0, 1, 2].map(|channel| {
                 (0..basis.count())
@@ -108,6 +143,8 @@ mod tests {
             for channel in 0..3 {
                 assert!((f64::from(fast[channel]) / truth[channel] - 1.0).abs() < 1e-6);
                 assert!((f64::from(plain[channel]) / truth[channel] - 1.0).abs() < 3e-6);
+                assert!((f64::from(vectors[channel].dot(normal)) / truth[channel] - 1.0).abs() < 3e-6);
+                assert!((vectors[channel] - plain_vectors[channel]).length() < 3e-6 * vectors[channel].length());
                 let dot =
                     |a: &[f32], b: &[f32]| -> f64 { a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum() };
                 let by_row = dot(&row, &light[channel]);

@@ -3,7 +3,7 @@
 use super::bounce::BounceMatrix;
 use super::footprint::{ShadingPoint, ViewFootprints};
 use super::half_vector;
-use super::irradiance::{irradiance, irradiance_backward};
+use super::irradiance::{irradiance, irradiance_backward, vector_irradiance};
 use super::light_basis::{LightBasis, LightPlanes};
 use super::lobe_place::{LobePlace, LobeSums};
 use super::lobe_sum::lobe_sums;
@@ -58,6 +58,8 @@ pub struct CachedTransport {
     pub settings: CachedSettings,
     /// Integrals of the light's hats.
     pub basis: LightBasis,
+    /// The same of pairs of rows, for wide lobes ([`LightBasis::with_rows_joined`]).
+    pub joined_basis: LightBasis,
     /// Where visibility is kept.
     pub grid: VisibilityGrid,
     /// What each point sees of the light.
@@ -92,6 +94,7 @@ impl CachedTransport {
         stop: &AtomicBool,
     ) -> Option<Self> {
         let basis = LightBasis::new(light_size.0, light_size.1);
+        let joined_basis = basis.with_rows_joined();
         let grid = VisibilityGrid::new(surface, settings.grid);
         let visibility = Visibility::trace(surface, &grid, &basis, settings.fine_shadows, stop)?;
         let began = Instant::now();
@@ -102,7 +105,17 @@ impl CachedTransport {
             .then(|| Surroundings::trace(surface, &grid, &basis, &visibility, side, stop));
         let bounce_seconds = began.elapsed().as_secs_f64();
         let albedo = lobe_albedo();
-        let made = CachedTransport { settings, basis, grid, visibility, bounces, surroundings, bounce_seconds, albedo };
+        let made = CachedTransport {
+            settings,
+            basis,
+            joined_basis,
+            grid,
+            visibility,
+            bounces,
+            surroundings,
+            bounce_seconds,
+            albedo,
+        };
         (!stop.load(Ordering::Relaxed)).then_some(made)
     }
 
@@ -128,6 +141,35 @@ impl CachedTransport {
                 irradiance(&self.basis, point_of(index).shading_normal, self.visibility.of(index), &light.channels)
             })
             .collect()
+    }
+
+    /// Light itself at all points: vector irradiance over pi, per channel.
+    pub fn vectors(&self, light: &LightPlanes) -> Vec<[Vec3; 3]> {
+        let points = self.grid.points.par_iter().enumerate().with_min_len(64);
+        let vectors = points.map(|(index, point)| {
+            vector_irradiance(&self.basis, point.shading_normal, self.visibility.of(index), &light.channels)
+        });
+        vectors.collect()
+    }
+
+    /// What arrives at a shading point as [`PointLight::arriving`], but that direct light, of which the grid has these
+    /// vectors, is that of the point's own normal.
+    #[inline]
+    pub fn arriving_at(
+        &self,
+        (at, vectors): (&PointLight, &[[Vec3; 3]]),
+        footprints: &ViewFootprints,
+        point: &ShadingPoint,
+    ) -> [f32; 3] {
+        let (mut indirect, mut mean) = ([0.0; 3], [Vec3::ZERO; 3]);
+        for &(index, weight) in footprints.lit_of(point) {
+            let (index, vectors) = (index as usize, &vectors[index as usize]);
+            for channel in 0..3 {
+                mean[channel] += weight * vectors[channel];
+                indirect[channel] += weight * (at.arriving[index][channel] - at.direct[index][channel]);
+            }
+        }
+        [0, 1, 2].map(|c| indirect[c] + mean[c].dot(point.normal).max(0.0))
     }
 
     /// The transpose of [`CachedTransport::direct`]: the derivative by the light, given that by direct light.

@@ -124,11 +124,10 @@ impl LobePlan {
         transport: &CachedTransport,
         (light, at): (&LightPlanes, &PointLight),
     ) -> Vec<LobeSums> {
-        let basis = &transport.basis;
-        let joined_basis = basis.with_rows_joined();
+        let (basis, joined_basis) = (&transport.basis, &transport.joined_basis);
         let is_joined = joined_basis.height < basis.height;
         let first_joined =
-            (0..=STEPS).take_while(|&step| !is_joined || width_of(step) < wide_from(&joined_basis)).count();
+            (0..=STEPS).take_while(|&step| !is_joined || width_of(step) < wide_from(joined_basis)).count();
         let of_place = |(seen, joined): &mut (SeenLight, SeenLight), own: &Place| {
             let shares = transport.seen_from(own.grid_point, light, at, seen);
             let normal = transport.grid.points[own.grid_point as usize].shading_normal;
@@ -142,7 +141,7 @@ impl LobePlan {
             if fine < count {
                 seen.join_rows(basis, joined);
                 let place = LobePlace { seen: joined, ..place };
-                lobe_sums(&joined_basis, &place, &widths[fine..count], &mut sums[fine..count]);
+                lobe_sums(joined_basis, &place, &widths[fine..count], &mut sums[fine..count]);
             }
             sums.into_iter().take(count)
         };

@@ -5,8 +5,9 @@
 //! those points and at some shading points alone and interpolated ([`LobePlan`]), before F0 of each pixel is multiplied in.
 //!
 //! Its picture is that of [`CachedTransport::picture`](super::cached::CachedTransport::picture) but for that interpolation,
-//! and for lights finer than the hats of the cache, which are averaged. `patina-lab bench studio --parts relight` prints the
-//! error of both against the path tracer. Nothing is random; nothing depends on the number of threads.
+//! for direct diffuse light, which follows the normal of each pixel, and for lights finer than the hats of the cache, which
+//! are averaged. `patina-lab bench studio --parts relight` prints the error of both against the path tracer. Nothing is
+//! random; nothing depends on the number of threads.
 
 mod lobe_plan;
 
@@ -102,7 +103,10 @@ impl RelitView {
         let averaged = (!is_of_basis).then(|| environment.resampled(basis.width, basis.height));
         let hats = averaged.as_ref().unwrap_or(environment).radiance.pixels();
         let light = basis.planes(&hats.iter().map(|radiance| radiance.to_array()).collect::<Vec<_>>());
-        let at = transport.point_light(&light, reflectance);
+        let vectors = transport.vectors(&light);
+        let normals = transport.grid.points.iter().map(|point| point.shading_normal);
+        let direct = vectors.iter().zip(normals).map(|(vectors, normal)| vectors.map(|vector| vector.dot(normal)));
+        let at = transport.with_bounces(direct.collect(), reflectance);
         if stop.load(Ordering::Relaxed) {
             return None;
         }
@@ -117,7 +121,7 @@ impl RelitView {
         pixels.par_chunks_mut(width).enumerate().for_each(|(row, pixels)| {
             for index in self.row_starts[row]..self.row_starts[row + 1] {
                 let (point, material) = (&footprints.points[index], &self.materials[index]);
-                let arriving = CachedTransport::interpolate(&at.arriving, footprints, point);
+                let arriving = transport.arriving_at((&at, &vectors), footprints, point);
                 let specular = [material[3], material[4], material[5]];
                 let reflected = lobes.get(index).map_or([0.0; 3], |lobe| lobe.radiance(specular));
                 let radiance = [0, 1, 2].map(|c| material[c] * arriving[c] + strength * reflected[c]);
@@ -184,7 +188,18 @@ mod tests {
         let light = transport.basis.planes(&light);
         let at = transport.point_light(&light, &reflectance);
         let traced = ViewFootprints::trace(&surface, &transport.grid, camera, &footprints);
-        let whole = transport.picture(&traced, &texels, &light, &at);
+        let mut whole = transport.picture(&traced, &texels, &light, &at);
+        // Direct diffuse light is that of each pixel's own normal.
+        let vectors = transport.vectors(&light);
+        for point in &traced.points {
+            let material = CachedTransport::material_of(&traced, point, &texels);
+            let of_grid = CachedTransport::interpolate(&at.arriving, &traced, point);
+            let own = transport.arriving_at((&at, &vectors), &traced, point);
+            for channel in 0..3 {
+                whole[point.pixel as usize][channel] +=
+                    point.share * material[channel] * (own[channel] - of_grid[channel]);
+            }
+        }
         let whole = Image::from_pixels(camera.width, camera.height, whole.into_iter().map(Vec3::from_array).collect());
         let error = relative_error(&own.radiance, &whole);
         println!("{error:.4} off with lobes at {} of {} points", own.lobe_points, traced.points.len());

@@ -5,7 +5,8 @@ use crate::image::RgbImage;
 use crate::image::display::DisplaySettings;
 use crate::light::Environment;
 use crate::light::ball::{matte_ball, mirror_ball};
-use crate::studio::model::Model;
+use crate::scene::Camera;
+use crate::studio::model::{LightName, Model};
 use crate::studio::panel::relight::colour_image;
 use crate::studio::stage::{Layer, StageFrame};
 use egui::{Color32, ColorImage, CursorIcon, Painter, Rect, Sense, Stroke, TextureHandle, TextureOptions, Ui, vec2};
@@ -28,13 +29,25 @@ const BALL_SIDE: usize = 84;
 const GREY: f32 = 0.18;
 
 /// What the balls show depends on these.
-#[derive(Clone, PartialEq)]
 struct BallKey {
     environment: Arc<Environment>,
+    /// The light whose brightness it is brought to.
+    reference: Option<Arc<Environment>>,
     turn_degrees: f32,
     strength_stops: f32,
     world_from_ball: Quat,
     display: DisplaySettings,
+}
+
+impl BallKey {
+    /// Whether both are the same; lights are told apart by where they lie, not by their texels.
+    fn is(&self, other: &BallKey) -> bool {
+        let address = |light: &Option<Arc<Environment>>| light.as_ref().map(Arc::as_ptr);
+        Arc::ptr_eq(&self.environment, &other.environment)
+            && address(&self.reference) == address(&other.reference)
+            && (self.turn_degrees, self.strength_stops) == (other.turn_degrees, other.strength_stops)
+            && (self.world_from_ball, self.display) == (other.world_from_ball, other.display)
+    }
 }
 
 /// What is kept of it.
@@ -57,12 +70,10 @@ pub(super) fn show(
         return;
     }
     let name = model.edits.relight.first.clone();
-    if model.edits.relight.balls
-        && let Some(environment) = model.stage_light(&name)
-    {
-        balls(ui, model, memory, &environment, (frame, rect, is_settled));
-    }
     let Some(own) = model.shelf.find(&name).map(|light| Arc::clone(&light.environment)) else { return };
+    if model.edits.relight.balls {
+        balls(ui, model, memory, (&name, &own), (frame, rect, is_settled));
+    }
     if memory.sun.as_ref().is_none_or(|(of, _)| !Arc::ptr_eq(of, &own)) {
         memory.sun = Some((Arc::clone(&own), sun_of(&own)));
     }
@@ -80,8 +91,7 @@ fn sun_of(environment: &Environment) -> Option<Vec3> {
 }
 
 /// Where a direction of the world is shown: its place on the stage, or the place on the border towards it.
-fn place_of(direction: Vec3, frame: &StageFrame, size: Vec2) -> (Vec2, bool) {
-    let camera = frame.eye.as_camera(size.x as usize, size.y as usize);
+fn place_of(direction: Vec3, camera: &Camera, size: Vec2) -> (Vec2, bool) {
     let seen = camera.rotation_camera_from_world * direction;
     let (middle, half) = (0.5 * size, 0.5 * size - INSET);
     let straight = (seen.z > 1e-3).then(|| seen.truncate() / seen.z * camera.focal_pixels + camera.centre_pixels);
@@ -98,9 +108,10 @@ fn place_of(direction: Vec3, frame: &StageFrame, size: Vec2) -> (Vec2, bool) {
 /// The sun, which is dragged about the up axis.
 fn handle(ui: &mut Ui, model: &mut Model, sun: Vec3, frame: &StageFrame, rect: Rect) {
     let size = Vec2::new(rect.width(), rect.height());
+    let camera = frame.eye.as_camera(size.x as usize, size.y as usize);
     let turned = |degrees: f32| Quat::from_rotation_y(degrees.to_radians()) * sun;
     let turn = model.edits.relight.turn_degrees;
-    let (place, is_on_stage) = place_of(turned(turn), frame, size);
+    let (place, is_on_stage) = place_of(turned(turn), &camera, size);
     let at = rect.min + vec2(place.x, place.y);
     let grip = Rect::from_center_size(at, vec2(1.0, 1.0) * 4.0 * SUN_RADIUS);
     let response = ui.interact(grip, ui.scope_id().with("sun"), Sense::drag());
@@ -109,7 +120,7 @@ fn handle(ui: &mut Ui, model: &mut Model, sun: Vec3, frame: &StageFrame, rect: R
         && let Some(pointer) = response.interact_pointer_pos()
     {
         let wanted = place_in(rect, pointer);
-        let distance = |degrees: f32| place_of(turned(degrees), frame, size).0.distance_squared(wanted);
+        let distance = |degrees: f32| place_of(turned(degrees), &camera, size).0.distance_squared(wanted);
         let steps = -MOST_DEGREES * TURNS_PER_DEGREE..=MOST_DEGREES * TURNS_PER_DEGREE;
         let candidates = steps.map(|step| turn + step as f32 / TURNS_PER_DEGREE as f32);
         if let Some(nearest) = candidates.min_by(|a, b| distance(*a).total_cmp(&distance(*b))) {
@@ -146,7 +157,7 @@ fn balls(
     ui: &mut Ui,
     model: &Model,
     memory: &mut Gauges,
-    environment: &Arc<Environment>,
+    (name, own): (&LightName, &Arc<Environment>),
     (frame, rect, is_settled): (&StageFrame, Rect, bool),
 ) {
     let relight = &model.edits.relight;
@@ -155,18 +166,26 @@ fn balls(
     let world_from_camera = Quat::from_mat3(&rotation.transpose());
     let world_from_ball = world_from_camera * Quat::from_mat3(&Mat3::from_diagonal(Vec3::new(1.0, -1.0, -1.0)));
     let key = BallKey {
-        environment: Arc::clone(environment),
+        environment: Arc::clone(own),
+        reference: model
+            .shelf
+            .find(&LightName::Fitted)
+            .filter(|_| relight.matched)
+            .map(|light| Arc::clone(&light.environment)),
         turn_degrees: relight.turn_degrees,
         strength_stops: relight.strength_stops,
         world_from_ball,
         display: model.edits.display,
     };
-    let is_known = memory.balls.as_ref().is_some_and(|(own, _)| *own == key);
-    if !is_known && (is_settled || memory.balls.is_none()) {
+    let is_known = memory.balls.as_ref().is_some_and(|(own, _)| own.is(&key));
+    if !is_known
+        && (is_settled || memory.balls.is_none())
+        && let Some(environment) = model.stage_light(name)
+    {
         let within_light = Quat::from_rotation_y(-relight.turn_degrees.to_radians()) * world_from_ball;
         let strength = relight.strength_stops.exp2();
-        let chrome = mirror_ball(environment, BALL_SIDE, within_light).map(|radiance| *radiance * strength);
-        let grey = matte_ball(environment, BALL_SIDE, within_light).map(|radiance| *radiance * GREY * strength);
+        let chrome = mirror_ball(&environment, BALL_SIDE, within_light).map(|radiance| *radiance * strength);
+        let grey = matte_ball(&environment, BALL_SIDE, within_light).map(|radiance| *radiance * GREY * strength);
         let textures = [("chrome ball", chrome), ("grey ball", grey)].map(|(name, picture)| {
             ui.ctx().load_texture(name, cut_out(&picture, &key.display), TextureOptions::LINEAR)
         });
