@@ -5,8 +5,7 @@ use super::pixel_system::{Lanes, PieceRow, PixelSystem};
 use super::pixels::{Piece, Pixels};
 use super::scene::SolverScene;
 use crate::material::Material;
-use crate::render::cached::lobe_sum::{lobe_alone, lobe_with_derivative};
-use crate::render::cached::{CachedTransport, SeenLight};
+use crate::render::cached::{CachedTransport, SeenRows};
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -75,7 +74,7 @@ impl SolverScene {
         let count = pixels.count();
         let chunks: Vec<(Vec<PieceRow>, Vec<[f32; 3]>)> = (0..count.div_ceil(TOGETHER))
             .into_par_iter()
-            .map_init(SeenLight::default, |seen, chunk| {
+            .map_init(SeenRows::default, |seen, chunk| {
                 let range = chunk * TOGETHER..((chunk + 1) * TOGETHER).min(count);
                 let first = pixels.pieces(range.start).start;
                 let mut rows = vec![PieceRow::default(); pixels.pieces(range.end - 1).end - first];
@@ -100,12 +99,8 @@ impl SolverScene {
                         continue;
                     };
                     let arriving = CachedTransport::interpolate(&at_points.arriving, footprints, point);
-                    let place = self.transport.lobe_place(point, planes, at_points, seen);
-                    let (basis, width) = (&self.transport.basis, mean[6].exp());
-                    let sums = match slopes {
-                        Slopes::OfWidths => lobe_with_derivative(basis, &place, width),
-                        Slopes::OfReflectances => lobe_alone(basis, &place, width),
-                    };
+                    let has_slope = slopes == Slopes::OfWidths;
+                    let sums = self.transport.lobe_at(point, (planes, at_points), seen, mean[6].exp(), has_slope);
                     for c in 0..3 {
                         let sent = arriving[c] * mean[c] + mean[3 + c] * sums.base[c] + sums.grazing[c];
                         radiance[c] += point.share * sent;

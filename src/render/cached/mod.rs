@@ -43,5 +43,5 @@ mod tests;
 pub use footprint::{FootprintSettings, ShadingPoint, ViewFootprints};
 pub use light_basis::LightPlanes;
 pub use points::VisibilityGrid;
-pub use seen_light::SeenLight;
+pub use seen_light::{SeenLight, SeenRows};
 pub use transport::{CachedSettings, CachedTransport, PointLight};

@@ -21,6 +21,24 @@ pub struct SeenLight {
     pub(super) texels: Vec<Vec4>,
 }
 
+/// What a point sees, by the hats of the light and by pairs of them.
+#[derive(Clone, Debug, Default)]
+pub struct SeenRows {
+    /// By the hats.
+    pub fine: SeenLight,
+    joined: SeenLight,
+}
+
+impl SeenRows {
+    /// By pairs of hats of this basis: for sums over [`LightBasis::with_rows_joined`].
+    pub fn joined(&mut self, basis: &LightBasis) -> &SeenLight {
+        if self.joined.point != self.fine.point {
+            self.fine.join_rows(basis, &mut self.joined);
+        }
+        &self.joined
+    }
+}
+
 impl Default for SeenLight {
     fn default() -> Self {
         SeenLight { point: NO_POINT, channels: Default::default(), texels: Vec::new() }
@@ -77,8 +95,8 @@ impl SeenLight {
 
     /// Fills `joined` with what is seen in pairs of hats, each of a row of `basis` and the one below it: their mean by solid
     /// angle, for sums over [`LightBasis::with_rows_joined`] alone.
-    pub fn join_rows(&self, basis: &LightBasis, joined: &mut SeenLight) {
-        joined.point = NO_POINT;
+    fn join_rows(&self, basis: &LightBasis, joined: &mut SeenLight) {
+        joined.point = self.point;
         let rows = 2 * basis.width;
         let solid_angles =
             || basis.solid_angle[..basis.count()].chunks_exact(rows).map(|rows| rows.split_at(basis.width));

@@ -5,10 +5,10 @@ use super::footprint::{ShadingPoint, ViewFootprints};
 use super::half_vector;
 use super::irradiance::{irradiance, irradiance_backward, vector_irradiance};
 use super::light_basis::{LightBasis, LightPlanes};
-use super::lobe_place::{LobePlace, LobeSums};
-use super::lobe_sum::lobe_sums;
+use super::lobe_place::{LobePlace, LobeSums, wide_from, width_through};
+use super::lobe_sum::{lobe_alone, lobe_with_derivative};
 use super::points::VisibilityGrid;
-use super::seen_light::SeenLight;
+use super::seen_light::{SeenLight, SeenRows};
 use super::surroundings::Surroundings;
 use super::visibility::Visibility;
 use crate::material::Material;
@@ -307,6 +307,35 @@ impl CachedTransport {
         }
     }
 
+    /// The sums of a shading point's lobe, with their derivatives by the logarithm of the width or without, as
+    /// [`CachedTransport::lobe_place`]. A lobe that is wide beside pairs of hats is summed over these: half as many.
+    #[inline]
+    pub fn lobe_at(
+        &self,
+        point: &ShadingPoint,
+        (light, at): (&LightPlanes, &PointLight),
+        seen: &mut SeenRows,
+        width: f32,
+        has_slope: bool,
+    ) -> LobeSums {
+        let shares = self.seen_from(point.lobe_point, light, at, &mut seen.fine);
+        let ShadingPoint { normal, to_viewer, normal_variance, .. } = *point;
+        let (basis, seen) = match width_through(width, normal_variance) >= self.joined_from() {
+            true => (&self.joined_basis, seen.joined(&self.basis)),
+            false => (&self.basis, &seen.fine),
+        };
+        let place = LobePlace { normal, to_viewer, shares, seen, normal_variance };
+        match has_slope {
+            true => lobe_with_derivative(basis, &place, width),
+            false => lobe_alone(basis, &place, width),
+        }
+    }
+
+    /// The narrowest lobe that is summed over pairs of hats; infinite where there are none.
+    pub fn joined_from(&self) -> f32 {
+        if self.joined_basis.height < self.basis.height { wide_from(&self.joined_basis) } else { f32::INFINITY }
+    }
+
     /// Radiance of a shading point with a material of seven numbers.
     pub fn shade(
         &self,
@@ -315,7 +344,7 @@ impl CachedTransport {
         footprints: &ViewFootprints,
         point: &ShadingPoint,
         material: &[f32; 7],
-        seen: &mut SeenLight,
+        seen: &mut SeenRows,
     ) -> [f32; 3] {
         let arriving = Self::interpolate(&at.arriving, footprints, point);
         let diffuse = [0, 1, 2].map(|c| material[c] * arriving[c]);
@@ -323,9 +352,8 @@ impl CachedTransport {
         if strength == 0.0 {
             return diffuse;
         }
-        let mut sums = [LobeSums::default()];
-        lobe_sums(&self.basis, &self.lobe_place(point, light, at, seen), &[material[6].exp()], &mut sums);
-        let lobe = sums[0].radiance([material[3], material[4], material[5]]);
+        let lobe = self.lobe_at(point, (light, at), seen, material[6].exp(), false);
+        let lobe = lobe.radiance([material[3], material[4], material[5]]);
         [0, 1, 2].map(|c| diffuse[c] + strength * lobe[c])
     }
 
@@ -351,7 +379,7 @@ impl CachedTransport {
             .points
             .par_iter()
             .with_min_len(256)
-            .map_init(SeenLight::default, |seen, point| {
+            .map_init(SeenRows::default, |seen, point| {
                 let material = Self::material_of(footprints, point, texels);
                 self.shade(light, at, footprints, point, &material, seen)
             })

@@ -7,9 +7,9 @@
 //! view that shows about as many points of the grid as shading points. What a light sends is not asked, so that the plan
 //! serves all of them.
 
-use crate::render::cached::lobe_place::{LobePlace, LobeSums, wide_from};
-use crate::render::cached::lobe_sum::{lobe_alone, lobe_sums};
-use crate::render::cached::{CachedTransport, LightPlanes, PointLight, SeenLight, ShadingPoint, ViewFootprints};
+use crate::render::cached::lobe_place::{LobePlace, LobeSums};
+use crate::render::cached::lobe_sum::lobe_sums;
+use crate::render::cached::{CachedTransport, LightPlanes, PointLight, SeenRows, ShadingPoint, ViewFootprints};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -125,35 +125,31 @@ impl LobePlan {
         (light, at): (&LightPlanes, &PointLight),
     ) -> Vec<LobeSums> {
         let (basis, joined_basis) = (&transport.basis, &transport.joined_basis);
-        let is_joined = joined_basis.height < basis.height;
-        let first_joined =
-            (0..=STEPS).take_while(|&step| !is_joined || width_of(step) < wide_from(joined_basis)).count();
-        let of_place = |(seen, joined): &mut (SeenLight, SeenLight), own: &Place| {
-            let shares = transport.seen_from(own.grid_point, light, at, seen);
+        let first_joined = (0..=STEPS).take_while(|&step| width_of(step) < transport.joined_from()).count();
+        let of_place = |seen: &mut SeenRows, own: &Place| {
+            let shares = transport.seen_from(own.grid_point, light, at, &mut seen.fine);
             let normal = transport.grid.points[own.grid_point as usize].shading_normal;
-            let place = LobePlace { normal, to_viewer: own.to_viewer, shares, seen, normal_variance: 0.0 };
             let [first, last] = own.steps.map(usize::from);
             let widths: [f32; STEPS + 1] = std::array::from_fn(|index| width_of(first + index));
             let (mut sums, count) = ([LobeSums::default(); STEPS + 1], last - first + 1);
-            // Lobes for which hats of twice the height are narrow enough are summed over these.
+            // Lobes for which pairs of hats are narrow enough are summed over these.
             let fine = first_joined.clamp(first, last + 1) - first;
+            let (to_viewer, normal_variance) = (own.to_viewer, 0.0);
+            let place = LobePlace { normal, to_viewer, shares, seen: &seen.fine, normal_variance };
             lobe_sums(basis, &place, &widths[..fine], &mut sums[..fine]);
             if fine < count {
-                seen.join_rows(basis, joined);
-                let place = LobePlace { seen: joined, ..place };
+                let place = LobePlace { normal, to_viewer, shares, seen: seen.joined(basis), normal_variance };
                 lobe_sums(joined_basis, &place, &widths[fine..count], &mut sums[fine..count]);
             }
             sums.into_iter().take(count)
         };
         let places = self.places.par_iter().with_min_len(16);
         let sums: Vec<LobeSums> = places.map_init(Default::default, of_place).flatten_iter().collect();
-        let own = |seen: &mut SeenLight, &index: &u32| {
+        let own = |seen: &mut SeenRows, &index: &u32| {
             let point = ShadingPoint { normal_variance: 0.0, ..footprints.points[index as usize] };
-            let place = transport.lobe_place(&point, light, at, seen);
-            lobe_alone(&transport.basis, &place, self.widths[index as usize])
+            transport.lobe_at(&point, (light, at), seen, self.widths[index as usize], false)
         };
-        let of_alone: Vec<LobeSums> =
-            self.alone.par_iter().with_min_len(64).map_init(SeenLight::default, own).collect();
+        let of_alone: Vec<LobeSums> = self.alone.par_iter().with_min_len(64).map_init(SeenRows::default, own).collect();
         let between = |index: usize| match self.is_alone[index] {
             true => LobeSums::default(),
             false => self.between(footprints.lit_of(&footprints.points[index]), self.widths[index], &sums),

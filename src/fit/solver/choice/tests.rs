@@ -7,7 +7,7 @@ use super::judge::region_of;
 use crate::image::Image;
 use crate::math::random::SequentialRandom;
 use crate::render::Surface;
-use crate::render::cached::{CachedTransport, SeenLight, ViewFootprints};
+use crate::render::cached::{CachedTransport, SeenRows, ViewFootprints};
 use crate::scene::{Scene, demo};
 use glam::Vec3;
 use std::sync::atomic::AtomicBool;
@@ -59,7 +59,7 @@ fn photograph(held_out: usize, noise: f32, lobe_of: impl Fn(usize) -> Option<[f3
         let grid = &cache.transport.grid;
         let footprints = ViewFootprints::trace(&made.surface, grid, camera, &cache.first_hits);
         let mut picture = vec![Vec3::ZERO; 64 * 48];
-        let mut around = SeenLight::default();
+        let mut around = SeenRows::default();
         for point in &footprints.points {
             let texel = footprints.texels_of(point)[0].0 as usize;
             let radiance = match lobe_of(region_of(texel, SIZE)) {
