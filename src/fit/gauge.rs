@@ -21,8 +21,7 @@ pub enum GaugeRule {
     FixedMaps,
     /// The start: mean reflectance 0.5 in the mean light that explains the photographs.
     Start,
-    /// The start holds for the mean of the channels; how they differ is told by highlights, since F0 of what is no metal is
-    /// grey (Lee 1986).
+    /// The start, and F0 of what is no metal where highlights are narrow: 0.04 and grey (Lee 1986).
     StartAndHighlights,
 }
 
@@ -53,9 +52,10 @@ impl GaugeRule {
                  start, a mean reflectance of 0.5. Read the scale-aligned scores."
             }
             GaugeRule::StartAndHighlights => {
-                "Nothing in the photographs fixes the scale between diffuse reflectance and light; over the three channels \
-                 together it stays near the start, a mean reflectance of 0.5, and the light's colour is that of highlights \
-                 on what is no metal, as far as photos show some. Read the scale-aligned scores."
+                "Diffuse surface does not tell how bright the light is that it is seen under. The scale between reflectance and \
+                 light, and the light's colour, are those under which what is no metal has the F0 of common dielectrics, \
+                 0.04 and grey, as far as photos show narrow highlights; without any, they stay near the start, a mean \
+                 reflectance of 0.5. Read the scale-aligned scores."
             }
         }
     }

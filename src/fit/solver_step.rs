@@ -181,7 +181,7 @@ impl Fitter {
         }
         state.light = estimate.light;
         self.light_known = estimate.light_known;
-        if !self.light_known.shares.is_empty() {
+        if self.light_known.scale_deviation > 0.0 {
             state.keep_light_scale_deviation(self.light_known.scale_deviation);
         }
         for (&view, gain) in solver.views.iter().zip(estimate.log_gains) {

@@ -54,8 +54,8 @@ pub struct FitState {
     pub variances: Vec<TexelVariance>,
     /// Radiance of the light's texels.
     pub light: Vec<[f32; 3]>,
-    /// Relative standard deviation of the factor that light and reflectance have in common, as the solver's last round on
-    /// the light left it; `f64::MAX` where the photos leave it open. `None` before the first, under a known light and under
+    /// Relative standard deviation of the factor that light and reflectance have in common, as the solver's last step
+    /// left it; `f64::MAX` where the photos leave it open. `None` before the first, under a known light and under
     /// Adam.
     pub light_scale_deviation: Option<f64>,
     /// Moments of the light.

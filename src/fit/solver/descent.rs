@@ -10,6 +10,7 @@
 use super::conjugate_gradients::conjugate_gradients;
 use super::estimate::Estimate;
 use super::freedom::Freedom;
+use super::light_scale::LightScale;
 use super::neighbours::Neighbours;
 use super::objective::{Learned, Objective};
 use super::pixel_system::{Lanes, PixelSystem, Rows};
@@ -60,6 +61,10 @@ pub struct Descended {
     pub precision: Vec<Lanes>,
     /// Squared errors of unclipped pixels in units of the photos.
     pub errors: ErrorSums,
+    /// What light and reflectances were scaled by at the end; `None` where that was known.
+    pub scale: Option<LightScale>,
+    /// The light by then.
+    pub light: Vec<[f32; 3]>,
 }
 
 /// A place on the way down.
@@ -81,7 +86,7 @@ pub(super) struct Descent<'a> {
     pub(super) scene: &'a SolverScene,
     pub(super) pixels: &'a Pixels<'a>,
     pub(super) system: PixelSystem,
-    estimate: &'a Estimate,
+    light: Vec<[f32; 3]>,
     lit: Lit,
     stop: &'a AtomicBool,
 }
@@ -97,7 +102,7 @@ impl SolverScene {
     ) -> Option<Descended> {
         let pixels = Pixels::of(self);
         let system = PixelSystem::new(&pixels, self.settings.map_size);
-        let mut descent = Descent { scene: self, pixels: &pixels, system, estimate, lit, stop };
+        let mut descent = Descent { scene: self, pixels: &pixels, system, light: estimate.light.clone(), lit, stop };
         let sight = descent.sight(&start, FIRST_STEPS[0].slopes)?;
         let rows = Learned::of(&pixels, &sight, None).rows(&pixels, &sight);
         let diagonal = descent.system.diagonal(Rows { pieces: &sight.pieces, pixels: &rows });
@@ -109,8 +114,14 @@ impl SolverScene {
         if lit == Lit::Yes {
             place = descent.or_plain(place, (&start, &shown, freedom), &mut steps)?;
         }
-        let place = descent.down(place, &LAST_STEPS, &mut steps)?;
+        let mut place = descent.down(place, &LAST_STEPS, &mut steps)?;
+        let scale = (lit == Lit::Yes && self.is_scale_open()).then(|| LightScale::told_by(&place.texels, &shown));
+        if let Some(scale) = scale.filter(|scale| scale.factor != [1.0; 3]) {
+            descent.light = scale.of_light(&descent.light, &self.shown_by_background());
+            place = descent.scaled(place, scale, (&shown, freedom), &mut steps)?;
+        }
 
+        let light = std::mem::take(&mut descent.light);
         let Place { texels, sight, learned, .. } = place;
         let learned = learned?;
         let rows = learned.rows(&pixels, &sight);
@@ -122,7 +133,7 @@ impl SolverScene {
                 errors.add(own.view as usize, row.left.iter().map(|left| f64::from(left * left)).sum::<f64>() / 3.0);
             }
         }
-        Some(Descended { texels, learned, steps, precision, errors })
+        Some(Descended { texels, learned, steps, precision, errors, scale, light })
     }
 }
 
@@ -130,7 +141,22 @@ impl Descent<'_> {
     /// What pixels see of texels. `None` when `stop` was raised.
     pub(super) fn sight(&mut self, texels: &[Material<f32>], slopes: Slopes) -> Option<Sight> {
         let pixels = (self.pixels, &mut self.system);
-        self.scene.sight(pixels, self.estimate, texels, (self.lit, slopes), self.stop)
+        self.scene.sight(pixels, &self.light, texels, (self.lit, slopes), self.stop)
+    }
+
+    /// The same place after the light was multiplied by a factor. What sees it, Schlick's rise, light between surfaces and
+    /// what the background told of the light, a step makes good.
+    fn scaled(
+        &mut self,
+        place: Place,
+        scale: LightScale,
+        (shown, freedom): (&[bool], Freedom),
+        told: &mut Vec<[Objective; 2]>,
+    ) -> Option<Place> {
+        let texels: Vec<Material<f32>> = place.texels.par_iter().map(|texel| scale.under(texel)).collect();
+        let sight = self.sight(&texels, Slopes::OfReflectances)?;
+        let begun = Place { learned: place.learned, ..self.place(&texels, sight, (shown, freedom)) };
+        self.down(begun, &FIRST_STEPS[..1], told)
     }
 
     /// A place to begin at, around which texels may differ so freely.

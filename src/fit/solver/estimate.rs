@@ -1,6 +1,7 @@
 //! What the solver changes: maps, light and gains, and how sure it is of the maps.
 
 use super::light_evidence::LightKnown;
+use super::light_scale::LightScale;
 use crate::atlas::{dilate, nearest_covered};
 use crate::image::Image;
 use crate::light::Environment;
@@ -53,6 +54,9 @@ const IRRADIANCE_SHARE: f32 = 0.5;
 /// to itself, logarithm of the width. A lobe sees more detail of the light than irradiance does, which photos tell little
 /// of. Chosen, like the share above, by how often stated intervals hold the truth.
 const LOBE_LIGHT_ERRORS: [f32; 2] = [0.25, 0.07];
+
+/// F0 of common dielectrics: that of a refractive index of 1.5.
+pub(super) const PLAIN_SPECULAR: f32 = 0.04;
 
 /// What is known of a texel before anything was solved.
 pub const START_TEXEL: Material<f32> = Material { diffuse: [0.4; 3], specular: [0.08; 3], log_width: -0.7 };
@@ -136,6 +140,18 @@ impl Estimate {
                 let texel = row * map_size + column;
                 roughness_deviation(texels[texel].log_width, deviation(texel, 6))
             }),
+        }
+    }
+
+    /// Divides what reflectances are known to by a factor of the light, and keeps how well that is known.
+    pub(super) fn scale_variances(&mut self, scale: &LightScale) {
+        self.light_known.scale_deviation = scale.deviation;
+        for known in &mut self.variances {
+            for c in 0..3 {
+                let square = scale.factor[c] * scale.factor[c];
+                known.variance.diffuse[c] /= square;
+                known.variance.specular[c] /= square;
+            }
         }
     }
 

@@ -16,9 +16,10 @@ pub type EvidenceShares = [f32; 3];
 pub struct LightKnown {
     /// What each texel is known by; empty before the first round on the light.
     pub shares: Vec<EvidenceShares>,
-    /// Standard deviation, relative, of the factor that light and reflectance have in common: that of the mean light on
-    /// the surface, by the photos and the belief that skies are smooth. What the convention that holds it adds is left
-    /// out. Mean over channels; infinite where no photo tells of it.
+    /// Standard deviation, relative, of the factor that light and reflectance have in common. Before the descent that of the
+    /// mean light on the surface, by the photos and the belief that skies are smooth, without what the convention that holds
+    /// it adds; mean over channels, infinite where no photo tells of it, 0 before the first round. After it, by
+    /// [`LightScale`](super::light_scale::LightScale).
     pub scale_deviation: f64,
 }
 

@@ -46,6 +46,7 @@ pub mod light_evidence;
 mod light_holes;
 mod light_reach;
 pub mod light_round;
+mod light_scale;
 pub mod light_shape;
 pub mod light_step;
 pub mod light_suns;

@@ -28,6 +28,10 @@ impl SolverScene {
     /// changed then.
     pub fn refine(&self, estimate: &mut Estimate, stop: &AtomicBool) -> Option<StepReport> {
         let found = self.descend(estimate, estimate.texels.clone(), Lit::Yes, stop)?;
+        if let Some(scale) = found.scale {
+            estimate.scale_variances(&scale);
+            estimate.light.clone_from(&found.light);
+        }
         if self.settings.exposure {
             for (log_gain, gain) in estimate.log_gains.iter_mut().zip(&found.learned.gains) {
                 *log_gain = gain.iter().map(|gain| gain.ln()).sum::<f32>() / 3.0;
@@ -85,16 +89,24 @@ pub(super) mod tests {
 
     /// A bowl whose photos are what the cache makes of a surface of patches under gains, and one pixel in fifty is wrong.
     pub fn photographed(gains: impl Fn(usize) -> [f32; 3]) -> (Solver, Vec<Material<f32>>) {
+        photographed_under(&Environment::constant(32, 16, Vec3::new(0.8, 1.0, 1.2)), -0.5, gains)
+    }
+
+    /// The same with lobes of this width under this light.
+    fn photographed_under(
+        light: &Environment,
+        log_width: f32,
+        gains: impl Fn(usize) -> [f32; 3],
+    ) -> (Solver, Vec<Material<f32>>) {
         let scene = bowl_of_plaster(SIZE);
         let surface = Surface::new(scene.mesh.clone()).unwrap();
         let settings = SolverSettings { map_size: SIZE, grid: SIZE, light_size: (32, 16), ..SolverSettings::default() };
-        let light = Environment::constant(32, 16, Vec3::new(0.8, 1.0, 1.2));
-        let mut solver = Solver::new(&scene, &surface, settings, Some(&light)).unwrap();
+        let mut solver = Solver::new(&scene, &surface, settings, Some(light)).unwrap();
         let truth: Vec<Material<f32>> = (0..SIZE * SIZE)
             .map(|texel| {
                 let patch = (texel / SIZE / 8 + texel % SIZE / 8) % 2;
                 let diffuse = [[0.2, 0.3, 0.1], [0.5, 0.4, 0.6]][patch];
-                Material { diffuse, specular: [0.04; 3], log_width: -0.5 }
+                Material { diffuse, specular: [0.04; 3], log_width }
             })
             .collect();
         solver.estimate.texels.clone_from(&truth);
@@ -104,7 +116,7 @@ pub(super) mod tests {
             let never = AtomicBool::new(false);
             let sight = solver.scene.sight(
                 (&pixels, &mut system),
-                &solver.estimate,
+                &solver.estimate.light,
                 &truth,
                 (Lit::Yes, Slopes::OfReflectances),
                 &never,
@@ -179,6 +191,43 @@ pub(super) mod tests {
         let report = scene.refine(estimate, &never).unwrap();
         assert!(report.squared_error > 0.0 && estimate.texels != before && report.descent.len() == found.steps.len());
         assert!(scene.refine(&mut estimate.clone(), &AtomicBool::new(true)).is_none());
+    }
+
+    #[test]
+    fn a_light_that_is_too_dark_and_red_becomes_what_gloss_says() {
+        let mut light = Environment::constant(32, 16, Vec3::splat(0.3));
+        for (texel, radiance) in light.radiance.pixels_mut().iter_mut().enumerate() {
+            if texel / 32 < 8 && texel % 7 == 3 {
+                *radiance = Vec3::splat(4.0);
+            }
+        }
+        let (mut solver, truth) = photographed_under(&light, -1.5, |_| [1.0; 3]);
+        let wrong = [0.8f32, 0.7, 0.6];
+        for radiance in &mut solver.estimate.light {
+            (0..3).for_each(|c| radiance[c] *= wrong[c]);
+        }
+        for texel in &mut solver.estimate.texels {
+            for c in 0..3 {
+                texel.diffuse[c] /= wrong[c];
+                texel.specular[c] /= wrong[c];
+            }
+        }
+        let Solver { scene, estimate } = &mut solver;
+        scene.refine(estimate, &AtomicBool::new(false)).unwrap();
+        let stated = estimate.light_known.scale_deviation;
+        assert!((0.1..0.3).contains(&stated), "{stated}");
+        let (truth_sum, sum) = (light.radiance.pixels().iter().sum::<Vec3>(), |c: usize| -> f32 {
+            estimate.light.iter().map(|radiance| radiance[c]).sum()
+        });
+        for c in 0..3 {
+            // Nearer by half at least, and within what is stated.
+            let off = (sum(c) / truth_sum[c]).ln().abs();
+            assert!(off < 0.5 * wrong[c].ln().abs() && f64::from(off) < stated, "channel {c}: {off}, {}", wrong[c]);
+        }
+        let seen: Vec<usize> = (0..SIZE * SIZE).filter(|&texel| scene.observations.range(texel).len() > 3).collect();
+        let mean = |of: &[Material<f32>]| seen.iter().map(|&texel| of[texel].diffuse[2]).sum::<f32>();
+        let off = (mean(&estimate.texels) / mean(&truth)).ln().abs();
+        assert!(off < 0.5 * wrong[2].ln().abs() && f64::from(off) < stated, "blue reflectance {off}");
     }
 
     #[test]

@@ -9,14 +9,11 @@
 use super::agreement::SquareGains;
 use super::choice::clustered::ClusteredMean;
 use super::descent::{Descent, FIRST_STEPS, Place, difference};
-use super::estimate::START_TEXEL;
+use super::estimate::{PLAIN_SPECULAR, START_TEXEL};
 use super::freedom::Freedom;
 use super::objective::{Learned, Objective};
 use super::sight::{Sight, Slopes};
 use crate::material::Material;
-
-/// F0 of the dielectric: that of a refractive index of 1.5.
-const PLAIN_SPECULAR: f32 = 0.04;
 
 impl Descent<'_> {
     /// Where to go on from: `found`, which began at `start`, or with the dielectric where that is better. What it chose is
@@ -116,7 +113,7 @@ mod tests {
             *own = Material { diffuse: [0.02; 3], specular: own.diffuse, log_width: own.log_width };
         }
         let found = scene.descend(estimate, start, Lit::Yes, &AtomicBool::new(false)).unwrap();
-        // Two steps, what was chosen, six steps.
+        // Two steps, what was chosen, six steps; the light is as bright as the dielectrics say.
         assert_eq!(found.steps.len(), 9, "{:?}", found.steps);
         let [before, after] = found.steps[2];
         assert!(after.total() < before.total() && after.neighbours < before.neighbours, "{before:?} {after:?}");

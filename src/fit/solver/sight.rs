@@ -1,6 +1,5 @@
 //! What pixels see of texels under a light: their radiance, and what it changes by with each number of a texel.
 
-use super::estimate::Estimate;
 use super::pixel_system::{Lanes, PieceRow, PixelSystem};
 use super::pixels::{Piece, Pixels};
 use super::scene::SolverScene;
@@ -18,7 +17,7 @@ const TOGETHER: usize = 4096;
 pub enum Lit {
     /// A texture without a light: a pixel is the mean of its texels' diffuse colours.
     No,
-    /// The estimate's light, lobes and light between surfaces.
+    /// A light, lobes and light between surfaces.
     Yes,
 }
 
@@ -55,19 +54,19 @@ impl Sight {
 }
 
 impl SolverScene {
-    /// What pixels see of these texels under the estimate's light. `None` when `stop` was raised.
+    /// What pixels see of these texels under a light. `None` when `stop` was raised.
     pub(super) fn sight(
         &self,
         (pixels, system): (&Pixels, &mut PixelSystem),
-        estimate: &Estimate,
+        light: &[[f32; 3]],
         texels: &[Material<f32>],
         (lit, slopes): (Lit, Slopes),
         stop: &AtomicBool,
     ) -> Option<Sight> {
         let lanes: Vec<Lanes> = texels.par_iter().map(lanes_of).collect();
         let means = system.means(&lanes);
-        let light = (lit == Lit::Yes).then(|| {
-            let planes = self.transport.basis.planes(&estimate.light);
+        let lit = (lit == Lit::Yes).then(|| {
+            let planes = self.transport.basis.planes(light);
             let at_points = self.point_light(texels, &planes);
             (planes, at_points)
         });
@@ -93,7 +92,7 @@ impl SolverScene {
                     let index = pixels.pieces(pixel).start + which;
                     let (row, mean) = (&mut rows[index - first], &means[index]);
                     let radiance = &mut radiance[pixel - range.start];
-                    let Some((planes, at_points)) = &light else {
+                    let Some((planes, at_points)) = &lit else {
                         row.arriving = [point.share; 3];
                         (0..3).for_each(|c| radiance[c] += point.share * mean[c]);
                         continue;

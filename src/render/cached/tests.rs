@@ -196,6 +196,43 @@ fn the_number_of_threads_changes_no_bit() {
     assert_eq!(run(1), run(3));
 }
 
+/// Also where the light has texels that are much brighter than the rest. Either sum is good to a percent of the integral.
+#[test]
+fn wide_lobes_over_pairs_of_hats_are_those_over_all_of_them() {
+    let small = small();
+    let settings = CachedSettings { grid: 32, bounce_rays: 16, max_bounces: 2, ..CachedSettings::default() };
+    let size = small.parameters.environment_size;
+    let transport = CachedTransport::build(&small.surface, settings, size, &AtomicBool::new(false)).unwrap();
+    let texels = &small.parameters.texels.levels[0].texels;
+    let light = transport.basis.planes(&small.parameters.light);
+    let at = transport.point_light(&light, &transport.reflectance_of_points(texels, 128));
+    let first_hits = FootprintSettings { map_size: 128, ..FootprintSettings::COARSE };
+    let footprints = ViewFootprints::trace(&small.surface, &transport.grid, &small.scene.views[0].camera, &first_hits);
+    let (mut fine, mut joined) = (SeenLight::default(), SeenRows::default());
+    assert!((0.4..0.6).contains(&transport.joined_from()), "{}", transport.joined_from());
+    let (mut difference, mut whole, mut alike) = ([0.0f64; 2], [0.0f64; 2], 0);
+    for (index, point) in footprints.points.iter().enumerate().step_by(5) {
+        let width = [0.2f32, 0.6, 0.9][index % 3];
+        let place = transport.lobe_place(point, &light, &at, &mut fine);
+        let (own, is_wide) = (place.width_seen(width), place.width_seen(width) >= transport.joined_from());
+        let truth = lobe_sum::lobe_with_derivative(&transport.basis, &place, width);
+        let found = transport.lobe_at(point, (&light, &at), &mut joined, width, true);
+        if !is_wide {
+            assert_eq!(found, truth, "{own}");
+            alike += 1;
+            continue;
+        }
+        let numbers = |sums: &lobe_place::LobeSums| [sums.base[1], sums.d_base[1]].map(f64::from);
+        for (which, (found, truth)) in numbers(&found).into_iter().zip(numbers(&truth)).enumerate() {
+            difference[which] += (found - truth).powi(2);
+            whole[which] += truth * truth;
+        }
+    }
+    let errors = [0, 1].map(|which| (difference[which] / whole[which]).sqrt());
+    println!("{errors:?}, {alike} narrow");
+    assert!(alike > 50 && errors[0] < 0.02 && errors[1] < 0.04, "{errors:?} {alike}");
+}
+
 #[test]
 fn footprints_cover_pixels_with_weights_that_sum_to_one() {
     let small = small();
