@@ -30,6 +30,14 @@ pub struct Architecture {
     pub name: String,
     /// Length of the code; 0 for a flow of one density.
     pub code: usize,
+    /// How many of a code's numbers, its last ones, are the same for the three channels of a material: its shape. What
+    /// is before them is the channel's own.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub shape: usize,
+    /// Whether codes scale and shift every layer of the conditioners, see [`super::modulation`], or are seen by the
+    /// first ones alone.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub gates: bool,
     /// Whether conditioners see waves of the coordinates, periodic ones of `phi_difference`, or the bare numbers.
     pub waves: bool,
     /// What stands behind the layers of the conditioners.
@@ -44,6 +52,14 @@ pub struct Architecture {
 
 fn usual_floor() -> u8 {
     FLOOR_DIGITS
+}
+
+fn is_zero(count: &usize) -> bool {
+    *count == 0
+}
+
+fn is_false(value: &bool) -> bool {
+    !*value
 }
 
 fn is_usual_floor(digits: &u8) -> bool {
@@ -61,6 +77,8 @@ impl Architecture {
         Architecture {
             name: "paper".into(),
             code,
+            shape: 0,
+            gates: false,
             waves: false,
             activation: Activation::Rectifier,
             floor_digits: FLOOR_DIGITS,
@@ -76,6 +94,14 @@ impl Architecture {
         Self::triangular(code, "compact", 128, 3)
     }
 
+    /// The compact flow with a shape of `shape` numbers a material beside the codes of its channels, both of which
+    /// scale and shift every layer: three times 16 numbers, a shape of 102 and three colours are 153 a material. Its
+    /// floor is lower, since logarithms of what is measured as nothing are learned too.
+    pub fn shaped(own: usize, shape: usize) -> Self {
+        let compact = Self::triangular(own + shape, "shaped", 128, 3);
+        Architecture { shape, gates: true, floor_digits: 8, ..compact }
+    }
+
     /// The triangular order with another size of its largest net.
     pub fn triangular(code: usize, name: &str, width: usize, depth: usize) -> Self {
         let dense = |width: usize, depth: usize, last: usize| {
@@ -86,6 +112,8 @@ impl Architecture {
         Architecture {
             name: name.into(),
             code,
+            shape: 0,
+            gates: false,
             waves: true,
             activation: Activation::Squareplus,
             floor_digits: FLOOR_DIGITS,
@@ -138,10 +166,13 @@ impl Architecture {
                 && (1..=256).contains(&coupling.bins)
                 && layers.last().is_some_and(|last| last.outputs == self.spline(coupling).raw_count())
                 && layers.iter().enumerate().all(|(index, layer)| {
-                    (1..=4096).contains(&layer.outputs) && layer.beside.is_none_or(|beside| index > 0 && beside < index)
+                    (1..=4096).contains(&layer.outputs)
+                        && layer.beside.is_none_or(|beside| index > 0 && beside < index && !self.gates)
                 })
         };
         self.code <= 256
+            && self.shape <= self.code
+            && (self.code > 0 || !self.gates)
             && (1..=12).contains(&self.floor_digits)
             && (1..=64).contains(&self.couplings.len())
             && self.couplings.iter().all(|coupling| coupling.layers.len() <= 64 && sound(coupling))
@@ -164,7 +195,8 @@ impl Architecture {
     /// The conditioner of a coupling.
     pub fn net(&self, coupling: &Coupling) -> DenseNet {
         let features = coupling.given.iter().map(|&axis| self.feature_count(axis)).sum();
-        DenseNet::new(features, self.code, coupling.layers.clone(), self.activation)
+        let net = DenseNet::new(features, self.code, coupling.layers.clone(), self.activation);
+        if self.gates { net.with_gates() } else { net }
     }
 
     /// Appends what a conditioner sees of one coordinate at `u`.
@@ -189,9 +221,13 @@ impl Architecture {
     }
 }
 
-/// Layers of the paper's conditioner: down to 16 and up again, each way seen beside (see [`DenseNet::unet`]).
+/// Layers of the paper's conditioner, a U-Net without convolutions: 256, 128, 64, 32, 16, and back with skips.
 fn unet_layers(last: usize) -> Vec<Layer> {
-    DenseNet::unet(1, 0, last).layers().to_vec()
+    let plain = |outputs| Layer { outputs, beside: None };
+    let beside = |outputs, index| Layer { outputs, beside: Some(index) };
+    let down = [256, 128, 64, 32, 16].map(plain);
+    let up = [plain(32), beside(64, 3), beside(128, 2), beside(256, 1), plain(last)];
+    down.into_iter().chain(up).collect()
 }
 
 #[cfg(test)]
@@ -208,10 +244,16 @@ mod tests {
         assert_eq!(weights(&Architecture::paper(0)), 815_430);
         assert!(weights(&Architecture::compact(CODE)) < 120_000);
         assert!(Architecture::compact(CODE).is_triangular() && !Architecture::paper(CODE).is_triangular());
+        assert!((200_000..230_000).contains(&weights(&Architecture::shaped(CODE, 102))));
         let mut broken = Architecture::compact(CODE);
         broken.couplings[0].bins += 1;
         assert!(!broken.is_sound());
-        let text = serde_json::to_string(&Architecture::compact(CODE)).unwrap();
-        assert_eq!(serde_json::from_str::<Architecture>(&text).unwrap(), Architecture::compact(CODE));
+        assert!(!Architecture { shape: CODE + 1, ..Architecture::compact(CODE) }.is_sound());
+        assert!(!Architecture { gates: true, ..Architecture::compact(0) }.is_sound());
+        assert!(!Architecture { gates: true, ..Architecture::paper(CODE) }.is_sound());
+        for architecture in [Architecture::compact(CODE), Architecture::shaped(CODE, 102)] {
+            let text = serde_json::to_string(&architecture).unwrap();
+            assert_eq!(serde_json::from_str::<Architecture>(&text).unwrap(), architecture);
+        }
     }
 }

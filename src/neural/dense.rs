@@ -1,50 +1,15 @@
 //! Nets of dense layers with skips, forward and backward on a batch.
 //!
 //! Rows of a batch come in groups that share a code: the code's part of the first layer is computed once a group. A
-//! layer may see the output of an earlier one beside that of the one before it (concatenation, as in a U-Net).
-//! Weights of all layers lie in one slice that the caller owns: per layer a matrix `[inputs][outputs]`, then the bias.
+//! layer may see the output of an earlier one beside that of the one before it (concatenation, as in a U-Net). In a
+//! net with gates codes scale and shift every layer, see [`super::modulation`].
+//! Weights of all layers lie in one slice that the caller owns: per layer a matrix `[inputs][outputs]`, then the bias;
+//! behind them those of the gates.
 
+pub use super::activation::Activation;
+use super::modulation::{Modulation, scale_and_shift};
 use super::product::{Rows, multiply};
 use crate::math::random::SequentialRandom;
-
-/// What stands behind every layer but the last.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Activation {
-    /// `max(x, 0)`, as in the paper.
-    Rectifier,
-    /// `(x + sqrt(x^2 + 1/4)) / 2` (Barron 2021, "Squareplus"): a rectifier with a derivative everywhere.
-    Squareplus,
-}
-
-/// Squareplus bends over about this width, squared.
-const BEND: f32 = 0.25;
-
-impl Activation {
-    fn apply(self, values: &mut [f32]) {
-        match self {
-            Activation::Rectifier => values.iter_mut().for_each(|x| *x = x.max(0.0)),
-            Activation::Squareplus => values.iter_mut().for_each(|x| *x = 0.5 * (*x + (*x * *x + BEND).sqrt())),
-        }
-    }
-
-    /// Multiplies an adjoint by the derivative, given the output.
-    fn pull_back(self, outputs: &[f32], adjoint: &mut [f32]) {
-        match self {
-            Activation::Rectifier => {
-                for (adjoint, &y) in adjoint.iter_mut().zip(outputs) {
-                    *adjoint = if y > 0.0 { *adjoint } else { 0.0 };
-                }
-            }
-            // y (y - x) = BEND / 4, so dy/dx = y / (2 y - x) = y^2 / (y^2 + BEND / 4).
-            Activation::Squareplus => {
-                for (adjoint, &y) in adjoint.iter_mut().zip(outputs) {
-                    *adjoint *= y * y / (y * y + 0.25 * BEND);
-                }
-            }
-        }
-    }
-}
 
 /// One layer: how many outputs, and which earlier layer's output it sees beside its predecessor's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -65,6 +30,8 @@ pub struct DenseNet {
     activation: Activation,
     /// Where the matrix of each layer begins; one more entry at the end.
     offsets: Vec<usize>,
+    /// How codes scale and shift each layer; empty in a net without gates.
+    modulations: Vec<Modulation>,
 }
 
 /// What a forward pass leaves for the backward pass. Reused from batch to batch.
@@ -74,6 +41,9 @@ pub struct Tape {
     codes: Vec<f32>,
     rows_per_group: usize,
     outputs: Vec<Vec<f32>>,
+    /// In a net with gates: products of rows and matrix, and the gates of each group, by layer.
+    products: Vec<Vec<f32>>,
+    gates: Vec<Vec<f32>>,
     adjoints: Vec<Vec<f32>>,
 }
 
@@ -88,7 +58,7 @@ impl DenseNet {
     /// A net of these layers over `features` numbers a row and `code` numbers a group. Panics when a layer looks beside
     /// itself at a layer that does not come before it: a defect of the caller.
     pub fn new(features: usize, code: usize, layers: Vec<Layer>, activation: Activation) -> Self {
-        let mut net = DenseNet { features, code, layers, activation, offsets: vec![0] };
+        let mut net = DenseNet { features, code, layers, activation, offsets: vec![0], modulations: Vec::new() };
         for index in 0..net.layers.len() {
             assert!(net.layers[index].beside.is_none_or(|beside| index > 0 && beside < index));
             let size = (net.inputs(index) + 1) * net.layers[index].outputs;
@@ -97,13 +67,18 @@ impl DenseNet {
         net
     }
 
-    /// The paper's conditioner, a U-Net without convolutions: 256, 128, 64, 32, 16, and back with skips.
-    pub fn unet(features: usize, code: usize, outputs: usize) -> Self {
-        let plain = |outputs| Layer { outputs, beside: None };
-        let beside = |outputs, index| Layer { outputs, beside: Some(index) };
-        let down = [256, 128, 64, 32, 16].map(plain);
-        let up = [plain(32), beside(64, 3), beside(128, 2), beside(256, 1), plain(outputs)];
-        DenseNet::new(features, code, down.into_iter().chain(up).collect(), Activation::Rectifier)
+    /// The same net with gates: codes scale and shift every layer. Panics when a layer looks beside itself or there are
+    /// no codes: a defect of the caller.
+    pub fn with_gates(mut self) -> Self {
+        assert!(self.code > 0 && self.layers.iter().all(|layer| layer.beside.is_none()));
+        let mut end = self.weight_count();
+        for (index, layer) in self.layers.iter().enumerate() {
+            let sees_rows = index > 0 || self.features > 0;
+            let own = Modulation::new(end, self.code, layer.outputs, index > 0, sees_rows);
+            end = own.end();
+            self.modulations.push(own);
+        }
+        self
     }
 
     /// The layers.
@@ -113,7 +88,8 @@ impl DenseNet {
 
     /// How many weights there are.
     pub fn weight_count(&self) -> usize {
-        self.offsets.last().copied().unwrap_or(0)
+        let plain = self.offsets.last().copied().unwrap_or(0);
+        self.modulations.last().map_or(plain, Modulation::end)
     }
 
     /// Multiplications of one row, the code's part not counted.
@@ -140,7 +116,8 @@ impl DenseNet {
         self.layers[index].beside.map_or(0, |beside| self.layers[beside].outputs)
     }
 
-    /// Writes weights to start from: uniform by fan-in (He et al. 2015), the last layer at a tenth of that.
+    /// Writes weights to start from: uniform by fan-in (He et al. 2015), the last layer at a tenth of that. What scales and
+    /// shifts by code begins small.
     pub fn start(&self, weights: &mut [f32], random: &mut SequentialRandom) {
         for index in 0..self.layers.len() {
             let outputs = self.layers[index].outputs;
@@ -152,6 +129,8 @@ impl DenseNet {
             let bias_bound = if last { 0.0 } else { 0.2 };
             bias.iter_mut().for_each(|weight| *weight = bias_bound * (2.0 * random.next_number() - 1.0));
         }
+        let plain = self.offsets[self.layers.len()];
+        weights[plain..].iter_mut().for_each(|weight| *weight = 0.1 * (2.0 * random.next_number() - 1.0));
     }
 
     /// Evaluates rows of `features`, in groups of `rows_per_group` that share a row of `codes`. The result is on the
@@ -166,6 +145,8 @@ impl DenseNet {
         tape.codes.extend_from_slice(codes);
         tape.rows_per_group = rows_per_group;
         tape.outputs.resize_with(self.layers.len(), Vec::new);
+        tape.products.resize_with(self.modulations.len(), Vec::new);
+        tape.gates.resize_with(self.modulations.len(), Vec::new);
         for index in 0..self.layers.len() {
             let width = self.layers[index].outputs;
             let own = &weights[self.offsets[index]..self.offsets[index + 1]];
@@ -180,13 +161,25 @@ impl DenseNet {
                     let codes = Rows::new(&tape.codes, groups, self.code);
                     multiply(codes, Rows::new(of_code, self.code, width), &mut base, true);
                 }
-                if rows > 0 {
+                let features = Rows::new(&tape.features, rows, self.features);
+                if let Some(modulation) = self.modulations.first().filter(|own| own.scales()) {
+                    multiply(features, Rows::new(of_features, self.features, width), into, false);
+                    modulation.gates_of(weights, &tape.codes, &mut tape.gates[0]);
+                    tape.products[0].clone_from(into);
+                    scale_and_shift(into, &tape.gates[0], &base, width);
+                } else if rows > 0 {
                     for (block, base) in into.chunks_exact_mut(rows_per_group * width).zip(base.chunks_exact(width)) {
                         block.chunks_exact_mut(width).for_each(|row| row.copy_from_slice(base));
                     }
+                    multiply(features, Rows::new(of_features, self.features, width), into, true);
                 }
-                let features = Rows::new(&tape.features, rows, self.features);
-                multiply(features, Rows::new(of_features, self.features, width), into, true);
+            } else if let Some(modulation) = self.modulations.get(index) {
+                let size = self.previous(index);
+                multiply(Rows::new(&before[index - 1], rows, size), Rows::new(matrix, size, width), into, false);
+                modulation.gates_of(weights, &tape.codes, &mut tape.gates[index]);
+                tape.products[index].clone_from(into);
+                let shifts = modulation.shifts_of(weights, &tape.codes, bias);
+                scale_and_shift(into, &tape.gates[index], &shifts, width);
             } else {
                 into.chunks_exact_mut(width).for_each(|row| row.copy_from_slice(bias));
                 let (of_previous, of_beside) = matrix.split_at(self.previous(index) * width);
@@ -235,6 +228,10 @@ impl DenseNet {
             if index + 1 < count {
                 self.activation.pull_back(&tape.outputs[index], own);
             }
+            let by_group = self.modulations.get(index).map(|modulation| {
+                let (gates, products) = (&tape.gates[index], &tape.products[index]);
+                modulation.pull_back(weights, &tape.codes, gates, products, own, d_weights, d_codes)
+            });
             let own = Rows::new(own, rows, width);
             let span = self.offsets[index]..self.offsets[index + 1];
             let matrix = &weights[span.clone()];
@@ -253,22 +250,23 @@ impl DenseNet {
             }
             if !d_weights.is_empty() {
                 let bias = span.start + row_of * width..span.end;
-                add_rows(own.values, &mut d_weights[bias]);
+                add_rows(by_group.as_deref().unwrap_or(own.values), &mut d_weights[bias]);
             }
         }
         let width = self.layers[0].outputs;
         if count > 1 {
             self.activation.pull_back(&tape.outputs[0], &mut adjoints[0]);
         }
-        let first = Rows::new(&adjoints[0], rows, width);
         let matrix = &weights[..self.offsets[1]];
         let groups = tape.codes.len().checked_div(self.code).unwrap_or(1);
-        let mut by_group = vec![0.0f32; groups * width];
-        for (block, sum) in
-            first.values.chunks(tape.rows_per_group.max(1) * width).zip(by_group.chunks_exact_mut(width))
-        {
-            add_rows(block, sum);
-        }
+        let by_group = match self.modulations.first().filter(|own| own.scales()) {
+            Some(modulation) => {
+                let (gates, products) = (&tape.gates[0], &tape.products[0]);
+                modulation.pull_back(weights, &tape.codes, gates, products, &mut adjoints[0], d_weights, d_codes)
+            }
+            None => sums_by_group(&adjoints[0], groups, tape.rows_per_group, width),
+        };
+        let first = Rows::new(&adjoints[0], rows, width);
         let code_part = self.features * width..(self.features + self.code) * width;
         let by_group = Rows::new(&by_group, groups, width);
         if !d_weights.is_empty() {
@@ -291,8 +289,17 @@ impl DenseNet {
     }
 }
 
+/// Sums of the rows of each group.
+fn sums_by_group(rows: &[f32], groups: usize, rows_per_group: usize, width: usize) -> Vec<f32> {
+    let mut sums = vec![0.0f32; groups * width];
+    for (block, sum) in rows.chunks(rows_per_group.max(1) * width).zip(sums.chunks_exact_mut(width)) {
+        add_rows(block, sum);
+    }
+    sums
+}
+
 /// Adds every row to `sum`.
-fn add_rows(rows: &[f32], sum: &mut [f32]) {
+pub(super) fn add_rows(rows: &[f32], sum: &mut [f32]) {
     for row in rows.chunks_exact(sum.len()) {
         sum.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
     }
@@ -304,13 +311,15 @@ mod tests {
 
     #[test]
     fn gradients_of_weights_codes_and_features_equal_finite_differences() {
-        let layers = vec![
-            Layer { outputs: 9, beside: None },
-            Layer { outputs: 6, beside: None },
-            Layer { outputs: 8, beside: Some(0) },
-            Layer { outputs: 3, beside: None },
-        ];
-        let net = DenseNet::new(2, 4, layers, Activation::Squareplus);
+        let layers = |beside| -> Vec<Layer> {
+            [(9, None), (6, None), (8, beside), (3, None)].map(|(outputs, beside)| Layer { outputs, beside }).into()
+        };
+        check_gradients(DenseNet::new(2, 4, layers(Some(0)), Activation::Squareplus));
+        check_gradients(DenseNet::new(2, 4, layers(None), Activation::Squareplus).with_gates());
+    }
+
+    /// Gradients of a net of two features, codes of four and three outputs against finite differences.
+    fn check_gradients(net: DenseNet) {
         let mut random = SequentialRandom::new(5);
         let mut numbers = |count: usize| -> Vec<f32> { (0..count).map(|_| random.next_number() - 0.5).collect() };
         let (features, codes, adjoint) = (numbers(6 * 2), numbers(3 * 4), numbers(6 * 3));
@@ -322,6 +331,7 @@ mod tests {
         };
         let mut tape = Tape::default();
         net.forward(&weights, &features, &codes, 2, &mut tape);
+        assert_eq!(tape.result().len(), 6 * 3);
         let (mut d_weights, mut d_codes, mut d_features) =
             (vec![0.0; weights.len()], vec![0.0; codes.len()], vec![0.0; features.len()]);
         net.backward(&weights, &mut tape, &adjoint, &mut d_weights, &mut d_codes, Some(&mut d_features));
@@ -338,11 +348,5 @@ mod tests {
         check(&weights, &d_weights, &|weights| objective(weights, &features, &codes));
         check(&codes, &d_codes, &|codes| objective(&weights, &features, codes));
         check(&features, &d_features, &|features| objective(&weights, features, &codes));
-    }
-
-    #[test]
-    fn the_papers_conditioner_has_the_papers_size() {
-        assert_eq!(6 * DenseNet::unet(2, 0, 17).weight_count(), 815_430);
-        assert_eq!(6 * DenseNet::unet(2, 16, 17).weight_count(), 840_006);
     }
 }

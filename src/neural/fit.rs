@@ -160,32 +160,58 @@ pub(crate) fn nearest_codes(library: &Trained, table: &MeasuredBrdf, seed: u64) 
     }))
 }
 
-/// For each channel the nearest codes of the library: the nearest in the first lobe, the next ones fainter behind it.
+/// The nearest codes of the library: the nearest in the first lobe, next ones fainter behind it. For each channel a row of
+/// its own, where codes have no part that the channels share; otherwise rows of the nearest material.
 fn start(model: &FlowModel, sample: &Sample) -> (Vec<f64>, [usize; 3]) {
     let trained = model.trained();
-    let length = trained.account.architecture.code;
-    let rows = trained.log_colours.len();
+    let architecture = &trained.account.architecture;
+    let (length, rows) = (architecture.code, trained.log_colours.len());
     let mut parameters = model.start();
     let mut from = [0; 3];
     if length == 0 || rows == 0 {
         return (parameters, from);
     }
     let densities = log_densities(&trained.flow, &trained.codes, rows, &sample.columns);
-    for channel in 0..3 {
-        let ranked = sample.ranked(&densities, channel);
-        from[channel] = ranked[0].2;
-        for lobe in 0..model.lobes() {
-            // The best codes are often twins, channels of one material: go further down the list for later lobes.
-            let (_, colour, row) = ranked[(7 * lobe).min(ranked.len() - 1)];
-            let slot = (3 * lobe + channel) * length;
-            for (value, &code) in parameters[slot..slot + length].iter_mut().zip(&trained.codes[row * length..]) {
-                *value = f64::from(code);
-            }
-            let fainter = if lobe == 0 { 0.0 } else { -1.5 };
-            parameters[model.code_parameters() + 3 * lobe + channel] = colour + fainter;
+    let ranked = [0, 1, 2].map(|channel| sample.ranked(&densities, channel));
+    let materials = if architecture.shape > 0 { nearest_materials(&ranked) } else { Vec::new() };
+    for lobe in 0..model.lobes() {
+        // The best codes are often twins, channels of one material: go further down the list for later lobes.
+        let place = 7 * lobe;
+        let of_channel = |channel: usize| -> (f64, usize) {
+            let ranked = &ranked[channel];
+            let within = materials.get(place.min(materials.len().max(1) - 1));
+            let own = within.and_then(|&material| ranked.iter().find(|row| row.2 / 3 == material));
+            let (_, colour, row) = *own.unwrap_or(&ranked[place.min(ranked.len() - 1)]);
+            (colour, row)
+        };
+        let nearest = [0, 1, 2].map(of_channel);
+        let code = |channel: usize| &trained.codes[nearest[channel].1 * length..][..length];
+        model.code_rows().set_lobe(lobe, code, &mut parameters);
+        let fainter = if lobe == 0 { 0.0 } else { -1.5 };
+        for channel in 0..3 {
+            parameters[model.code_parameters() + 3 * lobe + channel] = nearest[channel].0 + fainter;
+        }
+        if lobe == 0 {
+            from = nearest.map(|(_, row)| row);
         }
     }
     (parameters, from)
+}
+
+/// Materials by the sum of the errors of the channels, each by the material's best row, the nearest first.
+fn nearest_materials(ranked: &[Vec<(f64, f64, usize)>; 3]) -> Vec<usize> {
+    let count = ranked[0].len() / 3;
+    let mut errors: Vec<(f64, usize)> = (0..count).map(|material| (0.0, material)).collect();
+    for rows in ranked {
+        let mut seen = vec![false; count];
+        for &(error, _, row) in rows.iter().filter(|row| row.2 / 3 < count) {
+            if !std::mem::replace(&mut seen[row / 3], true) {
+                errors[row / 3].0 += error;
+            }
+        }
+    }
+    errors.sort_by(|a, b| a.0.total_cmp(&b.0));
+    errors.into_iter().map(|(_, material)| material).collect()
 }
 
 /// Adam from a start; returns the best parameters seen and their objective.
@@ -231,7 +257,7 @@ fn descend(model: &FlowModel, sample: &Sample, start: Vec<f64>, settings: &FlowF
         }
         let mut d_codes = vec![0.0f32; codes.len()];
         pull_back_codes(flow, &codes, groups, &sample.columns, &adjoint, &mut d_codes);
-        gradient.iter_mut().zip(&d_codes).for_each(|(slot, &own)| *slot = f64::from(own));
+        model.code_rows().add_slopes(&d_codes, &mut gradient);
         let wave = 0.5 * (1.0 + (std::f64::consts::PI * step as f64 / settings.steps as f64).cos());
         let (one, two) = (1.0 - 0.9f64.powi(step as i32 + 1), 1.0 - 0.99f64.powi(step as i32 + 1));
         for index in 0..count {

@@ -17,11 +17,13 @@
 //! neither keeps energy by construction, so albedo is measured ([`sampler::HalfVectorSampler::albedos`]), not promised.
 //! What ships was learned from "MERL via neural fits", not from MERL.
 
+pub mod activation;
 pub mod adam;
 pub mod architecture;
 pub mod batch;
 pub mod between;
 pub mod cells;
+pub mod code_rows;
 pub mod columns;
 pub mod dense;
 pub mod embedding;
@@ -30,6 +32,7 @@ pub mod flow;
 pub mod library;
 pub mod lobes;
 pub mod model;
+pub mod modulation;
 pub mod nodes;
 pub mod pass;
 pub mod product;

@@ -5,11 +5,12 @@
 //! [`FlowModel::interpolation_error`] and small beside the error of any fit. Who needs exact values asks
 //! [`FlowModel::exact`] or, for whole tables, [`FlowModel::table`].
 //!
-//! Parameters: per lobe three codes (red, green, blue), then per lobe three logarithms of colours.
+//! Parameters: per lobe its shape if there is one and three codes (red, green, blue), see [`super::code_rows`]; then per
+//! lobe three logarithms of colours.
 
+use super::code_rows::CodeRows;
 use super::lobes::{CubeColumns, log_densities, pull_back_codes, stored_value};
 use super::nodes::GridShape;
-use super::train::project_to_ball;
 use super::warp::{AZIMUTH, DIFFERENCE, HALF, to_cube};
 use super::weights::Trained;
 use crate::measured::coordinates::HalfDifference;
@@ -20,9 +21,6 @@ use crate::measured::model::ReflectanceModel;
 use crate::measured::table::{CHANNEL_SCALE, INVALID, MeasuredBrdf};
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
-
-/// Codes may leave the unit ball by this factor: the released code's allowance on estimation.
-const BALL: f64 = 1.01;
 
 /// What was decoded last: parameters, and `log(1 + stored value)` at each node.
 type Decoded = Arc<(Vec<f64>, Vec<[f32; 3]>)>;
@@ -62,27 +60,21 @@ impl FlowModel {
         self.lobes
     }
 
-    fn code_length(&self) -> usize {
-        self.trained.account.architecture.code
+    /// How parameters become the rows of codes of the flow.
+    pub(super) fn code_rows(&self) -> CodeRows {
+        CodeRows::of(&self.trained.account.architecture, self.lobes)
     }
 
     /// How many of the parameters are codes; the rest are logarithms of colours, three a lobe.
     pub fn code_parameters(&self) -> usize {
-        3 * self.lobes * self.code_length()
+        self.code_rows().parameters()
     }
 
     /// Codes within the ball, a row for each lobe and channel, and the logarithms of the colours.
     pub(super) fn unpack(&self, parameters: &[f64]) -> (Vec<f32>, Vec<f64>) {
-        let (codes, colours) = parameters.split_at(self.code_parameters().min(parameters.len()));
-        let mut codes: Vec<f32> = codes.iter().map(|&value| value as f32).collect();
-        if self.code_length() > 0 {
-            codes.chunks_mut(self.code_length()).for_each(|code| {
-                code.iter_mut().for_each(|value| *value /= BALL as f32);
-                project_to_ball(code);
-                code.iter_mut().for_each(|value| *value *= BALL as f32);
-            });
-        }
-        (codes, colours.iter().map(|colour| if colour.is_finite() { colour.clamp(-30.0, 10.0) } else { 0.0 }).collect())
+        let colours = parameters[self.code_parameters()..].iter();
+        let held = |&colour: &f64| if colour.is_finite() { colour.clamp(-30.0, 10.0) } else { 0.0 };
+        (self.code_rows().rows(parameters), colours.map(held).collect())
     }
 
     /// Parameters that give a material of the library back: its codes in the first lobe, the others dark.
@@ -91,11 +83,8 @@ impl FlowModel {
         let mut parameters = vec![0.0; self.parameter_count()];
         let from = self.code_parameters();
         for lobe in 0..self.lobes {
+            self.code_rows().set_lobe(lobe, |channel| codes[channel], &mut parameters);
             for channel in 0..3 {
-                let row = (3 * lobe + channel) * self.code_length();
-                for (slot, &value) in parameters[row..row + self.code_length()].iter_mut().zip(codes[channel]) {
-                    *slot = f64::from(value);
-                }
                 let dark = if lobe == 0 { 0.0 } else { -20.0 };
                 parameters[from + 3 * lobe + channel] = f64::from(colours[channel]) + dark;
             }
@@ -167,7 +156,7 @@ impl FlowModel {
         }
         let mut d_codes = vec![0.0f32; codes.len()];
         pull_back_codes(&self.trained.flow, &codes, groups, &columns, &adjoint, &mut d_codes);
-        gradient.iter_mut().zip(&d_codes).for_each(|(sum, &own)| *sum += f64::from(own));
+        self.code_rows().add_slopes(&d_codes, gradient);
     }
 
     /// Exact reflectance in 1/sr at each point, no grid between: slow, a net for each point.
@@ -302,7 +291,10 @@ impl ReflectanceModel for FlowModel {
 
     fn project(&self, parameters: &mut [f64]) {
         let (codes, colours) = self.unpack(parameters);
-        let all = codes.iter().map(|&value| f64::from(value)).chain(colours);
-        parameters.iter_mut().zip(all).for_each(|(slot, value)| *slot = value);
+        let (rows, from, length) = (self.code_rows(), self.code_parameters(), self.trained.account.architecture.code);
+        for lobe in 0..self.lobes {
+            rows.set_lobe(lobe, |channel| &codes[(3 * lobe + channel) * length..][..length], parameters);
+        }
+        parameters[from..].iter_mut().zip(colours).for_each(|(slot, value)| *slot = value);
     }
 }

@@ -1,7 +1,8 @@
 //! Files of weights: safetensors with an account of how they were made.
 //!
-//! Tensors: `weights` (all conditioners, one after the other), `codes` (row per material and channel), `log_colours`
-//! (one a row), and in a checkpoint the moments of Adam. The account is JSON under the key `patina` of the metadata.
+//! Tensors: `weights` (all conditioners, one after the other), `codes` (row per material and channel), `shapes` (row per
+//! material, where codes have a part that its channels share), `log_colours` (one a row), and in a checkpoint the moments
+//! of Adam. The account is JSON under the key `patina` of the metadata.
 
 use super::adam::Adam;
 use super::architecture::Architecture;
@@ -53,7 +54,7 @@ pub struct Trained {
     pub account: Account,
     /// The flow.
     pub flow: Flow,
-    /// A row per material and channel, channels fastest.
+    /// A row per material and channel, channels fastest; its last numbers are the material's shape, if there is one.
     pub codes: Vec<f32>,
     /// The colour of each density, as a logarithm.
     pub log_colours: Vec<f32>,
@@ -112,13 +113,36 @@ pub fn write(path: &Path, account: &Account, training: &Training, log_colours: &
 /// A tensor to be written: name, shape, bytes.
 type Part = (&'static str, Vec<usize>, Vec<u8>);
 
-/// What every file of weights holds.
+/// What every file of weights holds. The part of codes that the channels of a material share is written once.
 fn parts_of(account: &Account, flow: &Flow, codes: &[f32], log_colours: &[f32]) -> Vec<Part> {
-    vec![
-        ("weights", vec![flow.weights.len()], bytes(&flow.weights)),
-        ("codes", vec![log_colours.len(), account.architecture.code], bytes(codes)),
-        ("log_colours", vec![log_colours.len()], bytes(log_colours)),
-    ]
+    let (rows, length, shape) = (log_colours.len(), account.architecture.code, account.architecture.shape);
+    let own = length - shape;
+    let mut parts = vec![("weights", vec![flow.weights.len()], bytes(&flow.weights))];
+    if shape > 0 {
+        let of_channels: Vec<f32> = codes.chunks_exact(length).flat_map(|row| row[..own].to_vec()).collect();
+        let shared: Vec<f32> = codes.chunks_exact(length).step_by(3).flat_map(|row| row[own..].to_vec()).collect();
+        parts.push(("codes", vec![rows, own], bytes(&of_channels)));
+        parts.push(("shapes", vec![rows / 3, shape], bytes(&shared)));
+    } else {
+        parts.push(("codes", vec![rows, length], bytes(codes)));
+    }
+    parts.push(("log_colours", vec![rows], bytes(log_colours)));
+    parts
+}
+
+/// The codes of a file, a whole row for each material and channel.
+fn codes_of(tensors: &SafeTensors, architecture: &Architecture, materials: usize) -> Result<Vec<f32>> {
+    let (shape, own) = (architecture.shape, architecture.code - architecture.shape);
+    let codes = numbers(tensors, "codes", 3 * materials * own)?;
+    if shape == 0 {
+        return Ok(codes);
+    }
+    let shapes = numbers(tensors, "shapes", materials * shape)?;
+    let row = |index: usize| {
+        let of_channel = &codes[index * own..(index + 1) * own];
+        of_channel.iter().chain(&shapes[index / 3 * shape..(index / 3 + 1) * shape]).copied()
+    };
+    Ok((0..3 * materials).flat_map(row).collect())
 }
 
 /// Writes tensors with their account; whole or not at all.
@@ -180,7 +204,7 @@ impl Trained {
         let mut flow = Flow::new(account.architecture.clone(), 0)?;
         flow.weights = numbers(&tensors, "weights", flow.weights.len())?;
         let rows = 3 * account.materials.len();
-        let codes = numbers(&tensors, "codes", rows * account.architecture.code)?;
+        let codes = codes_of(&tensors, &account.architecture, account.materials.len())?;
         let log_colours = numbers(&tensors, "log_colours", rows)?;
         Ok(Trained { account, flow, codes, log_colours })
     }

@@ -191,7 +191,9 @@ pub fn fit_own_net(library: &Trained, table: &MeasuredBrdf, settings: &OwnNetSet
 fn start(library: &Trained, table: &MeasuredBrdf, settings: &OwnNetSettings) -> Result<Trained> {
     let length = library.account.architecture.code;
     let nearest = crate::neural::fit::nearest_codes(library, table, settings.seed)?;
-    let architecture = Architecture { floor_digits: settings.floor_digits, ..library.account.architecture.clone() };
+    // Each channel has a code to itself, shape included.
+    let floor_digits = settings.floor_digits;
+    let architecture = Architecture { floor_digits, shape: 0, ..library.account.architecture.clone() };
     let mut own = Trained { codes: Vec::new(), log_colours: Vec::new(), ..library.clone() };
     own.account.materials = vec!["fitted".into()];
     own.account.architecture = architecture.clone();
