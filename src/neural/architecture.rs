@@ -178,6 +178,11 @@ impl Architecture {
             && self.couplings.iter().all(|coupling| coupling.layers.len() <= 64 && sound(coupling))
     }
 
+    /// Lobes with which a table is represented by 153 numbers: one where codes hold a shape, three of codes alone.
+    pub fn usual_lobes(&self) -> usize {
+        if self.shape > 0 { 1 } else { 3 }
+    }
+
     /// The spline of a coupling.
     pub fn spline(&self, coupling: &Coupling) -> SplineShape {
         SplineShape { bins: coupling.bins, periodic: coupling.periodic, floor_digits: self.floor_digits }

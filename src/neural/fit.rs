@@ -5,6 +5,7 @@
 //! its single start at a code of zero is replaced by starts from the codes of the library that come nearest. Channels
 //! share nothing, so each has its own best start.
 
+use super::architecture::Architecture;
 use super::cells::{counted_in_column, log_stored};
 use super::lobes::{CubeColumns, log_densities, pull_back_codes, stored_value};
 use super::model::FlowModel;
@@ -37,6 +38,16 @@ pub struct FlowFitSettings {
 impl Default for FlowFitSettings {
     fn default() -> Self {
         FlowFitSettings { columns: 240, per_column: 20, steps: 250, code_rate: 0.03, colour_rate: 0.05, seed: 1 }
+    }
+}
+
+impl FlowFitSettings {
+    /// Settings that suit a flow: a shape has more numbers to find than codes alone.
+    pub fn of(architecture: &Architecture) -> Self {
+        match architecture.shape {
+            0 => Self::default(),
+            _ => FlowFitSettings { columns: 320, steps: 500, ..Self::default() },
+        }
     }
 }
 

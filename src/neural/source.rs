@@ -24,7 +24,7 @@ pub struct NamedTable {
 
 /// The reflectance that `source` names: a `.binary` file, the result folder of `patina object`, with `library` a
 /// material of this folder of neural fits of MERL, and otherwise a material of the neural model's own library, given by
-/// its codes. `weights` are those that ship when not given.
+/// its codes. `weights` are the shaped ones that ship when not given.
 ///
 /// # Errors
 /// Files that cannot be read, a name that is nowhere.
@@ -44,7 +44,7 @@ pub fn read(source: &str, library: Option<&Path>, weights: Option<&Path>) -> Res
         let table = NeuralFits::read(library)?.find(source)?.table();
         return Ok(NamedTable { name: source.into(), table, origin: "neural fit of a measurement" });
     }
-    let trained = Arc::new(weights.map_or_else(super::shipped, Trained::read)?);
+    let trained = Arc::new(weights.map_or_else(super::shaped, Trained::read)?);
     let model = FlowModel::new(Arc::clone(&trained), 1);
     let parameters = model.of_material(source).ok_or_else(|| {
         Error::new(ErrorKind::Missing, format!("the neural model has no material {source}, and no file is called so"))
@@ -60,7 +60,7 @@ mod tests {
 
     #[test]
     fn a_name_a_file_and_a_folder_are_told_apart() {
-        let trained = super::super::shipped().unwrap();
+        let trained = super::super::shaped().unwrap();
         let material = trained.account.materials[0].clone();
         let own = read(&material, None, None).unwrap();
         assert_eq!((own.name.as_str(), own.origin), (material.as_str(), "codes of the neural model"));

@@ -36,6 +36,7 @@ mod measured_tables;
 mod neural_energy;
 mod neural_hard;
 mod neural_model;
+mod neural_shaped;
 mod object_cli;
 mod object_flow;
 mod object_joint;

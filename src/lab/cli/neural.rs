@@ -104,9 +104,15 @@ pub struct CodesOptions {
     /// File of weights; those that come with the program when not given.
     #[arg(long)]
     pub weights: Option<PathBuf>,
-    /// Lobes, 1 to 3.
-    #[arg(long, default_value_t = 3)]
-    pub lobes: usize,
+    /// Take the weights with a shape a material that come with the program.
+    #[arg(long, conflicts_with = "weights")]
+    pub shaped: bool,
+    /// Take the weights that come with the program for studies of materials left out.
+    #[arg(long, conflicts_with = "weights")]
+    pub left_out: bool,
+    /// Lobes, 1 to 3; when not given, one of shaped weights and three of others.
+    #[arg(long)]
+    pub lobes: Option<usize>,
     /// Table of errors to write.
     #[arg(short, long)]
     pub output: Option<PathBuf>,
@@ -220,17 +226,24 @@ fn embedding(options: &EmbeddingOptions, json: bool) -> Result<()> {
 const BETWEEN_NODES_STRIDE: usize = 301;
 
 fn codes(options: &CodesOptions, json: bool) -> Result<()> {
-    if !(1..=3).contains(&options.lobes) {
-        return Err(unknown("lobes", format!("{} lobes are not fitted", options.lobes), "take 1, 2 or 3"));
+    let shipped = match (options.shaped, options.left_out) {
+        (false, false) => crate::neural::shipped,
+        (false, true) => crate::neural::shipped_leave_out,
+        (true, false) => crate::neural::shaped,
+        (true, true) => crate::neural::shaped_leave_out,
+    };
+    let trained = Arc::new(options.weights.as_deref().map_or_else(shipped, Trained::read)?);
+    let lobes = options.lobes.unwrap_or_else(|| trained.account.architecture.usual_lobes());
+    if !(1..=3).contains(&lobes) {
+        return Err(unknown("lobes", format!("{lobes} lobes are not fitted"), "take 1, 2 or 3"));
     }
-    let trained = Arc::new(weights(options.weights.as_deref())?);
-    let model = FlowModel::with(Arc::clone(&trained), options.lobes, GridShape::default());
+    let model = FlowModel::with(Arc::clone(&trained), lobes, GridShape::default());
     let mut rows = String::from(
         "material,trained_on,log_rmse,log10_rmse,cosine_rmse,library_log_rmse,largest_albedo,between_nodes_log_rmse\n",
     );
     let (mut errors, mut between, mut bright) = (Vec::new(), Vec::new(), 0usize);
     let mut one = |name: &str, table: &MeasuredBrdf| -> Result<()> {
-        let found = fit_table(&model, table, &FlowFitSettings::default())?;
+        let found = fit_table(&model, table, &FlowFitSettings::of(&trained.account.architecture))?;
         let own = match model.of_material(name) {
             Some(parameters) => crate::measured::metrics::table_error(&model.table(&parameters), table)?.log_rmse,
             None => f64::NAN,

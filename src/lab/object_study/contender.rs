@@ -11,12 +11,15 @@ use crate::neural::fit::{FlowFitSettings, fit_table};
 use crate::neural::{FlowModel, Trained};
 use std::sync::Arc;
 
-/// Lobes of the neural model.
-pub(super) const LOBES: usize = 3;
 /// Name of the neural model that was trained on all materials.
 pub(super) const SEEN: &str = "iBRDF";
 /// Name of the neural model on materials it has not seen.
 pub(super) const LEFT_OUT: &str = "iBRDF, left out";
+
+/// Name of the shaped weights that were trained on all materials.
+pub(super) const SHAPED: &str = "iBRDF, shaped";
+/// Name of shaped weights on materials they have not seen.
+pub(super) const SHAPED_LEFT_OUT: &str = "iBRDF, shaped, left out";
 
 /// Name of further weights on materials they have not seen: their size and what they were trained on.
 pub(super) fn name_of_left_out(trained: &Trained) -> String {
@@ -49,10 +52,10 @@ impl Contender {
     pub fn fit(&self, table: &MeasuredBrdf, quick: bool) -> Result<(usize, TableError)> {
         match self {
             Contender::Flow(_, trained) => {
-                let model = FlowModel::new(Arc::clone(trained), LOBES);
+                let model = FlowModel::new(Arc::clone(trained), trained.account.architecture.usual_lobes());
                 let settings = match quick {
                     true => FlowFitSettings { columns: 120, steps: 120, ..FlowFitSettings::default() },
-                    false => FlowFitSettings::default(),
+                    false => FlowFitSettings::of(&trained.account.architecture),
                 };
                 let found = fit_table(&model, table, &settings)?;
                 Ok((model.parameter_count(), found.error))

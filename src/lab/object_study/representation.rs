@@ -10,7 +10,7 @@
 //! together, which is harder.
 
 use super::StudyOptions;
-use super::contender::{Contender, LEFT_OUT, LOBES, SEEN, name_of_left_out};
+use super::contender::{Contender, LEFT_OUT, SEEN, SHAPED, SHAPED_LEFT_OUT, name_of_left_out};
 use crate::error::Result;
 use crate::image::file;
 use crate::insight::report::number::fixed;
@@ -51,10 +51,14 @@ impl Representation {
         let fits = NeuralFits::read(&options.library)?;
         let left_out_model = Arc::new(options.trained()?);
         let shipped = Arc::new(crate::neural::shipped()?);
+        let shaped = Arc::new(crate::neural::shaped()?);
+        let shaped_left_out = Arc::new(crate::neural::shaped_leave_out()?);
         let mut contenders = vec![
             (Contender::OwnNet(Arc::clone(&shipped)), None),
             (Contender::Flow(SEEN.into(), shipped), None),
             (Contender::Flow(LEFT_OUT.into(), Arc::clone(&left_out_model)), Some(left_out_model)),
+            (Contender::Flow(SHAPED.into(), shaped), None),
+            (Contender::Flow(SHAPED_LEFT_OUT.into(), Arc::clone(&shaped_left_out)), Some(shaped_left_out)),
         ];
         for path in &options.leave_out_weights {
             let trained = Arc::new(Trained::read(path)?);
@@ -149,8 +153,8 @@ pub fn write(lines: &[&CaseLine], share: &str, folder: &Path, stem: &str) -> Res
     text += &format!(
         "\nlog-RMSE in natural logarithms of stored values over all cells that count. \"{}\": all weights of a flow \
          fitted to each material, from those that ship on. \"{SEEN}\": weights trained on all \
-         materials of the library, codes and colours of {LOBES} lobes fitted to each. \"{LEFT_OUT}\": weights that saw \
-         none of {}. {}\n",
+         materials of the library, codes and colours of three lobes fitted to each. \"{SHAPED}\": the same of weights \
+         with a shape a material, one lobe. \"{LEFT_OUT}\" and \"{SHAPED_LEFT_OUT}\": weights that saw none of {}. {}\n",
         own_net::NAME,
         left_out.join(", "),
         crate::measured::fits::DATA_STATEMENT
