@@ -20,6 +20,8 @@ const OF_DIELECTRICS: f64 = 0.2;
 /// Standard deviation of the logarithm of a surface's mean reflectance: from a twelfth to one and a half around the mean that
 /// is held.
 const OF_REFLECTANCE: f64 = 0.6;
+/// A smaller share of the surface does not speak for all of it: what else is seen may as well be right as it is.
+const MAJORITY: f64 = 0.5;
 /// Logarithms of a factor that are less than this are left: no map shows them.
 const LEAST: f32 = 0.01;
 /// The share of reflectances that the bound of 1 holds for.
@@ -42,6 +44,7 @@ impl LightScale {
             |own: &&&Material<f32>| own.log_width < NARROW.ln() && own.specular.iter().sum::<f32>() < 3.0 * METAL;
         let dielectrics: Vec<&Material<f32>> = seen.iter().filter(is_dielectric).copied().collect();
         let share = dielectrics.len() as f64 / seen.len().max(1) as f64;
+        let share = if share < MAJORITY { 0.0 } else { share };
         // Told by a part of the surface, the factor of all is known less well.
         let (told, held) = (share / OF_DIELECTRICS.powi(2), OF_REFLECTANCE.powi(-2));
         let factor = [0, 1, 2].map(|c| {
