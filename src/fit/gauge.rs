@@ -54,7 +54,7 @@ impl GaugeRule {
             GaugeRule::StartAndHighlights => {
                 "Diffuse surface does not tell how bright the light is that it is seen under. The scale between reflectance and \
                  light, and the light's colour, are those under which what is no metal has the F0 of common dielectrics, \
-                 0.04 and grey, as far as photos show narrow highlights; without any, they stay near the start, a mean \
+                 0.04 and grey, if most of the surface shows narrow highlights; else they stay near the start, a mean \
                  reflectance of 0.5. Read the scale-aligned scores."
             }
         }

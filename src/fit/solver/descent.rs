@@ -61,7 +61,7 @@ pub struct Descended {
     pub precision: Vec<Lanes>,
     /// Squared errors of unclipped pixels in units of the photos.
     pub errors: ErrorSums,
-    /// What light and reflectances were scaled by at the end; `None` where that was known.
+    /// What light and reflectances were scaled by at the end, and how well that is known; `None` without a light to find.
     pub scale: Option<LightScale>,
     /// The light by then.
     pub light: Vec<[f32; 3]>,
