@@ -209,7 +209,7 @@ mod tests {
     fn largest_f0(material: &Value) -> f32 {
         let ior = material["extensions"]["KHR_materials_ior"]["ior"].as_f64().unwrap();
         let factor = material["extensions"]["KHR_materials_specular"]["specularColorFactor"][0].as_f64().unwrap();
-        (((ior - 1.0) / (ior + 1.0)).powi(2) * factor) as f32
+        (super::super::asset::f0_of(ior) * factor) as f32
     }
 
     #[test]

@@ -140,11 +140,11 @@ mod tests {
     use crate::neural::architecture::{Architecture, CODE};
     use crate::neural::flow::FlowTape;
 
-    #[test]
-    fn columns_give_the_densities_and_gradients_of_the_general_path() {
-        let mut flow = Flow::new(Architecture::triangular(CODE, "test", 24, 2), 4).unwrap();
-        let mut random = SequentialRandom::new(1);
-        flow.weights.iter_mut().for_each(|weight| *weight += 0.3 * (random.next_number() - 0.5));
+    /// Densities of a path, and their gradients by weights and by codes.
+    type Found = (Vec<f64>, Vec<f32>, Vec<f32>);
+
+    /// What two groups of these codes are given by the general path and by columns.
+    fn by_both_paths(flow: &Flow, codes: &[f32], random: &mut SequentialRandom) -> [Found; 2] {
         let nest = Nest { azimuths: 3, differences: 2, halves: 5 };
         let groups = 2;
         let mut numbers = |count: usize| -> Vec<f64> { (0..count).map(|_| f64::from(random.next_number())).collect() };
@@ -153,25 +153,47 @@ mod tests {
             differences: numbers(groups * 6),
             halves: numbers(groups * nest.points()),
         };
-        let codes: Vec<f32> = numbers(groups * CODE).into_iter().map(|u| u as f32 - 0.5).collect();
         let adjoint = numbers(groups * nest.points());
-        let mut points: Vec<[f64; 3]> = at
-            .halves
-            .iter()
-            .enumerate()
-            .map(|(index, &half)| [half, at.differences[index / 5], at.azimuths[index / 10]])
-            .collect();
+        let points = at.halves.iter().enumerate();
+        let mut points: Vec<[f64; 3]> =
+            points.map(|(index, &half)| [half, at.differences[index / 5], at.azimuths[index / 10]]).collect();
+        let zeros = || (vec![0.0; flow.weights.len()], vec![0.0; codes.len()]);
+
         let mut tape = FlowTape::default();
-        let general = flow.forward(&mut points, &codes, nest.points(), &mut tape);
-        let (mut d_weights, mut d_codes) = (vec![0.0; flow.weights.len()], vec![0.0; codes.len()]);
+        let general = flow.forward(&mut points, codes, nest.points(), &mut tape);
+        let (mut d_weights, mut d_codes) = zeros();
         flow.backward(&mut tape, &adjoint, &mut d_weights, &mut d_codes);
         let mut tape = ColumnTape::default();
-        let fast = flow.columns(&codes, nest, &at, &mut tape);
-        assert!(general.iter().zip(&fast).all(|(a, b)| (a - b).abs() < 1e-4));
-        assert!(general.iter().any(|value| value.abs() > 0.2));
-        let (mut d_weights_fast, mut d_codes_fast) = (vec![0.0; flow.weights.len()], vec![0.0; codes.len()]);
+        let fast = flow.columns(codes, nest, &at, &mut tape);
+        let (mut d_weights_fast, mut d_codes_fast) = zeros();
         flow.columns_backward(nest, &at, &mut tape, &adjoint, &mut d_weights_fast, &mut d_codes_fast);
+        [(general, d_weights, d_codes), (fast, d_weights_fast, d_codes_fast)]
+    }
+
+    #[test]
+    fn columns_give_the_densities_and_gradients_of_the_general_path() {
+        let mut flow = Flow::new(Architecture::triangular(CODE, "test", 24, 2), 4).unwrap();
+        let mut random = SequentialRandom::new(1);
+        flow.weights.iter_mut().for_each(|weight| *weight += 0.3 * (random.next_number() - 0.5));
+        let codes: Vec<f32> = (0..2 * CODE).map(|_| random.next_number() - 0.5).collect();
+        let [general, fast] = by_both_paths(&flow, &codes, &mut random);
+        assert!(general.0.iter().zip(&fast.0).all(|(a, b)| (a - b).abs() < 1e-4));
+        assert!(general.0.iter().any(|value| value.abs() > 0.2));
         let close = |a: &[f32], b: &[f32]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 2e-3 * (1.0 + a.abs()));
-        assert!(close(&d_weights, &d_weights_fast) && close(&d_codes, &d_codes_fast));
+        assert!(close(&general.1, &fast.1) && close(&general.2, &fast.2));
+    }
+
+    #[test]
+    fn of_the_shaped_weights_that_ship_as_well() {
+        let trained = crate::neural::shaped().unwrap();
+        let codes = &trained.codes[..2 * trained.flow.architecture().code];
+        let [general, fast] = by_both_paths(&trained.flow, codes, &mut SequentialRandom::new(1));
+        assert!(general.0.iter().zip(&fast.0).all(|(a, b)| (a - b).abs() < 1e-3), "{general:?} {fast:?}");
+        // Gradients of single weights are large where knots are close to each other.
+        let close = |a: &[f32], b: &[f32]| {
+            let largest = a.iter().fold(0.0f32, |most, value| most.max(value.abs()));
+            largest > 0.0 && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 2e-3 * largest)
+        };
+        assert!(close(&general.1, &fast.1) && close(&general.2, &fast.2));
     }
 }

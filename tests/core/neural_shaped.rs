@@ -6,8 +6,6 @@ use glam::DVec3;
 use patina::math::random::SequentialRandom;
 use patina::measured::{HalfDifference, ReflectanceModel};
 use patina::neural::architecture::{Architecture, CODE};
-use patina::neural::columns::{ColumnTape, Nest, NestPoints};
-use patina::neural::flow::FlowTape;
 use patina::neural::weights::Trained;
 use patina::neural::{FlowModel, shaped, shaped_leave_out, shipped_leave_out};
 use std::f64::consts::TAU;
@@ -71,39 +69,6 @@ fn a_shaped_flow_is_an_invertible_map_by_the_fast_path_and_the_general_one() {
         let mass = trained.flow.log_density(&cube, code).iter().map(|log| log.exp()).sum::<f64>() / cube.len() as f64;
         assert!((mass - 1.0).abs() < 2e-2, "{name}: {mass}");
     }
-}
-
-#[test]
-fn columns_of_a_shaped_flow_give_the_densities_and_gradients_of_the_general_path() {
-    let mut trained = shaped().unwrap();
-    let flow = &mut trained.flow;
-    let mut random = SequentialRandom::new(1);
-    let nest = Nest { azimuths: 3, differences: 2, halves: 5 };
-    let groups = 2;
-    let mut numbers = |count: usize| -> Vec<f64> { (0..count).map(|_| f64::from(random.next_number())).collect() };
-    let at = NestPoints {
-        azimuths: numbers(groups * 3),
-        differences: numbers(groups * 6),
-        halves: numbers(groups * nest.points()),
-    };
-    let codes = &trained.codes[..groups * (CODE + SHAPE)];
-    let adjoint = numbers(groups * nest.points());
-    let mut points: Vec<[f64; 3]> =
-        at.halves.iter().enumerate().map(|(i, &half)| [half, at.differences[i / 5], at.azimuths[i / 10]]).collect();
-    let mut tape = FlowTape::default();
-    let general = flow.forward(&mut points, codes, nest.points(), &mut tape);
-    let (mut d_weights, mut d_codes) = (vec![0.0; flow.weights.len()], vec![0.0; codes.len()]);
-    flow.backward(&mut tape, &adjoint, &mut d_weights, &mut d_codes);
-    let mut tape = ColumnTape::default();
-    let fast = flow.columns(codes, nest, &at, &mut tape);
-    assert!(general.iter().zip(&fast).all(|(a, b)| (a - b).abs() < 1e-3), "{general:?} {fast:?}");
-    let (mut d_weights_fast, mut d_codes_fast) = (vec![0.0; flow.weights.len()], vec![0.0; codes.len()]);
-    flow.columns_backward(nest, &at, &mut tape, &adjoint, &mut d_weights_fast, &mut d_codes_fast);
-    let close = |a: &[f32], b: &[f32]| {
-        let largest = a.iter().fold(0.0f32, |most, value| most.max(value.abs()));
-        largest > 0.0 && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 2e-3 * largest)
-    };
-    assert!(close(&d_weights, &d_weights_fast) && close(&d_codes, &d_codes_fast));
 }
 
 #[test]
