@@ -13,11 +13,14 @@ use super::judge::Judge;
 use super::race::{ContestOptions, Race, trouble_of, write_start};
 use super::snapshot::{self, Snapshot};
 use crate::error::{Error, ErrorKind, Place, Result};
+use crate::light::blur::BANDS;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 /// A fit shows relightable maps once its error of training pictures is at most this times that of its end.
 const FIRST_MAPS: f64 = 2.0;
+/// Degrees by which lights are blurred: a texel of a usual fit, and a highlight or the edge of a shadow.
+const LIGHT_BLURS: [f64; 2] = [BANDS[0], BANDS[1]];
 /// Seed of every fit: the spread that counts is that of scenes.
 const SEED: u64 = 1;
 
@@ -164,8 +167,13 @@ fn scores(judge: &Judge, place: &Path, snapshots: &[Snapshot], last: &Snapshot, 
         }
     }
     let mut scores = vec![of_truth];
-    // Image, held out, diffuse aligned, specular, roughness, light aligned, brightest light, relit, relit aligned.
-    scores.extend([0, 2, 5, 6, 8, 11, 14, 15, 16].map(|column| own[column]));
+    // Image, held out, diffuse aligned, specular, roughness, light aligned.
+    scores.extend([0, 2, 5, 6, 8, 11].map(|column| own[column]));
+    for degrees in LIGHT_BLURS {
+        scores.push(judge.light_error_blurred(&light, degrees)?);
+    }
+    // Brightest light, relit, relit aligned.
+    scores.extend([14, 15, 16].map(|column| own[column]));
     scores.extend(held);
     scores.extend([first, last.seconds, last.cpu_seconds.unwrap_or(f64::NAN), own[17]]);
     Ok(scores)

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// The measures. Errors are those of [`super::judge::COLUMNS`]; `holds` are shares of texels whose 90 % interval holds
-/// the truth; the first maps are the first snapshot whose image error is at most twice that of the end.
-pub const COLUMNS: [&str; 17] = [
+/// the truth; lights are compared after their factor; the first maps are the first snapshot whose image error is at most twice that of the end.
+pub const COLUMNS: [&str; 19] = [
     "image of the truth",
     "image",
     "held out",
@@ -16,6 +16,8 @@ pub const COLUMNS: [&str; 17] = [
     "F0",
     "roughness",
     "light aligned",
+    "light blurred by 5 deg",
+    "light blurred by 15 deg",
     "sun off, deg",
     "relit",
     "relit aligned",

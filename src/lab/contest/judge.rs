@@ -160,6 +160,17 @@ impl Judge {
         self.sums(&parameters(maps, light), photos, &mut 0, stop).rmse()
     }
 
+    /// Relative L2 error of the light after its factor, both lights blurred by so many degrees at the size of `light`: what is
+    /// below that angle, or below the texels of a fit, is not held against it. NaN without truth.
+    ///
+    /// # Errors
+    /// As of [`environment_errors`].
+    pub fn light_error_blurred(&self, light: &Environment, degrees: f64) -> Result<f64> {
+        let Some(truth) = &self.scene.truth else { return Ok(f64::NAN) };
+        let truth = truth.environment.resampled(light.width(), light.height());
+        Ok(environment_errors(&light.blurred(degrees), &truth.blurred(degrees))?.relative_l2.aligned)
+    }
+
     /// How often the 90 % intervals of stated deviations hold the truth; `None` where sizes do not agree.
     ///
     /// # Errors
