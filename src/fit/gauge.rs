@@ -55,7 +55,8 @@ impl GaugeRule {
                 "Diffuse surface does not tell how bright the light is that it is seen under. The scale between reflectance and \
                  light, and the light's colour, are those under which what is no metal has the F0 of common dielectrics, \
                  0.04 and grey, if most of the surface shows narrow highlights; else they stay near the start, a mean \
-                 reflectance of 0.5. Read the scale-aligned scores."
+                 reflectance of 0.5, unless bright surface would have to send back more than it gets. Read the \
+                 scale-aligned scores."
             }
         }
     }

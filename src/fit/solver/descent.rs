@@ -88,6 +88,8 @@ pub(super) struct Descent<'a> {
     pub(super) system: PixelSystem,
     light: Vec<[f32; 3]>,
     lit: Lit,
+    /// Largest diffuse reflectance of a texel.
+    pub(super) most_diffuse: f32,
     stop: &'a AtomicBool,
 }
 
@@ -102,7 +104,8 @@ impl SolverScene {
     ) -> Option<Descended> {
         let pixels = Pixels::of(self);
         let system = PixelSystem::new(&pixels, self.settings.map_size);
-        let mut descent = Descent { scene: self, pixels: &pixels, system, light: estimate.light.clone(), lit, stop };
+        let (light, most_diffuse) = (estimate.light.clone(), self.most_diffuse(lit));
+        let mut descent = Descent { scene: self, pixels: &pixels, system, light, lit, most_diffuse, stop };
         let sight = descent.sight(&start, FIRST_STEPS[0].slopes)?;
         let rows = Learned::of(&pixels, &sight, None).rows(&pixels, &sight);
         let diagonal = descent.system.diagonal(Rows { pieces: &sight.pieces, pixels: &rows });
@@ -116,7 +119,8 @@ impl SolverScene {
         }
         let mut place = descent.down(place, &LAST_STEPS, &mut steps)?;
         let scale = (lit == Lit::Yes && self.is_scale_open()).then(|| LightScale::told_by(&place.texels, &shown));
-        if let Some(scale) = scale.filter(|scale| scale.factor != [1.0; 3]) {
+        if let Some(scale) = scale.filter(|scale| scale.factor != [1.0; 3] || descent.most_diffuse > 1.0) {
+            descent.most_diffuse = 1.0;
             descent.light = scale.of_light(&descent.light, &self.shown_by_background());
             place = descent.scaled(place, scale, (&shown, freedom), &mut steps)?;
         }
@@ -182,7 +186,7 @@ impl Descent<'_> {
             let after_it = steps.get(number + 1).map_or(Slopes::OfReflectances, |next| next.slopes);
             let (mut share, mut after) = (1.0f32, before);
             for _ in 0..=HALVINGS {
-                let next = stepped(&texels, &way, share, self.lit);
+                let next = stepped(&texels, &way, share, self.most_diffuse);
                 let seen = match moves_widths {
                     true => self.sight(&next, after_it)?,
                     false => sight.moved(&mut self.system, &difference(&texels, &next)),
@@ -203,15 +207,14 @@ impl Descent<'_> {
 }
 
 /// Texels after a share of a step, within what there is.
-pub(super) fn stepped(texels: &[Material<f32>], step: &[Lanes], share: f32, lit: Lit) -> Vec<Material<f32>> {
-    let most = if lit == Lit::Yes { 1.0 } else { f32::MAX };
+pub(super) fn stepped(texels: &[Material<f32>], step: &[Lanes], share: f32, most_diffuse: f32) -> Vec<Material<f32>> {
     let one = |(texel, step): (&Material<f32>, &Lanes)| {
         let own = texel.to_array();
         let moved = std::array::from_fn(|lane| {
             let moved = own[lane] + share * step[lane];
             match lane {
                 _ if !moved.is_finite() => own[lane],
-                0..3 => moved.clamp(0.0, most),
+                0..3 => moved.clamp(0.0, most_diffuse),
                 3..6 => moved.clamp(0.0, 1.0),
                 _ => moved.clamp(own[6] - WIDTH_REACH, (own[6] + WIDTH_REACH).min(0.0)),
             }

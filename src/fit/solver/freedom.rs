@@ -113,7 +113,7 @@ impl Contest<'_> {
                 .for_each(|(_, row)| row.weight = 0.0);
             let rows = Rows { pieces: &now.pieces, pixels: &rows };
             let way = conjugate_gradients(system, rows, &beliefs.parabola(&own), step, stop)?;
-            let next = stepped(&own, &way, 1.0, *lit);
+            let next = stepped(&own, &way, 1.0, scene.most_diffuse(*lit));
             let moved = now.moved(system, &difference(&own, &next));
             (own, seen) = (next, Some(moved));
         }

@@ -25,7 +25,11 @@ const BACKGROUND_NOISE: f64 = 0.03;
 /// By how much the mean light on the surface may differ from the gauge's where background shows, relative. Errors of
 /// transport make blocks take their light for less than it is, so a sun that no photo shows grows where it is free to;
 /// but photographs want it loose.
-const BACKGROUND_GAUGE_SLACK: f64 = 0.05;
+const BACKGROUND_GAUGE_SLACK: f64 = 0.022;
+/// Which share of the rows counts beside what is believed of the light, where maps are sought. Blocks are wrong together, by
+/// lobes and cells that are coarser than the surface's; a twentieth, as of what lobes are told by, leaves lights as smooth as
+/// they are believed.
+const INDEPENDENCE_OF_ROWS: f64 = 0.25;
 /// A block with fewer observations says nothing of the light.
 const LEAST_OBSERVATIONS: usize = 16;
 /// The same where its reflectances are given: it has nothing to find out of them first.
@@ -183,7 +187,7 @@ impl SolverScene {
             let own: Vec<&plan::Block> = done.iter().map(|(index, _): &(usize, BlockWork)| &blocks[*index]).collect();
             let pairs = coupling::neighbours(&own);
             total.par_iter_mut().zip(&kept).for_each(|(total, kept)| {
-                coupling::add_coupled(total, kept, &pairs, self.settings.independence);
+                coupling::add_coupled(total, kept, &pairs, INDEPENDENCE_OF_ROWS);
             });
         }
         (!stop.load(Ordering::Relaxed)).then_some((total, done))
@@ -234,8 +238,7 @@ impl SolverScene {
     ) -> Option<(Vec<[f32; 3]>, LightKnown)> {
         let prior = LightPrior {
             variation: self.settings.light_variation,
-            // Blocks whose maps are sought are wrong together, by lobes and cells that are coarser than the surface's.
-            independence: if self.settings.fixed_maps { 1.0 } else { self.settings.independence },
+            independence: if self.settings.fixed_maps { 1.0 } else { INDEPENDENCE_OF_ROWS },
             // Where the background shows, it fixes the scale; but not alone: what photos show behind a thing is seldom as
             // far away as a sky, and the light would grow from round to round.
             gauge_slack: match self.background.is_empty() {

@@ -5,11 +5,15 @@
 //! need not have. But common dielectrics have one F0, grey: an index of refraction of 1.5, give or take a tenth. Where lobes
 //! are narrow enough to be told from diffuse light, the F0 that was found for them says how much too bright or too coloured
 //! the light is.
+//!
+//! The other thing that tells is that no surface sends back more than it gets. Until the factor is known the descent lets
+//! reflectances go beyond 1, since under a light that is held too dim bright surface asks for that, and would else be explained by nothing;
+//! then the light is raised until they do not.
 
 use super::estimate::PLAIN_SPECULAR;
 use super::scene::{BackgroundPixel, SolverScene};
+use super::sight::Lit;
 use crate::material::Material;
-use crate::math::statistics::quantile;
 
 /// Microfacet width below which a lobe counts as told from diffuse light: wider ones look much like it.
 const NARROW: f32 = 0.5;
@@ -24,8 +28,10 @@ const OF_REFLECTANCE: f64 = 0.6;
 const MAJORITY: f64 = 0.5;
 /// Logarithms of a factor that are less than this are left: no map shows them.
 const LEAST: f32 = 0.01;
-/// The share of reflectances that the bound of 1 holds for.
-const BOUNDED_SHARE: f64 = 0.99;
+/// The share of reflectances that the bound of 1 holds for: what few texels show may be explained by nothing.
+const BOUNDED_SHARE: f64 = 0.999;
+/// Largest diffuse reflectance in the descent while the factor is open.
+const MOST_WHILE_OPEN: f32 = 4.0;
 
 /// What is known of the factor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,33 +46,38 @@ impl LightScale {
     /// What these texels say, of which pixels show some.
     pub fn told_by(texels: &[Material<f32>], shown: &[bool]) -> Self {
         let seen: Vec<&Material<f32>> = texels.iter().zip(shown).filter(|own| *own.1).map(|own| own.0).collect();
-        let is_dielectric =
-            |own: &&&Material<f32>| own.log_width < NARROW.ln() && own.specular.iter().sum::<f32>() < 3.0 * METAL;
-        let dielectrics: Vec<&Material<f32>> = seen.iter().filter(is_dielectric).copied().collect();
+        let dielectrics: Vec<&Material<f32>> =
+            seen.iter().filter(|own| is_narrow(own) && is_dielectric(own)).copied().collect();
         let share = dielectrics.len() as f64 / seen.len().max(1) as f64;
         let share = if share < MAJORITY { 0.0 } else { share };
         // Told by a part of the surface, the factor of all is known less well.
         let (told, held) = (share / OF_DIELECTRICS.powi(2), OF_REFLECTANCE.powi(-2));
-        let factor = [0, 1, 2].map(|c| {
-            let of = |number: &dyn Fn(&Material<f32>) -> f32, among: &[&Material<f32>], share: f64| {
-                let numbers: Vec<f64> = among.iter().map(|own| f64::from(number(own))).collect();
-                if numbers.is_empty() { None } else { Some(quantile(&numbers, share)) }
-            };
-            let middle = of(&|own| own.specular[c], &dielectrics, 0.5).unwrap_or(f64::from(PLAIN_SPECULAR));
-            let logarithm = (middle.max(1e-4) / f64::from(PLAIN_SPECULAR)).ln() * told / (told + held);
-            // No surface sends back more than it gets.
-            let least = of(&|own| own.diffuse[c], &seen, BOUNDED_SHARE).unwrap_or(0.0);
-            logarithm.exp().max(least) as f32
+        let quantile_of = |among: &[&Material<f32>], number: &dyn Fn(&Material<f32>) -> f32, share: f64| {
+            let mut numbers: Vec<f32> = among.iter().map(|own| number(own)).collect();
+            let place = (share * numbers.len().saturating_sub(1) as f64).round() as usize;
+            (!numbers.is_empty()).then(|| *numbers.select_nth_unstable_by(place, f32::total_cmp).1)
+        };
+        let told_factor = [0, 1, 2].map(|c| {
+            let middle = quantile_of(&dielectrics, &|own| own.specular[c], 0.5).unwrap_or(PLAIN_SPECULAR);
+            let logarithm = f64::from(middle.max(1e-4) / PLAIN_SPECULAR).ln() * told / (told + held);
+            logarithm.exp() as f32
         });
+        // No surface sends back more than it gets. That says nothing of the colour of the light.
+        let most =
+            [0, 1, 2].map(|c| quantile_of(&seen, &|own| own.diffuse[c], BOUNDED_SHARE).unwrap_or(0.0) / told_factor[c]);
+        let raised = most.into_iter().fold(1.0, f32::max);
+        let factor = told_factor.map(|told| told * raised);
         let is_shown = factor.iter().any(|factor: &f32| factor.ln().abs() >= LEAST);
         let factor = if is_shown { factor } else { [1.0; 3] };
         LightScale { factor, deviation: (told + held).powf(-0.5) }
     }
 
-    /// A texel under the light times the factor.
+    /// A texel under the light times the factor. Wide lobes of dielectrics, whose F0 hardly any photo tells, stay.
     pub fn under(&self, texel: &Material<f32>) -> Material<f32> {
         let over = |value: [f32; 3]| [0, 1, 2].map(|c| (value[c] / self.factor[c]).min(1.0));
-        Material { diffuse: over(texel.diffuse), specular: over(texel.specular), log_width: texel.log_width }
+        let is_told = is_narrow(texel) || !is_dielectric(texel);
+        let specular = if is_told { over(texel.specular) } else { texel.specular };
+        Material { diffuse: over(texel.diffuse), specular, log_width: texel.log_width }
     }
 
     /// The light times the factor, but for these shares of its texels, which keep their radiance.
@@ -78,10 +89,30 @@ impl LightScale {
     }
 }
 
+/// Whether a lobe is told from diffuse light.
+fn is_narrow(texel: &Material<f32>) -> bool {
+    texel.log_width < NARROW.ln()
+}
+
+/// Whether a texel is no metal, by its F0.
+fn is_dielectric(texel: &Material<f32>) -> bool {
+    texel.specular.iter().sum::<f32>() < 3.0 * METAL
+}
+
 impl SolverScene {
     /// Whether the factor is for the photos to tell.
     pub(super) fn is_scale_open(&self) -> bool {
         !self.settings.fixed_light && !self.settings.fixed_maps
+    }
+
+    /// Largest diffuse reflectance of a texel: any without a light, 1 where the factor is known.
+    pub(super) fn most_diffuse(&self, lit: Lit) -> f32 {
+        match lit {
+            Lit::No => f32::MAX,
+            // What the background shows of the light leaves no factor that could be so large.
+            Lit::Yes if self.is_scale_open() && self.background.is_empty() => MOST_WHILE_OPEN,
+            Lit::Yes => 1.0,
+        }
     }
 
     /// How far background pixels show each texel of the light as it is, in [0, 1]: less where views see different ones.
@@ -133,6 +164,16 @@ mod tests {
         }
         let told = LightScale::told_by(&surface([0.02; 3], -2.0), &[false; 100]);
         assert_eq!(told.factor, [1.0; 3]);
+    }
+
+    #[test]
+    fn surface_that_asks_for_more_than_it_gets_raises_all_channels_of_the_light() {
+        let mut texels = surface([0.03; 3], -0.1);
+        texels.iter_mut().for_each(|own| own.diffuse[2] = 1.5);
+        let told = LightScale::told_by(&texels, &[true; 100]);
+        assert_eq!(told.factor, [1.5; 3]);
+        let under = told.under(&texels[0]);
+        assert_eq!((under.diffuse[2], under.specular), (1.0, [0.03; 3]), "a wide lobe stays");
     }
 
     #[test]

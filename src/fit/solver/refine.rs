@@ -231,6 +231,22 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn a_light_that_is_held_too_dim_is_raised_until_bright_surface_is_explained() {
+        let (mut solver, truth) = photographed(|_| [1.0; 3]);
+        solver.scene.background.clear();
+        solver.estimate.light.iter_mut().flatten().for_each(|radiance| *radiance *= 0.4);
+        let never = AtomicBool::new(false);
+        let Solver { scene, estimate } = &solver;
+        let found = scene.descend(estimate, estimate.texels.clone(), Lit::Yes, &never).unwrap();
+        let factor = found.scale.unwrap().factor;
+        // The brightest surface has 0.6, which is 1.5 under this light, and more where a pixel is wrong.
+        assert!((1.4..2.0).contains(&factor[0]) && factor == [factor[0]; 3], "{factor:?}");
+        assert!(found.texels.iter().flat_map(|own| own.diffuse).all(|value| value <= 1.0));
+        let off = error(&solver, &found, factor.map(|factor| 1.0 / (0.4 * factor)), &truth);
+        assert!(off < 0.05, "{off}");
+    }
+
+    #[test]
     fn with_light_pixels_are_explained_no_worse_than_by_a_texture_alone() {
         let (mut solver, _) = photographed(|_| [1.0; 3]);
         grey(&mut solver);

@@ -71,7 +71,7 @@ impl Descent<'_> {
         let before = made.clone();
         for (own, [of_left, of_light]) in made.iter_mut().zip(&sums) {
             for c in (0..3).filter(|&c| of_light[c] > 0.0) {
-                own.diffuse[c] = (own.diffuse[c] + of_left[c] / of_light[c]).clamp(0.0, 1.0);
+                own.diffuse[c] = (own.diffuse[c] + of_left[c] / of_light[c]).clamp(0.0, self.most_diffuse);
             }
         }
         let sight = sight.moved(&mut self.system, &difference(&before, &made));

@@ -27,8 +27,8 @@ pub struct SolverSettings {
     pub narrow_hats: usize,
     /// By how much neighbouring wide hats are believed to differ, relative to their radiance (one standard deviation).
     pub light_variation: f64,
-    /// Which share of the observations counts as independent when they are weighed against priors. Errors of neighbouring
-    /// pixels go together: a twentieth gives a better light and better roughness than three tenths, and hardly worse F0.
+    /// Which share of the observations counts as independent when they are weighed against what is believed of lobes and
+    /// gains. Errors of neighbouring pixels go together.
     /// Lobes take less where a tile's residuals say that errors go together more (`tile_independence`).
     pub independence: f64,
     /// By how much the mean light on the surface may differ from the one that is held, relative, where no background
@@ -86,7 +86,7 @@ impl Default for SolverSettings {
             narrow_hats: 256,
             light_variation: 0.7,
             independence: 0.05,
-            gauge_slack: 0.02,
+            gauge_slack: 0.009,
             exposure: false,
             use_background: true,
             fixed_light: false,
