@@ -21,7 +21,7 @@ pub enum GaugeRule {
     FixedMaps,
     /// The start: mean reflectance 0.5 in the mean light that explains the photographs.
     Start,
-    /// The start, and F0 of what is no metal where highlights are narrow: 0.04 and grey (Lee 1986).
+    /// The start, and F0 of what is no metal where highlights are narrow: 0.04 and grey (Lee 1986). No reflectance beyond 1.
     StartAndHighlights,
 }
 

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// The measures. Errors are those of [`super::judge::COLUMNS`]; `holds` are shares of texels whose 90 % interval holds
-/// the truth; lights are compared after their factor; the first maps are the first snapshot whose image error is at most twice that of the end.
+/// the truth; lights are compared after their factor; the first maps are the first snapshot whose image error is at most twice
+/// that of the end.
 pub const COLUMNS: [&str; 19] = [
     "image of the truth",
     "image",
