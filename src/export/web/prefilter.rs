@@ -29,11 +29,12 @@ pub fn levels(light: &Environment, model: LobeModel) -> Vec<Image<Vec3>> {
         let width = width_of(level);
         // Seen along the normal: the lobe about the mirror direction, weighed by the cosine.
         let material = Material { diffuse: [0.0; 3], specular: [1.0; 3], log_width: width.ln() };
-        blurred(&source, move |cosine| {
+        let table = ByCosine::new(|cosine| {
             let light = Vec3::new((1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine);
             LobeGeometry::new(Vec3::Z, light, Vec3::Z)
                 .map_or(0.0, |geometry| material.reflect_by(model, &geometry, 1.0)[0])
-        })
+        });
+        blurred(&source, |cosine| table.at(cosine))
     }));
     levels
 }
@@ -55,6 +56,27 @@ fn sources(light: &Environment) -> Vec<(Vec3, Vec3)> {
             (direction, light.radiance.pixels()[index] * angle)
         })
         .collect()
+}
+
+/// A function of a cosine in [0, 1], kept at equal steps of the root of what it lacks to 1: about those of the angle, so
+/// that narrow lobes are kept as well as wide ones.
+struct ByCosine(Vec<f32>);
+
+impl ByCosine {
+    const STEPS: usize = 4096;
+
+    fn new(value: impl Fn(f32) -> f32) -> Self {
+        let cosine = |step: usize| 1.0 - (step as f32 / Self::STEPS as f32).powi(2);
+        ByCosine((0..=Self::STEPS).map(|step| value(cosine(step))).collect())
+    }
+
+    #[inline]
+    fn at(&self, cosine: f32) -> f32 {
+        let place = (1.0 - cosine).max(0.0).sqrt() * Self::STEPS as f32;
+        let step = (place as usize).min(Self::STEPS - 1);
+        let (one, next) = (self.0[step], self.0[step + 1]);
+        one + (place - step as f32) * (next - one)
+    }
 }
 
 /// Each direction's mean of the light under a weight of the cosine to it.
@@ -146,6 +168,18 @@ mod tests {
             let index = brightest.unwrap();
             let found = direction_of_texel(index / level.width(), index % level.width(), level.width(), level.height());
             assert!(found.dot(towards) > 0.99, "{found} {towards}");
+        }
+    }
+
+    #[test]
+    fn a_function_of_a_cosine_is_kept_as_it_is() {
+        for width in [0.02f32, 0.3, 1.0] {
+            let lobe = |cosine: f32| (-(1.0 - cosine) / (width * width)).exp();
+            let table = ByCosine::new(lobe);
+            for step in 0..=1000 {
+                let cosine = 1.0 - (step as f32 * 1e-3).powi(2);
+                assert!((table.at(cosine) - lobe(cosine)).abs() < 1e-4, "{width} {cosine}");
+            }
         }
     }
 
