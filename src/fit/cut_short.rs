@@ -3,7 +3,7 @@
 use super::fitter::Fitter;
 use super::schedule::StageKind;
 use super::settings::Method;
-use super::solver::estimate::fill_from_solved;
+use super::underway::Reached;
 use crate::material::LobeModel;
 use crate::material::lobe::nearest;
 
@@ -32,20 +32,24 @@ impl Fitter {
         }
     }
 
-    /// Ends the fit with what there is: maps grow to their full size, texels that nothing was found for take what the
-    /// nearest has, and holes in the light are filled. The cheapest that is a whole result, in no time beside a step.
+    /// Ends the fit with what there is, and with what the step that was stopped had reached by then: maps grow to their
+    /// full size, and holes in the light are filled. The cheapest that is a whole result, in no time beside a step.
     ///
     /// The state is then that of a fit at its end: a checkpoint to go on from has to be written before.
-    pub fn cut_short(&mut self) {
+    pub(crate) fn cut_short(&mut self, reached: Option<Reached>) {
         let Some(stage) = self.stage().copied() else { return };
-        let knows_deviations = self.deviations_are_known();
+        // How well maps are known that a descent was half done with nothing tells.
+        let knows_deviations = reached.is_none() && self.deviations_are_known();
         if stage.kind.is_of_solver() {
             let state = &mut self.state;
-            if let Some(solver) = &self.solver {
-                solver.fill_holes(&mut state.light);
-            }
-            if !state.variances.is_empty() {
-                fill_from_solved(&mut state.texels, &state.variances, state.map_size);
+            match reached {
+                // A descent begins at a light without holes.
+                Some(reached) => reached.put_into(state),
+                None => {
+                    if let Some(solver) = &self.solver {
+                        solver.fill_holes(&mut state.light);
+                    }
+                }
             }
         }
         self.grow_maps(self.settings.map_size);

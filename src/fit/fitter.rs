@@ -19,6 +19,7 @@ use super::start;
 use super::state::{FitState, LossRow};
 use super::suited::Suited;
 use super::targets::{Target, held_out_targets, targets};
+use super::underway::WatchUnderway;
 use super::views::{ViewUse, training_views, unknown_names, uses_of};
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::light::Environment;
@@ -356,6 +357,11 @@ impl Fitter {
     /// # Errors
     /// `NonFinite` when too much of a step is not finite; photos of which none shows the surface.
     pub fn step(&mut self, stop: &AtomicBool) -> Result<StepOutcome> {
+        self.step_watched(stop, &mut |_| {})
+    }
+
+    /// [`Fitter::step`]; `watch` hears of maps and light within a step that takes long.
+    pub(crate) fn step_watched(&mut self, stop: &AtomicBool, watch: &mut WatchUnderway) -> Result<StepOutcome> {
         let began = Instant::now();
         if !self.look_at_held_out(stop) {
             return Ok(StepOutcome::Interrupted);
@@ -371,7 +377,7 @@ impl Fitter {
         }
         let Some(&stage) = self.stage() else { return Ok(StepOutcome::Finished) };
         if stage.kind.is_of_solver() {
-            return self.solver_step(&stage, stop);
+            return self.solver_step(&stage, stop, watch);
         }
         self.enter(&stage);
 

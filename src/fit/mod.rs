@@ -7,7 +7,7 @@
 //! `batch` picks views and pixels, `gradient` adds them up, `weigh` applies consistency, `advance` moves the numbers,
 //! `held_out` judges them. [`state`] is all they change, [`event`] what it tells of.
 //! `change` takes other settings between two steps, `cut_short` ends a fit before its last one, [`views`] leaves photos
-//! out, [`figures`] are for who watches.
+//! out, [`figures`] are for who watches, `underway` within a step.
 //! [`by_name`] reads and sets each setting by its name, `describe` says with the command line's help what it means,
 //! [`presets`] are whole sets of them.
 //! [`solver`] is the other method, `solver_step` does its steps, [`known_maps`] are maps that it keeps, [`suited`] says which of both a scene
@@ -50,6 +50,7 @@ pub mod state;
 mod step_sums;
 pub mod suited;
 pub mod targets;
+pub(crate) mod underway;
 pub mod views;
 mod weigh;
 mod work;

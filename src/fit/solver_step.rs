@@ -7,12 +7,15 @@
 use super::fitter::{Fitter, StepOutcome};
 use super::schedule::{Stage, StageKind};
 use super::settings::Method;
+use super::solver::descent::OnTheWay;
+use super::solver::refine::log_gains;
 use super::solver::{
     Choices, Estimate, SolverScene, SolverSettings, SolverStep, StepReport, TexelVariance, TransportError,
 };
 use super::stage_work::halved;
 use super::state::LossRow;
 use super::targets::targets;
+use super::underway::{Underway, WatchUnderway};
 use crate::error::Result;
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::material::{LobeModel, MaterialMaps};
@@ -22,8 +25,13 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 impl Fitter {
-    /// Does one step of the solver. A step that is stopped changes nothing.
-    pub(super) fn solver_step(&mut self, stage: &Stage, stop: &AtomicBool) -> Result<StepOutcome> {
+    /// Does one step of the solver. A step that is stopped changes nothing but the size of the maps.
+    pub(super) fn solver_step(
+        &mut self,
+        stage: &Stage,
+        stop: &AtomicBool,
+        watch: &mut WatchUnderway,
+    ) -> Result<StepOutcome> {
         let began = Instant::now();
         let whole = SolverSettings::of(&self.settings);
         // What the model needs is asked on the finest maps that the solver makes, once.
@@ -53,7 +61,12 @@ impl Fitter {
         };
         self.grow_maps(stage.map_size);
         let mut estimate = self.lend_estimate(&solver)?;
-        let report = solver.step(step, &mut estimate, stop);
+        let light_size = settings.light_size;
+        let views = if settings.exposure { solver.views.clone() } else { Vec::new() };
+        let report = solver.step_watched(step, &mut estimate, stop, &mut |OnTheWay { texels, light, gains }| {
+            let log_gains = views.iter().copied().zip(log_gains(gains)).collect();
+            watch(&Underway { texels, map_size, light, light_size, log_gains });
+        });
         if report.is_some() && whole.fixed_maps && self.steps_total() == self.state.step + 1 {
             // Else before maps are made under the light.
             solver.fill_holes(&mut estimate.light);

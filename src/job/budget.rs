@@ -2,7 +2,8 @@
 //!
 //! Between two steps the job looks at the clock by itself; within one, a thread of its own raises the flag by which steps
 //! are stopped. A step that is stopped changes nothing, so a fit that ends by its budget has the state that it had between
-//! two steps, and goes on from there bit for bit. What is written then is made from that state and not kept in it.
+//! two steps, and goes on from there bit for bit. What is written then is made from that state, or from what a descent had
+//! reached, and not kept in it.
 
 use crate::error::{Finding, Severity};
 use crate::fit::Fitter;
@@ -68,8 +69,9 @@ impl Budget {
         })
     }
 
-    /// What a report says of a fit that ends here by its budget. To be asked before the fit is cut short.
-    pub(super) fn finding(&self, fitter: &Fitter) -> Finding {
+    /// What a report says of a fit that ends here by its budget, within a step of which something was kept or not. To be
+    /// asked before the fit is cut short.
+    pub(super) fn finding(&self, fitter: &Fitter, has_reached: bool) -> Finding {
         let left = fitter.steps_left();
         let names: Vec<String> = left
             .iter()
@@ -77,6 +79,7 @@ impl Budget {
             .collect();
         let (done, total) = (fitter.state().step, fitter.steps_total());
         let maps = match fitter.has_maps() {
+            _ if has_reached => "; the maps are those that the first of these had reached",
             true => "",
             false => "; no maps were made yet: theirs are the rough values that the light was sought with",
         };

@@ -34,6 +34,11 @@ impl<T> Slot<T> {
         cell.value.as_ref().map(|value| (cell.number, Arc::clone(value)))
     }
 
+    /// The newest value for who writes: it does not count as seen.
+    pub fn last(&self) -> Option<Arc<T>> {
+        self.cell().value.clone()
+    }
+
     /// Whether somebody has looked since the last value was put; true before the first.
     pub fn is_seen(&self) -> bool {
         self.cell().is_seen
@@ -63,7 +68,7 @@ mod tests {
         let slot = Slot::default();
         assert!(slot.is_seen());
         slot.put(1);
-        assert!(!slot.is_seen());
+        assert!(slot.last().is_some() && !slot.is_seen());
         slot.newest();
         assert!(slot.is_seen());
         slot.put(2);

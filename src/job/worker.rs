@@ -9,6 +9,7 @@ use super::time_left;
 use super::{Budget, Command, Event, Progress, Slot, Snapshot, SolverTold};
 use crate::error::{Error, ErrorKind, Finding, Result, Severity, text_of_panic};
 use crate::export::RunFolder;
+use crate::fit::underway::{Reached, Underway};
 use crate::fit::{FitSettings, Fitter, LossRow, StepOutcome};
 use crate::insight::report::data::StageTime;
 use crossbeam_channel::{Receiver, unbounded};
@@ -60,6 +61,7 @@ pub fn start_with(
         began: Instant::now(),
         paused: false,
         steps_asked: 0,
+        reached: None,
     };
     let thread = std::thread::Builder::new()
         .name("patina-fit".into())
@@ -98,6 +100,8 @@ struct Worker {
     paused: bool,
     /// Single steps that were asked for and not done yet.
     steps_asked: usize,
+    /// Where the last step was when its time was up.
+    reached: Option<Reached>,
 }
 
 impl Worker {
@@ -140,7 +144,8 @@ impl Worker {
             if self.is_out_of_time() {
                 break true;
             }
-            match self.step()? {
+            let (outcome, was_shown_within) = self.step()?;
+            match outcome {
                 StepOutcome::Interrupted if self.is_out_of_time() => break true,
                 StepOutcome::Interrupted => return self.end_early(),
                 StepOutcome::Finished => break false,
@@ -162,7 +167,7 @@ impl Worker {
             // pictures of a fit of photographs took 4 of its 96 s. The solver's steps are few, and each is shown.
             let is_large_step = self.fitter.stage().is_some_and(|stage| stage.kind.is_of_solver());
             let is_due = is_large_step || last_snapshot.elapsed() > SNAPSHOT_INTERVAL;
-            if self.paused || (is_due && self.snapshot.is_seen()) {
+            if self.paused || was_shown_within || (is_due && self.snapshot.is_seen()) {
                 self.put_snapshot();
                 last_snapshot = Instant::now();
             }
@@ -170,9 +175,9 @@ impl Worker {
         self.put_snapshot();
         self.save();
         if let Some(budget) = self.budget.take().filter(|_| is_cut_short) {
-            let finding = budget.finding(&self.fitter);
+            let finding = budget.finding(&self.fitter, self.reached.is_some());
             // What goes on later is the checkpoint; the result is made of what there is.
-            self.fitter.cut_short();
+            self.fitter.cut_short(self.reached.take());
             self.teller.send(Event::Finding(finding.clone()));
             prepared.findings.push(finding);
             self.put_snapshot();
@@ -203,13 +208,34 @@ impl Worker {
         Ok(())
     }
 
-    /// One step; where the time is limited, it is dropped when that is up.
-    fn step(&mut self) -> Result<StepOutcome> {
-        let Worker { fitter, budget, stop, .. } = self;
-        match budget {
-            Some(budget) => budget.limit(stop, |flag| fitter.step(flag)),
-            None => fitter.step(stop),
+    /// One step; where the time is limited, it is dropped when that is up, but for what it had reached.
+    /// Also whether something within it was shown.
+    fn step(&mut self) -> Result<(StepOutcome, bool)> {
+        let Worker { fitter, budget, stop, snapshot, teller, reached, .. } = self;
+        *reached = None;
+        let is_limited = budget.is_some();
+        let mut last_snapshot = Instant::now();
+        let mut was_shown = false;
+        let mut watch = |underway: &Underway| {
+            if is_limited {
+                *reached = Some(underway.reached());
+            }
+            let Some(before) = snapshot.last().filter(|_| snapshot.is_seen()) else { return };
+            if last_snapshot.elapsed() > SNAPSHOT_INTERVAL {
+                let (maps, environment) = (Arc::new(underway.maps()), Arc::new(underway.environment()));
+                snapshot.put(Snapshot { maps, environment, ..(*before).clone() });
+                teller.wake();
+                (last_snapshot, was_shown) = (Instant::now(), true);
+            }
+        };
+        let outcome = match budget {
+            Some(budget) => budget.limit(stop, |flag| fitter.step_watched(flag, &mut watch)),
+            None => fitter.step_watched(stop, &mut watch),
+        }?;
+        if outcome != StepOutcome::Interrupted {
+            *reached = None;
         }
+        Ok((outcome, was_shown))
     }
 
     /// Whether the time is up with steps left, and nobody asked for a stop.
@@ -291,6 +317,8 @@ impl Worker {
     fn end_early(mut self) -> Result<()> {
         let path = self.saver.save(&self.fitter, &self.settings)?;
         self.teller.send(Event::Checkpoint(path));
+        // What was seen within a step that was dropped is not what is kept.
+        self.put_snapshot();
         self.teller.send(Event::Stopped { steps_done: self.fitter.state().step });
         Ok(())
     }

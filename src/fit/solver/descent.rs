@@ -6,6 +6,7 @@
 //! never is leaves all as it was. Noise and gains are learned before each step, and stay while the objective falls.
 //!
 //! With a light it begins twice: at the texels that were found, and at one plain dielectric ([`super::second_start`]).
+//! At its end the scale of the light is told ([`super::light_scale`]), and dielectrics are common ones.
 
 use super::conjugate_gradients::conjugate_gradients;
 use super::estimate::Estimate;
@@ -21,6 +22,33 @@ use super::sight::{Lit, Sight, Slopes, lanes_of};
 use crate::material::Material;
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
+
+/// Where a descent is after a step.
+pub struct OnTheWay<'a> {
+    /// The texels, diffuse reflectances at most 1.
+    pub texels: &'a [Material<f32>],
+    /// Radiance of the light's texels.
+    pub light: &'a [[f32; 3]],
+    /// Gain of each view and channel.
+    pub gains: &'a [[f32; 3]],
+}
+
+/// Hears of each step of a descent that is gone on from.
+pub type Watch<'a> = dyn FnMut(OnTheWay) + 'a;
+
+/// What a descent leaves on its way.
+pub(super) struct Trace<'a> {
+    /// The objective before and after each step.
+    steps: Vec<[Objective; 2]>,
+    watch: Option<&'a mut Watch<'a>>,
+}
+
+impl Trace<'_> {
+    /// Of a way that may not be gone on from: nobody hears of it.
+    pub(super) fn unseen() -> Self {
+        Trace { steps: Vec::new(), watch: None }
+    }
+}
 
 /// The first steps down, from each start.
 pub(super) const FIRST_STEPS: [Step; 2] = [Step { iterations: 12, slopes: Slopes::OfReflectances }; 2];
@@ -63,6 +91,8 @@ pub struct Descended {
     pub errors: ErrorSums,
     /// What light and reflectances were scaled by at the end, and how well that is known; `None` without a light to find.
     pub scale: Option<LightScale>,
+    /// Whether F0 of a texel was scaled with it.
+    pub scaled_specular: Vec<bool>,
     /// The light by then.
     pub light: Vec<[f32; 3]>,
 }
@@ -86,7 +116,7 @@ pub(super) struct Descent<'a> {
     pub(super) scene: &'a SolverScene,
     pub(super) pixels: &'a Pixels<'a>,
     pub(super) system: PixelSystem,
-    light: Vec<[f32; 3]>,
+    pub(super) light: Vec<[f32; 3]>,
     lit: Lit,
     /// Largest diffuse reflectance of a texel.
     pub(super) most_diffuse: f32,
@@ -102,6 +132,18 @@ impl SolverScene {
         lit: Lit,
         stop: &AtomicBool,
     ) -> Option<Descended> {
+        self.descend_watched(estimate, start, lit, stop, None)
+    }
+
+    /// The same; `watch` hears of the way.
+    pub(super) fn descend_watched<'a>(
+        &self,
+        estimate: &Estimate,
+        start: Vec<Material<f32>>,
+        lit: Lit,
+        stop: &AtomicBool,
+        watch: Option<&'a mut Watch<'a>>,
+    ) -> Option<Descended> {
         let pixels = Pixels::of(self);
         let system = PixelSystem::new(&pixels, self.settings.map_size);
         let (light, most_diffuse) = (estimate.light.clone(), self.most_diffuse(lit));
@@ -112,17 +154,16 @@ impl SolverScene {
         let shown: Vec<bool> = diagonal.iter().map(|diagonal| diagonal[0] > 0.0).collect();
         let freedom = self.choose_freedom(&pixels, &sight, (&start, &shown), lit, stop)?;
 
-        let mut steps = Vec::new();
-        let mut place = descent.down(descent.place(&start, sight, (&shown, freedom)), &FIRST_STEPS, &mut steps)?;
+        let mut trace = Trace { steps: Vec::new(), watch };
+        let mut place = descent.down(descent.place(&start, sight, (&shown, freedom)), &FIRST_STEPS, &mut trace)?;
         if lit == Lit::Yes {
-            place = descent.or_plain(place, (&start, &shown, freedom), &mut steps)?;
+            place = descent.or_plain(place, (&start, &shown, freedom), &mut trace)?;
         }
-        let mut place = descent.down(place, &LAST_STEPS, &mut steps)?;
+        let mut place = descent.down(place, &LAST_STEPS, &mut trace)?;
         let scale = (lit == Lit::Yes && self.is_scale_open()).then(|| LightScale::told_by(&place.texels, &shown));
-        if let Some(scale) = scale.filter(|scale| scale.factor != [1.0; 3] || descent.most_diffuse > 1.0) {
-            descent.most_diffuse = 1.0;
-            descent.light = scale.of_light(&descent.light, &self.shown_by_background());
-            place = descent.scaled(place, scale, (&shown, freedom), &mut steps)?;
+        let scaled_specular = place.texels.iter().map(LightScale::changes_specular).collect();
+        if lit == Lit::Yes {
+            place = descent.settled(place, scale.unwrap_or(LightScale::NONE), (&shown, freedom), &mut trace)?;
         }
 
         let light = std::mem::take(&mut descent.light);
@@ -137,7 +178,7 @@ impl SolverScene {
                 errors.add(own.view as usize, row.left.iter().map(|left| f64::from(left * left)).sum::<f64>() / 3.0);
             }
         }
-        Some(Descended { texels, learned, steps, precision, errors, scale, light })
+        Some(Descended { texels, learned, steps: trace.steps, precision, errors, scale, scaled_specular, light })
     }
 }
 
@@ -148,19 +189,45 @@ impl Descent<'_> {
         self.scene.sight(pixels, &self.light, texels, (self.lit, slopes), self.stop)
     }
 
-    /// The same place after the light was multiplied by a factor. What sees it, Schlick's rise, light between surfaces and
-    /// what the background told of the light, a step makes good.
-    fn scaled(
+    /// The end of the way: the light is multiplied by what was told of its scale, and dielectrics are known to be common
+    /// ones from then on. What was found of a texel until then stands for its region. What all that makes wrong, as
+    /// Schlick's rise, light between surfaces and what the background told of the light, steps make good.
+    fn settled(
         &mut self,
         place: Place,
         scale: LightScale,
         (shown, freedom): (&[bool], Freedom),
-        told: &mut Vec<[Objective; 2]>,
+        trace: &mut Trace,
     ) -> Option<Place> {
+        self.most_diffuse = 1.0;
+        if scale.factor != [1.0; 3] {
+            self.light = scale.of_light(&self.light, &self.scene.told_by_background());
+        }
         let texels: Vec<Material<f32>> = place.texels.par_iter().map(|texel| scale.under(texel)).collect();
         let sight = self.sight(&texels, Slopes::OfReflectances)?;
-        let begun = Place { learned: place.learned, ..self.place(&texels, sight, (shown, freedom)) };
-        self.down(begun, &FIRST_STEPS[..1], told)
+        let mut begun = Place { learned: place.learned, ..self.place(&texels, sight, (shown, freedom)) };
+        begun.beliefs.know_dielectrics();
+        self.down(begun, &FIRST_STEPS, trace)
+    }
+
+    /// Leaves a step on the trace. While reflectances may go beyond 1, who watches sees them as they would be if the way ended
+    /// here: under a light that is raised.
+    pub(super) fn leave(
+        &self,
+        trace: &mut Trace,
+        objective: [Objective; 2],
+        (texels, beliefs): (&[Material<f32>], &Neighbours),
+        Learned { gains, .. }: &Learned,
+    ) {
+        trace.steps.push(objective);
+        let Some(watch) = &mut trace.watch else { return };
+        if self.most_diffuse <= 1.0 {
+            return watch(OnTheWay { texels, light: &self.light, gains });
+        }
+        let scale = LightScale::told_by(texels, beliefs.shown());
+        let light = scale.of_light(&self.light, &self.scene.told_by_background());
+        let texels: Vec<Material<f32>> = texels.par_iter().map(|texel| scale.under(texel)).collect();
+        watch(OnTheWay { texels: &texels, light: &light, gains });
     }
 
     /// A place to begin at, around which texels may differ so freely.
@@ -170,7 +237,7 @@ impl Descent<'_> {
     }
 
     /// Goes these steps from a place, and tells the objective before and after each. `None` when `stop` was raised.
-    pub(super) fn down(&mut self, from: Place, steps: &[Step], told: &mut Vec<[Objective; 2]>) -> Option<Place> {
+    pub(super) fn down(&mut self, from: Place, steps: &[Step], trace: &mut Trace) -> Option<Place> {
         let Place { mut texels, mut sight, mut learned, beliefs, mut is_exact } = from;
         for (number, step) in steps.iter().enumerate() {
             let moves_widths = step.slopes == Slopes::OfWidths;
@@ -199,7 +266,7 @@ impl Descent<'_> {
                 }
                 share *= 0.5;
             }
-            told.push([before, after]);
+            self.leave(trace, [before, after], (&texels, &beliefs), &by);
             learned = Some(by);
         }
         Some(Place { texels, sight, learned, beliefs, is_exact })

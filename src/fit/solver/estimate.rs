@@ -30,7 +30,7 @@ pub struct TexelVariance {
     /// Variance of each of its numbers given the light; 0 where it is not known yet.
     pub variance: Material<f32>,
     /// Number of texels that share its lobe once maps are made, at least 1 where the texel's own pixels, or those of its
-    /// block, were solved for; 0 where a texel took over what others have.
+    /// block, were solved for; 0 where it was not.
     pub lobe_cluster_size: f32,
 }
 
@@ -52,8 +52,9 @@ const MOST_LIGHT_DEVIATION: f64 = 0.25;
 const IRRADIANCE_SHARE: f32 = 0.5;
 /// By what a light that was found puts lobes off, all alike where they see the same of it: specular reflectance relative
 /// to itself, logarithm of the width. A lobe sees more detail of the light than irradiance does, which photos tell little
-/// of. Chosen, like the share above, by how often stated intervals hold the truth.
-const LOBE_LIGHT_ERRORS: [f32; 2] = [0.25, 0.07];
+/// of. Chosen, like the share above, by how often stated intervals hold the truth: in the mean over development scenes, and with
+/// each of them left out.
+const LOBE_LIGHT_ERRORS: [f32; 2] = [0.35, 0.18];
 
 /// F0 of common dielectrics: that of a refractive index of 1.5.
 pub(super) const PLAIN_SPECULAR: f32 = 0.04;
@@ -85,20 +86,15 @@ impl Estimate {
         self.variances[texel] = TexelVariance { lobe_cluster_size: known.lobe_cluster_size.max(1.0), ..known };
     }
 
-    /// Texels that no block has reached yet take the mean of those that one has.
-    pub fn fill_with_mean(&mut self) {
+    /// Mean of the texels that were solved for. `None` where none was.
+    pub fn mean_of_solved(&self) -> Option<Material<f32>> {
         let mut sum = Material::<f64>::default();
         let mut count = 0.0f64;
         for (texel, _) in self.texels.iter().zip(&self.variances).filter(|(_, known)| known.is_solved()) {
             sum.add(&texel.map(f64::from));
             count += 1.0;
         }
-        if count > 0.0 {
-            let mean = sum.map(|value| (value / count) as f32);
-            for (texel, _) in self.texels.iter_mut().zip(&self.variances).filter(|(_, known)| !known.is_solved()) {
-                *texel = mean;
-            }
-        }
+        (count > 0.0).then(|| sum.map(|value| (value / count) as f32))
     }
 
     /// Standard deviations of the values of maps of this size, by [`Estimate::texels`] and [`Estimate::variances`]: how far
@@ -143,14 +139,16 @@ impl Estimate {
         }
     }
 
-    /// Divides what reflectances are known to by a factor of the light, and keeps how well that is known.
-    pub(super) fn scale_variances(&mut self, scale: &LightScale) {
+    /// Divides what reflectances are known to by a factor of the light, F0 where it was, and keeps how well that is known.
+    pub(super) fn scale_variances(&mut self, scale: &LightScale, scaled_specular: &[bool]) {
         self.light_known.scale_deviation = scale.deviation;
-        for known in &mut self.variances {
+        for (known, scaled_specular) in self.variances.iter_mut().zip(scaled_specular) {
             for c in 0..3 {
                 let square = scale.factor[c] * scale.factor[c];
                 known.variance.diffuse[c] /= square;
-                known.variance.specular[c] /= square;
+                if *scaled_specular {
+                    known.variance.specular[c] /= square;
+                }
             }
         }
     }
@@ -171,11 +169,15 @@ impl Estimate {
 
 /// Texels of square maps that were not solved for take the values of the nearest that were; where none was, all stay.
 pub fn fill_from_solved(texels: &mut Vec<Material<f32>>, variances: &[TexelVariance], map_size: usize) {
-    let solved: Vec<bool> = variances.iter().map(TexelVariance::is_solved).collect();
-    if !solved.contains(&true) {
+    fill_from_known(texels, variances.iter().map(TexelVariance::is_solved).collect(), map_size);
+}
+
+/// Texels of square maps that are not known take the values of the nearest that are; where none is, all stay.
+pub(super) fn fill_from_known(texels: &mut Vec<Material<f32>>, is_known: Vec<bool>, map_size: usize) {
+    if !is_known.contains(&true) || !is_known.contains(&false) {
         return;
     }
-    let nearest = nearest_covered(&Image::from_pixels(map_size, map_size, solved));
+    let nearest = nearest_covered(&Image::from_pixels(map_size, map_size, is_known));
     let image = Image::from_pixels(map_size, map_size, std::mem::take(texels));
     *texels = dilate(&image, &nearest).into_pixels();
 }
@@ -209,8 +211,8 @@ mod tests {
         let near = |value: f32, expected: f32| assert!((value - expected).abs() < 1e-6, "{value} for {expected}");
         near(close.diffuse[(0, 0)].x, 0.1f32.hypot(0.05 * 0.4));
         near(open.diffuse[(0, 0)].x, 0.1f32.hypot(0.125 * 0.4));
-        near(close.specular[(0, 0)].y, 0.01f32.hypot(0.25 * 0.1));
-        near(close.roughness[(0, 0)], roughness_deviation(-0.5, 0.2f32.hypot(0.07)));
+        near(close.specular[(0, 0)].y, 0.01f32.hypot(0.35 * 0.1));
+        near(close.roughness[(0, 0)], roughness_deviation(-0.5, 0.2f32.hypot(0.18)));
         // Where nothing was found, what is believed of any surface is left as it is.
         assert_eq!(close.diffuse[(1, 0)], known.diffuse[(1, 0)]);
         assert_eq!(known.diffuse[(1, 1)], Vec3::splat(UNKNOWN_DEVIATION[0]));

@@ -15,20 +15,21 @@ impl SolverScene {
     /// Fills the holes of a light that is not given.
     pub(in crate::fit) fn fill_holes(&self, light: &mut [[f32; 3]]) {
         if !self.settings.fixed_light {
-            fill_holes(light, self.settings.light_size, &shown_by_background(&self.background, light.len()));
+            fill_holes(light, self.settings.light_size, &self.shown_by_background(|_| 1.0));
         }
     }
-}
 
-/// How much background pixels look at each texel of a light: the sum of their weights.
-fn shown_by_background(background: &[BackgroundPixel], texels: usize) -> Vec<f32> {
-    let mut shown = vec![0.0; texels];
-    for pixel in background {
-        for (&texel, &weight) in pixel.tap.index.iter().zip(&pixel.tap.weight) {
-            shown[texel as usize] += weight;
+    /// How much background pixels look at each texel of the light: the sum of their weights, times what each pixel counts.
+    pub(super) fn shown_by_background(&self, counts: impl Fn(&BackgroundPixel) -> f32) -> Vec<f32> {
+        let mut shown = vec![0.0; self.transport.basis.count()];
+        for pixel in &self.background {
+            let counts = counts(pixel);
+            for (&texel, &weight) in pixel.tap.index.iter().zip(&pixel.tap.weight) {
+                shown[texel as usize] += counts * weight;
+            }
         }
+        shown
     }
-    shown
 }
 
 /// Raises texels that are not shown, between two of the same row or column that are, to what those have between them.

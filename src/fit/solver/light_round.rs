@@ -74,11 +74,12 @@ impl SolverScene {
             estimate.light = light;
             estimate.light_known = known;
         }
-        if !self.settings.fixed_maps {
-            self.take_blocks(estimate, &done);
-        }
         if let Some(gains) = gains {
             estimate.log_gains = gains;
+        }
+        if !self.settings.fixed_maps {
+            self.take_blocks(estimate, &done);
+            self.fill_by_division(estimate);
         }
         Some(StepReport {
             residual: median(&mut residuals),
@@ -90,7 +91,7 @@ impl SolverScene {
         })
     }
 
-    /// Texels of solved blocks that no maps were made for take what was found for the block, all others the mean.
+    /// Texels of solved blocks that no maps were made for take what was found for the block.
     fn take_blocks(&self, estimate: &mut Estimate, done: &Solved) {
         for (index, work) in done {
             let solution = &work.solution;
@@ -103,7 +104,6 @@ impl SolverScene {
                 estimate.set(texel as usize, own, TexelVariance::default());
             }
         }
-        estimate.fill_with_mean();
     }
 
     /// How far lobes are let go in a round: 0 in the first, 1 in the last, more in rounds on finer photos, which count

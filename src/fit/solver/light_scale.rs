@@ -20,7 +20,7 @@ const NARROW: f32 = 0.5;
 /// F0 from which on a texel speaks for metal.
 const METAL: f32 = 0.15;
 /// Standard deviation of the logarithm of F0 among dielectrics: indices from 1.4 to 1.6 have .028 to .053.
-const OF_DIELECTRICS: f64 = 0.2;
+pub(super) const OF_DIELECTRICS: f64 = 0.2;
 /// Standard deviation of the logarithm of a surface's mean reflectance around the one that is held: from 0.27 to 0.91 beside
 /// 0.5.
 const OF_REFLECTANCE: f64 = 0.6;
@@ -43,11 +43,14 @@ pub struct LightScale {
 }
 
 impl LightScale {
+    /// Nothing changes, by a light that is known.
+    pub const NONE: LightScale = LightScale { factor: [1.0; 3], deviation: 0.0 };
+
     /// What these texels say, of which pixels show some.
     pub fn told_by(texels: &[Material<f32>], shown: &[bool]) -> Self {
         let seen: Vec<&Material<f32>> = texels.iter().zip(shown).filter(|own| *own.1).map(|own| own.0).collect();
         let dielectrics: Vec<&Material<f32>> =
-            seen.iter().filter(|own| is_narrow(own) && is_dielectric(own)).copied().collect();
+            seen.iter().filter(|own| is_narrow(own) && is_dielectric(own.specular)).copied().collect();
         let share = dielectrics.len() as f64 / seen.len().max(1) as f64;
         let share = if share < MAJORITY { 0.0 } else { share };
         // Told by a part of the surface, the factor of all is known less well.
@@ -75,9 +78,13 @@ impl LightScale {
     /// A texel under the light times the factor. Wide lobes of dielectrics, whose F0 hardly any photo tells, stay.
     pub fn under(&self, texel: &Material<f32>) -> Material<f32> {
         let over = |value: [f32; 3]| [0, 1, 2].map(|c| (value[c] / self.factor[c]).min(1.0));
-        let is_told = is_narrow(texel) || !is_dielectric(texel);
-        let specular = if is_told { over(texel.specular) } else { texel.specular };
+        let specular = if LightScale::changes_specular(texel) { over(texel.specular) } else { texel.specular };
         Material { diffuse: over(texel.diffuse), specular, log_width: texel.log_width }
+    }
+
+    /// Whether a texel's F0 goes with the factor: all but wide lobes of dielectrics.
+    pub fn changes_specular(texel: &Material<f32>) -> bool {
+        is_narrow(texel) || !is_dielectric(texel.specular)
     }
 
     /// The light times the factor, but for these shares of its texels, which keep their radiance.
@@ -94,9 +101,9 @@ fn is_narrow(texel: &Material<f32>) -> bool {
     texel.log_width < NARROW.ln()
 }
 
-/// Whether a texel is no metal, by its F0.
-fn is_dielectric(texel: &Material<f32>) -> bool {
-    texel.specular.iter().sum::<f32>() < 3.0 * METAL
+/// Whether what has this F0 is no metal.
+pub(super) fn is_dielectric(specular: [f32; 3]) -> bool {
+    specular.iter().sum::<f32>() < 3.0 * METAL
 }
 
 impl SolverScene {
@@ -116,16 +123,12 @@ impl SolverScene {
     }
 
     /// How far background pixels show each texel of the light as it is, in [0, 1]: less where views see different ones.
-    pub(super) fn shown_by_background(&self) -> Vec<f32> {
-        let mut shown = vec![0.0f32; self.transport.basis.count()];
-        for BackgroundPixel { tap, radiance, scatter, .. } in &self.background {
+    pub(super) fn told_by_background(&self) -> Vec<f32> {
+        let trust = |BackgroundPixel { radiance, scatter, .. }: &BackgroundPixel| {
             let radiance = radiance.iter().sum::<f32>().max(0.0) / 3.0;
-            let trust = if *scatter > 0.0 { radiance / (radiance + scatter) } else { 1.0 };
-            for (&texel, weight) in tap.index.iter().zip(tap.weight) {
-                shown[texel as usize] += trust * weight;
-            }
-        }
-        shown.into_iter().map(|shown| shown.min(1.0)).collect()
+            if *scatter > 0.0 { radiance / (radiance + scatter) } else { 1.0 }
+        };
+        self.shown_by_background(trust).into_iter().map(|shown| shown.min(1.0)).collect()
     }
 }
 

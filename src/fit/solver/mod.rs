@@ -12,8 +12,9 @@
 //!    `given_maps` does all of this for reflectances that are given.
 //! 4. [`light_step`]: the light from those rows, added up ([`normal_equations`]), at least zero ([`non_negative`]), in
 //!    wide and narrow hats ([`light_shape`]), with a weak wish for smoothness but for suns ([`light_suns`]).
-//!    [`light_round`] is the round as a whole, [`light_evidence`] says what each texel of the light is known by, `light_holes` fills what lies between texels
-//!    that photos show; `gains` of photos whose exposures differ.
+//!    [`light_round`] is the round as a whole, [`light_evidence`] says what each texel of the light is known by,
+//!    `light_holes` fills what lies between texels that photos show; `gains` of photos whose exposures differ; `first_maps`
+//!    of texels that no block was solved for.
 //! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`) with the footprints of pixels, where the evidence,
 //!    as far as it is independent (`tile_independence`), decides which texels share a lobe ([`lobe_tree`],
 //!    [`lobe_evidence`], [`lobe_prior`], [`lobe_sums`], [`lobe_widths`], [`lobe_families`], `lobe_scene`).
@@ -38,6 +39,7 @@ pub mod coupling;
 pub mod descent;
 pub mod eliminate;
 pub mod estimate;
+mod first_maps;
 mod freedom;
 mod gains;
 mod given_maps;
@@ -71,7 +73,7 @@ mod pixel_system;
 pub mod pixel_terms;
 pub mod pixels;
 pub mod plan;
-mod refine;
+pub(in crate::fit) mod refine;
 pub mod report;
 pub mod round;
 pub mod scene;

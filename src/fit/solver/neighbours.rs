@@ -1,11 +1,14 @@
-//! What neighbouring texels are believed to have in common, and lobes with what was found of their region.
+//! What neighbouring texels are believed to have in common, and lobes with what was found of their region and with
+//! common dielectrics.
 //!
 //! Materials change at few places: differences of logarithms between neighbours have Cauchy's distribution, a small scale
 //! with heavy tails. What no pixel tells apart is smooth then, and edges stay. Its negative logarithm is replaced by the
 //! parabola that touches it from above (majorisation; Hunter and Lange 2004), so that a step that makes the parabola less
 //! makes the objective less.
 
+use super::estimate::PLAIN_SPECULAR;
 use super::freedom::Freedom;
+use super::light_scale::{OF_DIELECTRICS, is_dielectric};
 use super::pixel_system::Lanes;
 use crate::material::Material;
 use rayon::prelude::*;
@@ -30,6 +33,8 @@ pub struct Neighbours {
     centre: Vec<[f32; 4]>,
     /// Standard deviation of a texel's lobe from its region's: of F0 relative to itself, of the logarithm of the width.
     spread: [f32; 2],
+    /// Whether F0 of common dielectrics is believed as well.
+    knows_dielectrics: bool,
 }
 
 /// The parabola that touches the beliefs from above.
@@ -62,7 +67,19 @@ impl Neighbours {
             dark,
             centre: centre.collect(),
             spread: [freedom.lobes, 0.5 * freedom.lobes],
+            knows_dielectrics: false,
         }
+    }
+
+    /// Which texels pixels show.
+    pub fn shown(&self) -> &[bool] {
+        &self.shown
+    }
+
+    /// From now on F0 of what is no metal by its region is believed to be that of common dielectrics. Not before the scale
+    /// of the light is told: that is told by it.
+    pub fn know_dielectrics(&mut self) {
+        self.knows_dielectrics = true;
     }
 
     /// The texel to the right and the one below, where pixels show both.
@@ -113,7 +130,8 @@ impl Neighbours {
                         .map(|(square, n)| power(n) * f64::from(square.ln_1p()))
                         .sum::<f64>();
                 }
-                sums[1] += 0.5 * self.away(own, texel).iter().map(|away| f64::from(away * away)).sum::<f64>();
+                let away = self.away(own, texel);
+                sums[1] += (0..4).map(|k| 0.5 * f64::from(self.lobe(own, k).1 * away[k] * away[k])).sum::<f64>();
             }
             sums
         };
@@ -121,21 +139,29 @@ impl Neighbours {
         of_chunks.iter().fold([0.0; 2], |total, own| [total[0] + own[0], total[1] + own[1]])
     }
 
-    /// How far a lobe is from its region's, in standard deviations.
+    /// How far a lobe is from what is believed of it: F0, logarithm of the width.
     #[inline]
     fn away(&self, texel: usize, own: &Material<f32>) -> [f32; 4] {
-        let centre = &self.centre[texel];
-        let specular = |c: usize| (own.specular[c] - centre[c]) * self.stiffness(texel, c);
-        [specular(0), specular(1), specular(2), (own.log_width - centre[3]) * self.stiffness(texel, 3)]
+        let [red, green, blue] = own.specular;
+        let numbers = [red, green, blue, own.log_width];
+        std::array::from_fn(|number| numbers[number] - self.lobe(texel, number).0)
     }
 
-    /// One over the standard deviation of a number of a lobe.
+    /// What is believed of a number of a lobe: mean and precision. Two normal beliefs are as their product.
     #[inline]
-    fn stiffness(&self, texel: usize, number: usize) -> f32 {
-        match number {
-            3 => 1.0 / self.spread[1],
-            c => 1.0 / (self.spread[0] * (self.centre[texel][c] + self.dark[1])),
+    fn lobe(&self, texel: usize, number: usize) -> (f32, f32) {
+        let centre = &self.centre[texel];
+        if number == 3 {
+            return (centre[3], (self.spread[1] * self.spread[1]).recip());
         }
+        let deviation = self.spread[0] * (centre[number] + self.dark[1]);
+        let of_region = (deviation * deviation).recip();
+        if !(self.knows_dielectrics && is_dielectric([centre[0], centre[1], centre[2]])) {
+            return (centre[number], of_region);
+        }
+        let of_dielectrics = (OF_DIELECTRICS as f32 * PLAIN_SPECULAR).powi(-2);
+        let precision = of_region + of_dielectrics;
+        (centre[number] + of_dielectrics / precision * (PLAIN_SPECULAR - centre[number]), precision)
     }
 
     /// The parabola that touches at these texels.
@@ -170,7 +196,7 @@ impl Neighbours {
         made.add_differences(&|texel, lane| if lane < 7 { logarithms[texel][lane] } else { 0.0 }, &mut slope);
         slope.par_iter_mut().enumerate().filter(|(texel, _)| self.shown[*texel]).for_each(|(texel, slope)| {
             let away = self.away(texel, &texels[texel]);
-            (0..4).for_each(|number| slope[3 + number] += away[number] * self.stiffness(texel, number));
+            (0..4).for_each(|number| slope[3 + number] += away[number] * self.lobe(texel, number).1);
         });
         made.slope = slope;
         made
@@ -198,7 +224,7 @@ impl Parabola<'_> {
         self.add_differences(&|texel, lane| self.relative[texel][lane] * step[texel][lane], product);
         product.par_iter_mut().enumerate().filter(|(texel, _)| self.of.shown[*texel]).for_each(|(texel, product)| {
             for number in 0..4 {
-                product[3 + number] += self.of.stiffness(texel, number).powi(2) * step[texel][3 + number];
+                product[3 + number] += self.of.lobe(texel, number).1 * step[texel][3 + number];
             }
         });
     }
@@ -239,7 +265,7 @@ impl Parabola<'_> {
         self.for_neighbours(texel, self.of.size, |_, weights| (0..3).for_each(|group| sum[group] += weights[group]));
         let relative = &self.relative[texel];
         std::array::from_fn(|lane| {
-            let of_lobe = if (3..7).contains(&lane) { self.of.stiffness(texel, lane - 3).powi(2) } else { 0.0 };
+            let of_lobe = if (3..7).contains(&lane) { self.of.lobe(texel, lane - 3).1 } else { 0.0 };
             if lane < 7 { sum[lane / 3] * relative[lane] * relative[lane] + of_lobe } else { 0.0 }
         })
     }
@@ -268,22 +294,48 @@ mod tests {
         (texels, beliefs)
     }
 
+    /// The same texels with half of the regions dielectrics, of which it is known.
+    fn made_up_of_dielectrics() -> (Vec<Material<f32>>, Neighbours) {
+        let (texels, mut beliefs) = made_up();
+        beliefs.centre.iter_mut().step_by(2).for_each(|centre| (0..3).for_each(|c| centre[c] *= 0.2));
+        beliefs.know_dielectrics();
+        (texels, beliefs)
+    }
+
+    #[test]
+    fn a_dielectric_is_drawn_to_the_common_one_and_a_metal_is_not() {
+        let (_, mut beliefs) = made_up();
+        (beliefs.centre[0], beliefs.centre[1]) = ([0.07, 0.08, 0.09, -0.5], [0.6, 0.4, 0.2, -0.5]);
+        let of = |beliefs: &Neighbours, texel: usize| [0, 1, 2, 3].map(|number| beliefs.lobe(texel, number));
+        let before = [0, 1].map(|texel| of(&beliefs, texel));
+        beliefs.know_dielectrics();
+        for (now, before) in of(&beliefs, 0).into_iter().zip(before[0]).take(3) {
+            assert!(now.0 < before.0 && now.0 > PLAIN_SPECULAR && now.1 > before.1, "{now:?} {before:?}");
+        }
+        assert_eq!((of(&beliefs, 0)[3], of(&beliefs, 1)), (before[0][3], before[1]));
+    }
+
     fn total(beliefs: &Neighbours, texels: &[Material<f32>]) -> f64 {
         beliefs.energies(texels).iter().sum()
     }
 
     #[test]
     fn the_slope_is_that_of_the_energies() {
-        let (texels, beliefs) = made_up();
-        let parabola = beliefs.parabola(&texels);
+        [made_up(), made_up_of_dielectrics()]
+            .iter()
+            .for_each(|(texels, beliefs)| slope_is_of_energies(texels, beliefs));
+    }
+
+    fn slope_is_of_energies(texels: &[Material<f32>], beliefs: &Neighbours) {
+        let parabola = beliefs.parabola(texels);
         for texel in (0..SIZE * SIZE).step_by(5) {
             for lane in 0..7 {
                 let at = |step: f32| {
-                    let mut moved = texels.clone();
+                    let mut moved = texels.to_vec();
                     let mut own = moved[texel].to_array();
                     own[lane] += step;
                     moved[texel] = Material::from_array(own);
-                    total(&beliefs, &moved)
+                    total(beliefs, &moved)
                 };
                 let slope = (at(1e-3) - at(-1e-3)) / 2e-3;
                 let found = f64::from(parabola.slope()[texel][lane]);
@@ -295,9 +347,12 @@ mod tests {
     /// In logarithms of reflectances and widths, which the curvature is of.
     #[test]
     fn the_parabola_touches_and_lies_above() {
-        let (texels, beliefs) = made_up();
-        let parabola = beliefs.parabola(&texels);
-        let here = total(&beliefs, &texels);
+        [made_up(), made_up_of_dielectrics()].iter().for_each(|(texels, beliefs)| parabola_lies_above(texels, beliefs));
+    }
+
+    fn parabola_lies_above(texels: &[Material<f32>], beliefs: &Neighbours) {
+        let parabola = beliefs.parabola(texels);
+        let here = total(beliefs, texels);
         let mut random = SequentialRandom::new(8);
         for _ in 0..40 {
             let reach = 0.05 * random.next_number();
@@ -319,7 +374,7 @@ mod tests {
                 steps.iter().flatten().zip(of.iter().flatten()).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
             };
             let above = here + along(parabola.slope()) + 0.5 * along(&product);
-            let there = total(&beliefs, &moved);
+            let there = total(beliefs, &moved);
             // The logarithm's own bend is small beside the parabola's.
             assert!(there < above + 0.02 * (above - here).abs() + 1e-3, "{there} {above} {here}");
             let curvature: f64 = steps

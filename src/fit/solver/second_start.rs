@@ -8,10 +8,10 @@
 
 use super::agreement::SquareGains;
 use super::choice::clustered::ClusteredMean;
-use super::descent::{Descent, FIRST_STEPS, Place, difference};
+use super::descent::{Descent, FIRST_STEPS, Place, Trace, difference};
 use super::estimate::{PLAIN_SPECULAR, START_TEXEL};
 use super::freedom::Freedom;
-use super::objective::{Learned, Objective};
+use super::objective::Learned;
 use super::sight::{Sight, Slopes};
 use crate::material::Material;
 
@@ -22,10 +22,10 @@ impl Descent<'_> {
         &mut self,
         found: Place,
         (start, shown, freedom): (&[Material<f32>], &[bool], Freedom),
-        told: &mut Vec<[Objective; 2]>,
+        trace: &mut Trace,
     ) -> Option<Place> {
         let (plain_start, sight) = self.plain(&found, start, shown)?;
-        let plain = self.down(self.place(&plain_start, sight, (shown, freedom)), &FIRST_STEPS, &mut Vec::new())?;
+        let plain = self.down(self.place(&plain_start, sight, (shown, freedom)), &FIRST_STEPS, &mut Trace::unseen())?;
         let by = Learned::of(self.pixels, &found.sight, found.learned.as_ref());
         let is_plain = self.plain_texels(&found, &plain, &by);
         let choose = |one: &[Material<f32>], other: &[Material<f32>]| -> Vec<Material<f32>> {
@@ -36,13 +36,13 @@ impl Descent<'_> {
         let begun = self.place(&choose(start, &plain_start), sight, (shown, freedom));
         // Where squares meet neighbours differ at once; a step makes that good before it is judged.
         let begun = Place { texels, learned: found.learned.clone(), ..begun };
-        let mixed = self.down(begun, &FIRST_STEPS[..1], &mut Vec::new())?;
+        let mixed = self.down(begun, &FIRST_STEPS[..1], &mut Trace::unseen())?;
         let objective = |place: &Place| by.objective(self.pixels, &place.sight, place.beliefs.energies(&place.texels));
         let (before, after) = (objective(&found), objective(&mixed));
         if after.total() >= before.total() {
             return Some(found);
         }
-        told.push([before, after]);
+        self.leave(trace, [before, after], (&mixed.texels, &mixed.beliefs), &by);
         Some(mixed)
     }
 
@@ -113,8 +113,8 @@ mod tests {
             *own = Material { diffuse: [0.02; 3], specular: own.diffuse, log_width: own.log_width };
         }
         let found = scene.descend(estimate, start, Lit::Yes, &AtomicBool::new(false)).unwrap();
-        // Two steps, what was chosen, six steps; the light is as bright as the dielectrics say.
-        assert_eq!(found.steps.len(), 9, "{:?}", found.steps);
+        // Two steps, what was chosen, six steps; two more once the scale of the light is told.
+        assert_eq!(found.steps.len(), 11, "{:?}", found.steps);
         let [before, after] = found.steps[2];
         assert!(after.total() < before.total() && after.neighbours < before.neighbours, "{before:?} {after:?}");
         for is_upper in [true, false] {

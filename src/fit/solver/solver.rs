@@ -1,5 +1,6 @@
 //! The whole way in one call: for tests, measurements, and whoever needs neither checkpoint nor job.
 
+use super::descent::Watch;
 use super::estimate::Estimate;
 use super::report::StepReport;
 use super::scene::SolverScene;
@@ -28,9 +29,20 @@ pub enum SolverStep {
 impl SolverScene {
     /// Does a step. `None` when `stop` was raised: nothing was changed then.
     pub fn step(&self, step: SolverStep, estimate: &mut Estimate, stop: &AtomicBool) -> Option<StepReport> {
+        self.step_watched(step, estimate, stop, &mut |_| {})
+    }
+
+    /// The same; `watch` hears of texels and light within a step that takes long.
+    pub(crate) fn step_watched<'a>(
+        &self,
+        step: SolverStep,
+        estimate: &mut Estimate,
+        stop: &AtomicBool,
+        watch: &'a mut Watch<'a>,
+    ) -> Option<StepReport> {
         match step {
             SolverStep::Light(number) => self.light_round(estimate, number, stop),
-            SolverStep::Refine => self.refine(estimate, stop),
+            SolverStep::Refine => self.refine(estimate, stop, watch),
             SolverStep::Maps => {
                 let mut next = estimate.clone();
                 self.fill_holes(&mut next.light);

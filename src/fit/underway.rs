@@ -1,0 +1,59 @@
+//! Maps and light within a step of the solver, for who watches: a descent over all texels takes longer than one likes to
+//! wait.
+
+use super::state::FitState;
+use crate::image::Image;
+use crate::light::Environment;
+use crate::material::texels::maps_from_texels;
+use crate::material::{Material, MaterialMaps};
+use glam::Vec3;
+
+/// Where a step is. The state has nothing of it until the step is done.
+pub(crate) struct Underway<'a> {
+    /// Texels of square maps.
+    pub(super) texels: &'a [Material<f32>],
+    /// Texels along their side.
+    pub(super) map_size: usize,
+    /// Radiance of the light's texels.
+    pub(super) light: &'a [[f32; 3]],
+    /// Width and height of the light in texels.
+    pub(super) light_size: (usize, usize),
+    /// Views of the scene with the logarithms of their gains; empty where gains are not fitted.
+    pub(super) log_gains: Vec<(usize, f32)>,
+}
+
+/// Hears of it.
+pub(crate) type WatchUnderway<'a> = dyn FnMut(&Underway) + 'a;
+
+/// What a step had reached when it was stopped.
+pub(crate) struct Reached {
+    texels: Vec<Material<f32>>,
+    light: Vec<[f32; 3]>,
+    log_gains: Vec<(usize, f32)>,
+}
+
+impl Underway<'_> {
+    /// The maps by now.
+    pub fn maps(&self) -> MaterialMaps {
+        maps_from_texels(self.texels, self.map_size, self.map_size)
+    }
+
+    /// The light by now.
+    pub fn environment(&self) -> Environment {
+        let pixels = self.light.iter().map(|&radiance| Vec3::from_array(radiance)).collect();
+        Environment { radiance: Image::from_pixels(self.light_size.0, self.light_size.1, pixels) }
+    }
+
+    /// A copy of it.
+    pub fn reached(&self) -> Reached {
+        Reached { texels: self.texels.to_vec(), light: self.light.to_vec(), log_gains: self.log_gains.clone() }
+    }
+}
+
+impl Reached {
+    /// Becomes the state, of maps of the same size.
+    pub(super) fn put_into(self, state: &mut FitState) {
+        (state.texels, state.light) = (self.texels, self.light);
+        self.log_gains.into_iter().for_each(|(view, gain)| state.log_gains[view] = gain);
+    }
+}
