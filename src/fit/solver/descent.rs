@@ -116,7 +116,7 @@ pub(super) struct Descent<'a> {
     pub(super) scene: &'a SolverScene,
     pub(super) pixels: &'a Pixels<'a>,
     pub(super) system: PixelSystem,
-    pub(super) light: Vec<[f32; 3]>,
+    light: Vec<[f32; 3]>,
     lit: Lit,
     /// Largest diffuse reflectance of a texel.
     pub(super) most_diffuse: f32,
