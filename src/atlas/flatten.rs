@@ -9,8 +9,8 @@ use super::lscm;
 use super::outline;
 use super::quality::chart_distortion;
 use super::shape::least_box;
+use crate::math::parallel;
 use glam::{DVec2, DVec3};
-use rayon::prelude::*;
 
 /// A chart laid flat.
 #[derive(Clone, Debug)]
@@ -132,15 +132,12 @@ pub(crate) fn flatten_all(
         sets[cluster as usize].push(triangle as u32);
     }
     let done = std::sync::atomic::AtomicUsize::new(0);
-    let charts: Vec<Vec<FlatChart>> = sets
-        .into_par_iter()
-        .map(|triangles| {
-            let size = triangles.len();
-            let flat = flatten(surface, triangles, limits);
-            let before = done.fetch_add(size, std::sync::atomic::Ordering::Relaxed);
-            progress((before + size) as f32 / label.len() as f32);
-            flat
-        })
-        .collect();
+    let charts = parallel::map_items(&sets, |triangles| {
+        let size = triangles.len();
+        let flat = flatten(surface, triangles.clone(), limits);
+        let before = done.fetch_add(size, std::sync::atomic::Ordering::Relaxed);
+        progress((before + size) as f32 / label.len() as f32);
+        flat
+    });
     charts.into_iter().flatten().collect()
 }

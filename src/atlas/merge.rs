@@ -8,7 +8,7 @@ use super::chart::{ChartMesh, Surface};
 use super::flatten::{FlatChart, Limits, try_flatten};
 use super::shape::least_box;
 use super::topology::NONE;
-use rayon::prelude::*;
+use crate::math::parallel;
 use std::collections::{HashMap, HashSet};
 
 /// Distortion allowed in a union: tighter than in a first chart, for nothing forces a merge.
@@ -77,20 +77,17 @@ pub(crate) fn merge(
         if pairs.is_empty() {
             break;
         }
-        let unions: Vec<Option<Candidate>> = pairs
-            .par_iter()
-            .map(|&(a, b)| {
-                let (a, b) = (charts[a as usize].as_ref()?, charts[b as usize].as_ref()?);
-                let mut triangles = a.flat.chart.triangles.clone();
-                triangles.extend(&b.flat.chart.triangles);
-                triangles.sort_unstable();
-                let flat = try_flatten(surface, &ChartMesh::new(surface, triangles), UNION_LIMITS)?;
-                let union = Candidate::new(flat, gutter, 0);
-                let halves_fill = (a.area * a.fill + b.area * b.fill) / (a.area + b.area);
-                let crooked = union.area > large && union.fill < FILL_LEAST.min(halves_fill);
-                (!crooked && union.room <= ROOM_FACTOR * (a.room + b.room)).then_some(union)
-            })
-            .collect();
+        let unions = parallel::map_items(&pairs, |&(a, b)| {
+            let (a, b) = (charts[a as usize].as_ref()?, charts[b as usize].as_ref()?);
+            let mut triangles = a.flat.chart.triangles.clone();
+            triangles.extend(&b.flat.chart.triangles);
+            triangles.sort_unstable();
+            let flat = try_flatten(surface, &ChartMesh::new(surface, triangles), UNION_LIMITS)?;
+            let union = Candidate::new(flat, gutter, 0);
+            let halves_fill = (a.area * a.fill + b.area * b.fill) / (a.area + b.area);
+            let crooked = union.area > large && union.fill < FILL_LEAST.min(halves_fill);
+            (!crooked && union.room <= ROOM_FACTOR * (a.room + b.room)).then_some(union)
+        });
         for (&(a, b), union) in pairs.iter().zip(unions) {
             let Some(mut union) = union else {
                 if let (Some(a), Some(b)) = (&charts[a as usize], &charts[b as usize]) {

@@ -8,8 +8,8 @@
 use super::flatten::FlatChart;
 use super::shape::{Boxed, Shape, bounds, least_box};
 use crate::error::{Error, ErrorKind, Place, Result};
+use crate::math::parallel;
 use glam::{DAffine2, DMat2, DVec2};
-use rayon::prelude::*;
 use std::collections::HashMap;
 
 /// Trials of the search for the scale.
@@ -26,7 +26,7 @@ pub(crate) fn pack(
     gutter: usize,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Vec<DAffine2>> {
-    let boxes: Vec<Boxed> = charts.par_iter().map(|flat| least_box(&flat.points)).collect();
+    let boxes = parallel::map_items(charts, |flat| least_box(&flat.points));
     let area: f64 = charts.iter().map(chart_area).sum();
     let longest = boxes.iter().map(|boxed| boxed.size.x).fold(0.0, f64::max);
     let size = resolution as f64;
@@ -91,8 +91,8 @@ struct Laid {
 
 /// Lays all charts at a scale (texels per world unit) into the strip.
 fn lay(charts: &[FlatChart], boxes: &[Boxed], order: &[usize], scale: f64, resolution: usize, gutter: usize) -> Laid {
-    let prepared: Vec<Vec<(DAffine2, Shape)>> =
-        order.par_iter().map(|&index| poses(&charts[index], boxes[index], scale, resolution, charts.len())).collect();
+    let poses_of = |&index: &usize| poses(&charts[index], boxes[index], scale, resolution, charts.len());
+    let prepared = parallel::map_items(order, poses_of);
     let mut strip = Strip::new(resolution);
     let mut laid = Laid { placements: vec![DAffine2::IDENTITY; charts.len()], height: 0, complete: true };
     let limit = resolution * 3 / 2;

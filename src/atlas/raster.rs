@@ -4,6 +4,7 @@
 //! public functions turn them over.
 
 use crate::image::Image;
+use crate::math::parallel;
 use crate::scene::Mesh;
 use glam::DVec2;
 use rayon::prelude::*;
@@ -125,33 +126,30 @@ pub fn nearest_covered(covered: &Image<bool>) -> Image<u32> {
         return own;
     }
     // Within each column: the nearest covered row, stored by columns.
-    let columns: Vec<Vec<i32>> = (0..width)
-        .into_par_iter()
-        .map(|column| {
-            let mut nearest = vec![-1i32; height];
-            let mut last = -1i32;
-            for row in 0..height {
-                if covered[(row, column)] {
-                    last = row as i32;
-                }
-                nearest[row] = last;
+    let columns = parallel::map(width, |column| {
+        let mut nearest = vec![-1i32; height];
+        let mut last = -1i32;
+        for row in 0..height {
+            if covered[(row, column)] {
+                last = row as i32;
             }
-            let mut following = -1i32;
-            for row in (0..height).rev() {
-                if covered[(row, column)] {
-                    following = row as i32;
-                }
-                let above = nearest[row];
-                if above < 0 || (following >= 0 && following - (row as i32) < row as i32 - above) {
-                    nearest[row] = following;
-                }
+            nearest[row] = last;
+        }
+        let mut following = -1i32;
+        for row in (0..height).rev() {
+            if covered[(row, column)] {
+                following = row as i32;
             }
-            nearest
-        })
-        .collect();
+            let above = nearest[row];
+            if above < 0 || (following >= 0 && following - (row as i32) < row as i32 - above) {
+                nearest[row] = following;
+            }
+        }
+        nearest
+    });
     // Across columns: the lower envelope of the parabolas (x - column)^2 + distance within the column^2.
     let mut nearest = own;
-    nearest.pixels_mut().par_chunks_mut(width).enumerate().for_each(|(row, line)| {
+    parallel::each_chunk(nearest.pixels_mut(), width, &|row, line| {
         let mut hull: Vec<(usize, i64, f64)> = Vec::with_capacity(width);
         for (column, rows) in columns.iter().enumerate() {
             if rows[row] < 0 {

@@ -18,6 +18,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Runs the demo.
 pub fn demo(options: &DemoOptions, json: bool) -> Result<()> {
+    let job_options = within(options.seconds);
     let folder = RunFolder::create(&options.output)?.held()?;
     let stop = Arc::new(AtomicBool::new(false));
     stop_on_interrupt(Arc::clone(&stop));
@@ -37,7 +38,7 @@ pub fn demo(options: &DemoOptions, json: bool) -> Result<()> {
         opened.resolve(&mut settings.fit, &chosen);
         open::start_new(opened, settings, &stop, tell)
     })?;
-    let job = job::start(prepared, fitter, settings, folder.clone())?;
+    let job = job::start_with(prepared, fitter, settings, folder.clone(), job_options)?;
     watch(job, &folder, &stop, json)
 }
 

@@ -8,10 +8,10 @@ use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::material::MaterialMaps;
 use crate::material::texels::TextureTap;
+use crate::math::parallel;
 use crate::scene::Mesh;
 use crate::trace::{Bvh, Ray};
 use glam::{Mat3, Vec2, Vec3};
-use rayon::prelude::*;
 
 /// How far a ray looks, as a share of the diagonal of the result's bounding box.
 pub const REACH: f32 = 0.02;
@@ -53,15 +53,13 @@ pub fn transfer(result: &RunResult, onto: Mesh, size: usize) -> Result<Transferr
         return Err(Error::new(ErrorKind::InvalidScene, "no texture coordinate of the mesh lies in [0, 1]")
             .remedy("move its charts into the unit square: tiles beyond it are not written"));
     }
-    let taps: Vec<Option<TextureTap>> = places
-        .pixels()
-        .par_iter()
-        .map(|place| {
-            let (position, normal) = (*place)?;
-            let uv = nearest_along(&bvh, &result.mesh, position, normal, reach)?;
-            Some(TextureTap::at(uv, 0, result.maps.diffuse.width(), result.maps.diffuse.height()))
-        })
-        .collect();
+    let tap = |place: &Option<(Vec3, Vec3)>| {
+        let (position, normal) = (*place)?;
+        let uv = nearest_along(&bvh, &result.mesh, position, normal, reach)?;
+        Some(TextureTap::at(uv, 0, result.maps.diffuse.width(), result.maps.diffuse.height()))
+    };
+    let row = |_, places: &[Option<(Vec3, Vec3)>]| places.iter().map(tap).collect::<Vec<_>>();
+    let taps: Vec<Option<TextureTap>> = parallel::map_chunks(places.pixels(), size, row).concat();
     let met = taps.iter().filter(|tap| tap.is_some()).count();
     let coverage = met as f64 / wanted as f64;
     let message = format!("{:.1} % of the texels of the other mesh met the fitted surface", 100.0 * coverage);

@@ -6,6 +6,7 @@
 use crate::material::lobe::MIN_WIDTH;
 use crate::material::{Material, TexelGradient};
 use crate::math::adam::{Decay, LARGEST_GRADIENT};
+use crate::math::parallel;
 use rayon::prelude::*;
 
 /// The second moment forgets sooner than in the paper: a fit is a few hundred steps.
@@ -141,7 +142,7 @@ impl Moments {
 
 /// Mean absolute value of each of the seven numbers over the texels that a gradient touched.
 fn mean_sizes(gradient: &[TexelGradient<f32>]) -> [f32; 7] {
-    let of_chunk = |texels: &[TexelGradient<f32>]| {
+    let of_chunk = |_: usize, texels: &[TexelGradient<f32>]| {
         let (mut sums, mut count) = ([0.0f64; 7], 0.0f64);
         for own in texels.iter().filter(|own| own.evidence != 0.0 && is_sound(own)) {
             let numbers = own.d_material.to_array();
@@ -151,7 +152,7 @@ fn mean_sizes(gradient: &[TexelGradient<f32>]) -> [f32; 7] {
         (sums, count)
     };
     // Chunks of one size, added in their order: the same bits whatever the number of threads.
-    let sums: Vec<([f64; 7], f64)> = gradient.par_chunks(1 << 14).map(of_chunk).collect();
+    let sums = parallel::map_chunks(gradient, 1 << 14, of_chunk);
     let count = sums.iter().fold(0.0, |total, (_, count)| total + count);
     let total = sums.iter().fold([0.0f64; 7], |total, (sums, _)| std::array::from_fn(|k| total[k] + sums[k]));
     total.map(|sum| (sum / count.max(1.0)) as f32)

@@ -13,11 +13,11 @@ use crate::error::{Error, ErrorKind, Place, Result};
 use crate::light::EnvironmentSampler;
 use crate::material::TexelGradient;
 use crate::material::texels::PyramidWeights;
+use crate::math::parallel;
 use crate::render::accumulate::{PassKey, PassTotals, accumulate};
 use crate::render::first_hits::{CameraRays, FirstHits};
 use crate::render::{ParameterGradient, Parameters, PathSettings, PathTracer};
 use crate::scene::Background;
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A fit ends with an error when more than this share of a step's pixels is not finite.
@@ -159,17 +159,19 @@ impl Fitter {
 
 fn clear(gradient: &mut ParameterGradient<f32>) {
     for level in &mut gradient.texels.levels {
-        level.texels.par_iter_mut().with_min_len(1 << 14).for_each(|texel| *texel = TexelGradient::default());
+        parallel::each_chunk(&mut level.texels, 1 << 14, &|_, texels| texels.fill(TexelGradient::default()));
     }
     gradient.light.fill([0.0; 3]);
 }
 
 fn add_scaled(total: &mut ParameterGradient<f32>, part: &ParameterGradient<f32>, factor: f32) {
     let (total_texels, part_texels) = (&mut total.texels.levels[0].texels, &part.texels.levels[0].texels);
-    total_texels.par_iter_mut().zip(part_texels).with_min_len(1 << 14).for_each(|(total, part)| {
-        if part.evidence != 0.0 {
-            total.d_material.add_scaled(&part.d_material, factor);
-            total.evidence += part.evidence;
+    parallel::each_chunk(total_texels, 1 << 14, &|chunk, total_texels| {
+        for (total, part) in total_texels.iter_mut().zip(&part_texels[chunk << 14..]) {
+            if part.evidence != 0.0 {
+                total.d_material.add_scaled(&part.d_material, factor);
+                total.evidence += part.evidence;
+            }
         }
     });
     for (total, part) in total.light.iter_mut().zip(&part.light) {

@@ -2,9 +2,9 @@
 
 use super::views::ViewUse;
 use crate::image::Image;
+use crate::math::parallel;
 use crate::scene::{Camera, PixelState, Scene, View};
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// Pixels of a held-out view that the curve looks at.
 const HELD_OUT_PIXELS: usize = 20_000;
@@ -101,7 +101,7 @@ impl Target {
 
 /// Targets of the given views, made in parallel.
 pub fn targets(scene: &Scene, views: &[usize], level: usize) -> Vec<Target> {
-    views.par_iter().map(|&view| Target::new(scene, view, level)).collect()
+    parallel::map_items(views, |&view| Target::new(scene, view, level))
 }
 
 /// The held-out views of a scene, shrunk to a size at which looking at them costs little.

@@ -5,8 +5,8 @@
 
 use super::linear::Linear;
 use super::raster::{Image, RgbImage};
+use crate::math::parallel;
 use glam::Vec3;
-use rayon::prelude::*;
 use std::sync::OnceLock;
 
 /// A texel that may be without a value.
@@ -111,9 +111,9 @@ pub fn area_mean_of<T: Texel>(
         return small;
     }
     let (columns, rows) = (Footprint::parts(source_size.0, width), Footprint::parts(source_size.1, height));
-    small.pixels_mut().par_chunks_mut(width).zip(&rows).for_each(|(pixels, row)| {
+    parallel::each_chunk(small.pixels_mut(), width, &|row, pixels| {
         for (pixel, column) in pixels.iter_mut().zip(&columns) {
-            *pixel = mean_under(row, column, &texel);
+            *pixel = mean_under(&rows[row], column, &texel);
         }
     });
     small

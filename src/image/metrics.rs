@@ -9,9 +9,8 @@
 
 use super::raster::{GreyImage, Image, RgbImage};
 use crate::error::{Error, ErrorKind, Result};
-use crate::math::luminance;
+use crate::math::{luminance, parallel};
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
 /// The scores of one image against another.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -263,7 +262,7 @@ fn blurred(image: &Image<[f64; 5]>) -> Image<[f64; 5]> {
 
 fn each_row(width: usize, height: usize, pixel: impl Fn(usize, usize) -> [f64; 5] + Sync) -> Image<[f64; 5]> {
     let mut image = Image::filled(width, height, [0.0; 5]);
-    image.pixels_mut().par_chunks_mut(width).enumerate().for_each(|(row, pixels)| {
+    parallel::each_chunk(image.pixels_mut(), width, &|row, pixels| {
         pixels.iter_mut().enumerate().for_each(|(column, value)| *value = pixel(row, column));
     });
     image

@@ -2,20 +2,21 @@
 
 use crate::image::{GreyImage, Image};
 use crate::material::TextureTap;
+use crate::math::parallel;
 use crate::render::Surface;
 use crate::scene::{PixelState, Scene};
 use glam::Vec2;
-use rayon::prelude::*;
 
 /// In how many of the given views, by index, each texel of square maps is seen.
 pub fn times_seen_by(scene: &Scene, surface: &Surface, training: &[usize], map_size: usize) -> GreyImage {
     let mut counts = vec![0u16; map_size * map_size];
     // A few views at once: each needs a map of bits of its own.
     for group in training.chunks(8) {
-        let seen: Vec<Vec<u64>> =
-            group.par_iter().map(|&view| texels_of_view(scene, surface, view, map_size)).collect();
-        counts.par_iter_mut().enumerate().with_min_len(4096).for_each(|(index, count)| {
-            *count += seen.iter().filter(|bits| bits[index / 64] >> (index % 64) & 1 == 1).count() as u16;
+        let seen: Vec<Vec<u64>> = parallel::map_items(group, |&view| texels_of_view(scene, surface, view, map_size));
+        parallel::each_chunk(&mut counts, 4096, &|chunk, counts| {
+            for (index, count) in (4096 * chunk..).zip(counts) {
+                *count += seen.iter().filter(|bits| bits[index / 64] >> (index % 64) & 1 == 1).count() as u16;
+            }
         });
     }
     Image::from_pixels(map_size, map_size, counts.into_iter().map(f32::from).collect())

@@ -5,10 +5,10 @@
 //! depends on where one looks from; both say what mesh and cameras are worth.
 
 use crate::image::{Image, RgbImage};
+use crate::math::parallel;
 use crate::render::Surface;
 use crate::scene::{Camera, PixelState, Scene};
 use glam::{Vec2, Vec3};
-use rayon::prelude::*;
 
 /// A picture and where it is known.
 #[derive(Clone, Debug)]
@@ -23,26 +23,24 @@ pub struct Reprojected {
 pub fn reprojected(scene: &Scene, surface: &Surface, camera: &Camera, views: &[usize]) -> Reprojected {
     let eyes: Vec<(usize, Vec3)> =
         views.iter().map(|&view| (view, scene.views[view].camera.position_in_world())).collect();
-    let pixels: Vec<Option<Vec3>> = (0..camera.width * camera.height)
-        .into_par_iter()
-        .with_min_len(256)
-        .map(|pixel| {
-            let place = Vec2::new((pixel % camera.width) as f32 + 0.5, (pixel / camera.width) as f32 + 0.5);
-            let ray = camera.ray_through(place);
-            let point = surface.point_facing(&surface.closest(&ray)?, -ray.direction);
-            let mut nearest: Vec<(f32, usize, Vec3)> = eyes
-                .iter()
-                .map(|&(view, eye)| ((eye - point.position).normalize_or_zero().dot(-ray.direction), view, eye))
-                .filter(|&(_, _, eye)| (eye - point.position).dot(point.geometric_normal) > 0.0)
-                .collect();
-            nearest.sort_by(|a, b| b.0.total_cmp(&a.0));
-            nearest.into_iter().find_map(|(_, view, eye)| {
-                let place = scene.views[view].camera.place_in_picture(point.position)?;
-                let colour = sampled(scene, view, place)?;
-                (!surface.bvh().is_hidden_from(point.position, point.geometric_normal, eye)).then_some(colour)
-            })
+    let pixel = |row: usize, column: usize| {
+        let place = Vec2::new(column as f32 + 0.5, row as f32 + 0.5);
+        let ray = camera.ray_through(place);
+        let point = surface.point_facing(&surface.closest(&ray)?, -ray.direction);
+        let mut nearest: Vec<(f32, usize, Vec3)> = eyes
+            .iter()
+            .map(|&(view, eye)| ((eye - point.position).normalize_or_zero().dot(-ray.direction), view, eye))
+            .filter(|&(_, _, eye)| (eye - point.position).dot(point.geometric_normal) > 0.0)
+            .collect();
+        nearest.sort_by(|a, b| b.0.total_cmp(&a.0));
+        nearest.into_iter().find_map(|(_, view, eye)| {
+            let place = scene.views[view].camera.place_in_picture(point.position)?;
+            let colour = sampled(scene, view, place)?;
+            (!surface.bvh().is_hidden_from(point.position, point.geometric_normal, eye)).then_some(colour)
         })
-        .collect();
+    };
+    let row = |row: usize| (0..camera.width).map(|column| pixel(row, column)).collect::<Vec<_>>();
+    let pixels: Vec<Option<Vec3>> = parallel::map(camera.height, row).concat();
     let image = |pixels: Vec<Vec3>| Image::from_pixels(camera.width, camera.height, pixels);
     Reprojected {
         known: Image::from_pixels(camera.width, camera.height, pixels.iter().map(Option::is_some).collect()),

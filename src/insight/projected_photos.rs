@@ -6,11 +6,11 @@
 
 use crate::image::Image;
 use crate::material::MaterialMaps;
+use crate::math::parallel;
 use crate::render::Surface;
 use crate::render::cached::VisibilityGrid;
 use crate::scene::{Camera, Mesh, Scene};
 use glam::{Vec2, Vec3};
-use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -46,18 +46,14 @@ impl ProjectedPhotos {
     pub fn new(scene: Arc<Scene>, stop: &AtomicBool) -> Option<Self> {
         // Evenly spread, the first and the last among them.
         let count = scene.views.len().min(MOST_VIEWS);
-        let chosen = (0..count).map(|k| k * (scene.views.len() - 1) / (count - 1).max(1));
-        let views = chosen
-            .collect::<Vec<_>>()
-            .into_par_iter()
-            .map(|view| {
-                let camera = scene.views[view].camera;
-                let factor = camera.width.max(camera.height).div_ceil(DEPTH_SIDE).max(1);
-                let camera = camera.shrunk(factor);
-                let depth = if stop.load(Ordering::Relaxed) { Vec::new() } else { depth_map(&scene.mesh, &camera) };
-                DepthView { view, camera, depth }
-            })
-            .collect();
+        let views = parallel::map(count, |k| {
+            let view = k * (scene.views.len() - 1) / (count - 1).max(1);
+            let camera = scene.views[view].camera;
+            let factor = camera.width.max(camera.height).div_ceil(DEPTH_SIDE).max(1);
+            let camera = camera.shrunk(factor);
+            let depth = if stop.load(Ordering::Relaxed) { Vec::new() } else { depth_map(&scene.mesh, &camera) };
+            DepthView { view, camera, depth }
+        });
         (!stop.load(Ordering::Relaxed)).then_some(ProjectedPhotos { scene, views })
     }
 
@@ -89,22 +85,20 @@ impl ProjectedPhotos {
             Some(&normal) => self.colour(mesh.positions[vertex], normal),
             None => [0.0; 4],
         };
-        (0..mesh.positions.len()).into_par_iter().with_min_len(1024).map(colour).collect()
+        let part = |chunk: usize, points: &[Vec3]| (1024 * chunk..).take(points.len()).map(colour).collect::<Vec<_>>();
+        parallel::map_chunks(&mesh.positions, 1024, part).concat()
     }
 
     /// The colours of the texels of an atlas as a diffuse map of about this width, and which texels some photo sees.
     pub fn of_texels(&self, surface: &Surface, map_size: usize) -> (MaterialMaps, Image<bool>) {
         let side = map_size.clamp(TEXEL_SIDES.0, TEXEL_SIDES.1);
         let grid = VisibilityGrid::new(surface, side);
-        let colours: Vec<WeightedColour> = grid
-            .points
-            .par_iter()
-            .with_min_len(1024)
-            .map(|point| self.colour(point.position, point.shading_normal))
-            .collect();
+        let colours = parallel::map_chunks(&grid.points, 1024, |_, points| {
+            points.iter().map(|point| self.colour(point.position, point.shading_normal)).collect::<Vec<_>>()
+        });
         let mut diffuse = Image::filled(side, side, Vec3::ZERO);
         let mut seen = Image::filled(side, side, false);
-        for (point, [red, green, blue, weight]) in grid.points.iter().zip(colours) {
+        for (point, [red, green, blue, weight]) in grid.points.iter().zip(colours.into_iter().flatten()) {
             let place = (point.texel as usize / side, point.texel as usize % side);
             diffuse[place] = Vec3::new(red, green, blue);
             seen[place] = weight > 0.0;

@@ -6,13 +6,13 @@
 
 use super::cursor::{seen_at, texel_of_uv};
 use crate::light::environment::brightest_direction;
+use crate::math::parallel;
 use crate::render::picture::PictureSettings;
 use crate::render::progressive::PictureTracer;
 use crate::render::surface::SurfacePoint;
 use crate::render::{Parameters, PathArena, Surface};
 use crate::scene::{PixelState, Scene};
 use glam::{Vec2, Vec3};
-use rayon::prelude::*;
 
 /// How a record is made.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -100,36 +100,33 @@ pub fn texel_record(
     let base = &parameters.texels.levels[0];
     let (width, height) = (base.width, base.height);
     let map_side = ((width * height) as f32).sqrt();
-    let rows: Vec<ViewRow> = (0..scene.views.len())
-        .into_par_iter()
-        .map_init(PathArena::default, |arena, view| {
-            let place = seen_at(scene, surface, view, point)?;
-            let own = &scene.views[view];
-            let (row, column) = (place.y as usize, place.x as usize);
-            let samples = settings.picture.samples;
-            let (traced, _) =
-                tracer.pixel(&own.camera, view as u32, row * own.camera.width + column, samples, 0, arena);
-            let photo = own.photo.radiance(row, column);
-            let model = traced * settings.gains.get(view).copied().unwrap_or(1.0);
-            let to_camera = own.camera.position_in_world() - point.position;
-            let cosine = point.geometric_normal.dot(to_camera.normalize_or_zero()).max(0.05);
-            let pixel_in_world = own.camera.pixel_angle_radians() * to_camera.length() / cosine.sqrt();
-            Some(ViewRow {
-                view,
-                name: own.name.clone(),
-                place,
-                photo,
-                state: own.states[(row, column)],
-                model,
-                residual: model - photo,
-                angle_degrees: angle_degrees(point.shading_normal, to_camera),
-                footprint_texels: pixel_in_world * point.uv_per_length * map_side,
-                held_out: own.held_out,
-                is_excluded: settings.excluded.get(view).copied().unwrap_or(false),
-            })
+    let row_of = |view: usize| {
+        let place = seen_at(scene, surface, view, point)?;
+        let own = &scene.views[view];
+        let (row, column) = (place.y as usize, place.x as usize);
+        let samples = settings.picture.samples;
+        let (pixel, mut arena) = (row * own.camera.width + column, PathArena::default());
+        let (traced, _) = tracer.pixel(&own.camera, view as u32, pixel, samples, 0, &mut arena);
+        let photo = own.photo.radiance(row, column);
+        let model = traced * settings.gains.get(view).copied().unwrap_or(1.0);
+        let to_camera = own.camera.position_in_world() - point.position;
+        let cosine = point.geometric_normal.dot(to_camera.normalize_or_zero()).max(0.05);
+        let pixel_in_world = own.camera.pixel_angle_radians() * to_camera.length() / cosine.sqrt();
+        Some(ViewRow {
+            view,
+            name: own.name.clone(),
+            place,
+            photo,
+            state: own.states[(row, column)],
+            model,
+            residual: model - photo,
+            angle_degrees: angle_degrees(point.shading_normal, to_camera),
+            footprint_texels: pixel_in_world * point.uv_per_length * map_side,
+            held_out: own.held_out,
+            is_excluded: settings.excluded.get(view).copied().unwrap_or(false),
         })
-        .flatten()
-        .collect();
+    };
+    let rows: Vec<ViewRow> = parallel::map(scene.views.len(), row_of).into_iter().flatten().collect();
 
     let directions: Vec<Vec3> = rows
         .iter()

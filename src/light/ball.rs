@@ -5,9 +5,9 @@
 
 use super::environment::Environment;
 use crate::image::{Image, RgbImage};
+use crate::math::parallel;
 use crate::math::sphere;
 use glam::{Quat, Vec3};
-use rayon::prelude::*;
 
 /// Samples a pixel along each side.
 const SAMPLES: usize = 3;
@@ -44,7 +44,7 @@ pub fn matte_ball(environment: &Environment, size: usize, world_from_ball: Quat)
 /// The picture of `radiance(normal)` on a ball that fills it.
 fn ball(size: usize, radiance: impl Fn(Vec3) -> Vec3 + Sync) -> RgbImage {
     let mut picture = Image::filled(size, size, Vec3::ZERO);
-    picture.pixels_mut().par_chunks_mut(size.max(1)).enumerate().for_each(|(row, pixels)| {
+    parallel::each_chunk(picture.pixels_mut(), size.max(1), &|row, pixels| {
         for (column, pixel) in pixels.iter_mut().enumerate() {
             let mut sum = Vec3::ZERO;
             for sample in 0..SAMPLES * SAMPLES {

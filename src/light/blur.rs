@@ -2,9 +2,9 @@
 
 use super::Environment;
 use crate::image::Image;
+use crate::math::parallel;
 use crate::math::sphere;
 use glam::DVec3;
-use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
 /// Angles in degrees by which lights are told apart from coarse to fine: below a texel of a small map, a highlight, a
@@ -18,23 +18,20 @@ impl Environment {
         let (width, height) = (self.width(), self.height());
         let kernel = BlurKernel::new(width, height, degrees);
         let radiance = self.radiance.pixels();
-        let rows: Vec<Vec<DVec3>> = (0..height)
-            .into_par_iter()
-            .map(|row| {
-                let mut sums = vec![(DVec3::ZERO, 0.0); width];
-                for other in 0..height {
-                    let weights = kernel.between(row, other);
-                    for (column, (sum, total)) in sums.iter_mut().enumerate() {
-                        for (from, radiance) in radiance[other * width..(other + 1) * width].iter().enumerate() {
-                            let weight = weights[column.abs_diff(from)];
-                            *sum += weight * radiance.as_dvec3();
-                            *total += weight;
-                        }
+        let rows: Vec<Vec<DVec3>> = parallel::map(height, |row| {
+            let mut sums = vec![(DVec3::ZERO, 0.0); width];
+            for other in 0..height {
+                let weights = kernel.between(row, other);
+                for (column, (sum, total)) in sums.iter_mut().enumerate() {
+                    for (from, radiance) in radiance[other * width..(other + 1) * width].iter().enumerate() {
+                        let weight = weights[column.abs_diff(from)];
+                        *sum += weight * radiance.as_dvec3();
+                        *total += weight;
                     }
                 }
-                sums.into_iter().map(|(sum, total)| sum / total.max(f64::MIN_POSITIVE)).collect()
-            })
-            .collect();
+            }
+            sums.into_iter().map(|(sum, total)| sum / total.max(f64::MIN_POSITIVE)).collect()
+        });
         let pixels = rows.into_iter().flatten().map(|value| value.as_vec3()).collect();
         Environment { radiance: Image::from_pixels(width, height, pixels) }
     }

@@ -8,9 +8,9 @@ use super::lobe::{LobeModel, MIN_WIDTH, Material};
 use super::maps::MaterialMaps;
 use crate::image::Image;
 use crate::math::elementary;
+use crate::math::parallel;
 use crate::math::real::Real;
 use glam::{Vec2, Vec3};
-use rayon::prelude::*;
 
 /// One level of a chain.
 #[derive(Clone, Debug, PartialEq)]
@@ -189,8 +189,10 @@ impl<R: Real> TexelPyramid<R> {
         for level in 1..self.levels.len() {
             let (fine, coarse) = self.levels.split_at_mut(level);
             let fine = &fine[level - 1].texels;
-            coarse[0].texels.par_iter_mut().with_min_len(1 << 13).enumerate().for_each(|(parent, texel)| {
-                *texel = mean_of_children(fine, weights, level - 1, parent);
+            parallel::each_chunk(&mut coarse[0].texels, 1 << 13, &|chunk, texels| {
+                for (texel, parent) in texels.iter_mut().zip(chunk << 13..) {
+                    *texel = mean_of_children(fine, weights, level - 1, parent);
+                }
             });
         }
     }

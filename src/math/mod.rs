@@ -3,7 +3,8 @@
 //! Read [`random`] first: every random number of the program is a pure function of its key. Then [`sphere`], the one
 //! place where a direction and a place on a latitude-longitude map meet. [`real`] lets the reflection lobe and the
 //! path sums run in `f32`, in `f64` for audits, and with derivatives for Hessian-vector products. [`elementary`] holds
-//! angles and floors for inner loops, `vector` arithmetic of several numbers at a time.
+//! angles and floors for inner loops, `vector` arithmetic of several numbers at a time, [`parallel`] work on many things at
+//! once.
 //! What is not here: linear algebra (that is glam's and faer's).
 
 pub mod adam;
@@ -12,6 +13,7 @@ pub mod clusters;
 pub mod distribution;
 pub mod elementary;
 pub mod frame;
+pub mod parallel;
 pub mod random;
 pub mod real;
 pub mod sphere;

@@ -14,8 +14,8 @@ use super::metrics::{LOG_FLOOR, TableError, log_raw, model_error};
 use super::model::ReflectanceModel;
 use super::table::{CHANNEL_SCALE, MeasuredBrdf};
 use crate::error::{Error, ErrorKind, Result};
+use crate::math::parallel;
 use crate::math::random::SequentialRandom;
-use rayon::prelude::*;
 
 /// How a model is fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,62 +107,58 @@ impl CellSample {
 
     /// The square of the main figure, estimated.
     pub fn objective(&self, model: &dyn ReflectanceModel, parameters: &[f64]) -> f64 {
-        let parts: Vec<f64> = self
-            .parts()
-            .map(|(at, log_raws, weights)| {
-                let mut values = vec![[0.0; 3]; at.len()];
-                model.evaluate(parameters, at, &mut values);
-                let mut sum = 0.0;
-                for ((value, truth), weight) in values.iter().zip(log_raws).zip(weights) {
-                    for channel in 0..3 {
-                        sum += weight / 3.0 * (log_raw(value[channel], channel) - truth[channel]).powi(2);
-                    }
+        let parts: Vec<f64> = self.parts(|at, log_raws, weights| {
+            let mut values = vec![[0.0; 3]; at.len()];
+            model.evaluate(parameters, at, &mut values);
+            let mut sum = 0.0;
+            for ((value, truth), weight) in values.iter().zip(log_raws).zip(weights) {
+                for channel in 0..3 {
+                    sum += weight / 3.0 * (log_raw(value[channel], channel) - truth[channel]).powi(2);
                 }
-                sum
-            })
-            .collect();
+            }
+            sum
+        });
         parts.iter().sum()
     }
 
-    fn parts(&self) -> impl IndexedParallelIterator<Item = (&[HalfDifference], &[[f64; 3]], &[f64])> {
-        let pairs = self.at.par_chunks(CHUNK).zip(self.log_raw.par_chunks(CHUNK)).zip(self.weight.par_chunks(CHUNK));
-        pairs.map(|((at, log_raw), weight)| (at, log_raw, weight))
+    fn parts<R: Send>(&self, of: impl Fn(&[HalfDifference], &[[f64; 3]], &[f64]) -> R + Sync) -> Vec<R> {
+        parallel::map_chunks(&self.at, CHUNK, |chunk, at| {
+            let own = chunk * CHUNK..chunk * CHUNK + at.len();
+            of(at, &self.log_raw[own.clone()], &self.weight[own])
+        })
     }
 
     /// Objective, gradient halved, and the matrix of Gauss and Newton (row-major, full).
     fn normal_equations(&self, model: &dyn ReflectanceModel, parameters: &[f64]) -> (f64, Vec<f64>, Vec<f64>) {
         let n = parameters.len();
-        let parts: Vec<(f64, Vec<f64>, Vec<f64>)> = self
-            .parts()
-            .map(|(at, log_raws, weights)| {
-                let mut values = vec![[0.0; 3]; at.len()];
-                model.evaluate(parameters, at, &mut values);
-                let (mut sum, mut gradient, mut matrix) = (0.0, vec![0.0; n], vec![0.0; n * n]);
-                let mut row = vec![0.0; n];
-                for (index, value) in values.iter().enumerate() {
-                    for channel in 0..3 {
-                        let weight = weights[index] / 3.0;
-                        let residual = log_raw(value[channel], channel) - log_raws[index][channel];
-                        sum += weight * residual * residual;
-                        let raw = value[channel].max(0.0) / CHANNEL_SCALE[channel];
-                        let mut adjoint = [[0.0; 3]];
-                        adjoint[0][channel] = 1.0 / (CHANNEL_SCALE[channel] * (raw + LOG_FLOOR));
-                        row.fill(0.0);
-                        model.pull_back(parameters, &at[index..=index], &adjoint, &mut row);
-                        for i in 0..n {
-                            let weighted = weight * row[i];
-                            if weighted != 0.0 {
-                                gradient[i] += weighted * residual;
-                                for j in 0..=i {
-                                    matrix[i * n + j] += weighted * row[j];
-                                }
+        let parts: Vec<(f64, Vec<f64>, Vec<f64>)> = self.parts(|at, log_raws, weights| {
+            let mut values = vec![[0.0; 3]; at.len()];
+            model.evaluate(parameters, at, &mut values);
+            let (mut sum, mut gradient, mut matrix) = (0.0, vec![0.0; n], vec![0.0; n * n]);
+            let mut row = vec![0.0; n];
+            for (index, value) in values.iter().enumerate() {
+                for channel in 0..3 {
+                    let weight = weights[index] / 3.0;
+                    let residual = log_raw(value[channel], channel) - log_raws[index][channel];
+                    sum += weight * residual * residual;
+                    let raw = value[channel].max(0.0) / CHANNEL_SCALE[channel];
+                    let mut adjoint = [[0.0; 3]];
+                    adjoint[0][channel] = 1.0 / (CHANNEL_SCALE[channel] * (raw + LOG_FLOOR));
+                    row.fill(0.0);
+                    model.pull_back(parameters, &at[index..=index], &adjoint, &mut row);
+                    for i in 0..n {
+                        let weighted = weight * row[i];
+                        if weighted != 0.0 {
+                            gradient[i] += weighted * residual;
+                            for j in 0..=i {
+                                matrix[i * n + j] += weighted * row[j];
                             }
                         }
                     }
                 }
-                (sum, gradient, matrix)
-            })
-            .collect();
+            }
+            (sum, gradient, matrix)
+        });
         let (mut sum, mut gradient, mut matrix) = (0.0, vec![0.0; n], vec![0.0; n * n]);
         for part in parts {
             sum += part.0;

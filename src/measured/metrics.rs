@@ -9,7 +9,7 @@ use super::grid;
 use super::model::ReflectanceModel;
 use super::table::{CHANNEL_SCALE, MeasuredBrdf};
 use crate::error::{Error, ErrorKind, Result};
-use rayon::prelude::*;
+use crate::math::parallel;
 
 /// What is added to a stored value before its logarithm is taken.
 pub const LOG_FLOOR: f64 = 1e-6;
@@ -75,31 +75,28 @@ fn error_over(truth: &MeasuredBrdf, fill: impl Fn(&[u32], &mut [[f64; 3]]) + Syn
     if cells.is_empty() {
         return Err(Error::new(ErrorKind::NonFinite, "no cell of the table counts: its red is 0 everywhere"));
     }
-    let parts: Vec<Sums> = cells
-        .par_chunks(CHUNK)
-        .map(|cells| {
-            let mut values = vec![[0.0; 3]; cells.len()];
-            fill(cells, &mut values);
-            let mut sums = Sums::default();
-            for (&cell, value) in cells.iter().zip(&values) {
-                let truth = truth.value(cell as usize);
-                let [cosine, _] = grid::cosines(grid::coordinates_of_cell(cell as usize));
-                for channel in 0..3 {
-                    // `max` turns what is not a number into 0.
-                    let (value, truth) = (value[channel].max(0.0), truth[channel]);
-                    sums.natural += (log_raw(value, channel) - log_raw(truth, channel)).powi(2);
-                    if truth > 0.0 {
-                        sums.decimal += ((value + LOG10_FLOOR).log10() - (truth + LOG10_FLOOR).log10()).powi(2);
-                        sums.decimal_count += 1;
-                    }
-                    let difference = (value * cosine.max(0.0)).ln_1p() - (truth * cosine.max(0.0)).ln_1p();
-                    sums.cosine_square += difference * difference;
-                    sums.cosine_absolute += difference.abs();
+    let parts: Vec<Sums> = parallel::map_chunks(&cells, CHUNK, |_, cells| {
+        let mut values = vec![[0.0; 3]; cells.len()];
+        fill(cells, &mut values);
+        let mut sums = Sums::default();
+        for (&cell, value) in cells.iter().zip(&values) {
+            let truth = truth.value(cell as usize);
+            let [cosine, _] = grid::cosines(grid::coordinates_of_cell(cell as usize));
+            for channel in 0..3 {
+                // `max` turns what is not a number into 0.
+                let (value, truth) = (value[channel].max(0.0), truth[channel]);
+                sums.natural += (log_raw(value, channel) - log_raw(truth, channel)).powi(2);
+                if truth > 0.0 {
+                    sums.decimal += ((value + LOG10_FLOOR).log10() - (truth + LOG10_FLOOR).log10()).powi(2);
+                    sums.decimal_count += 1;
                 }
+                let difference = (value * cosine.max(0.0)).ln_1p() - (truth * cosine.max(0.0)).ln_1p();
+                sums.cosine_square += difference * difference;
+                sums.cosine_absolute += difference.abs();
             }
-            sums
-        })
-        .collect();
+        }
+        sums
+    });
     let mut total = Sums::default();
     for part in &parts {
         total.natural += part.natural;

@@ -11,11 +11,10 @@ use crate::image::metrics::{self, Scores};
 use crate::image::transfer::srgb_from_linear;
 use crate::image::{Image, RgbImage};
 use crate::light::Environment;
-use crate::math::luminance;
 use crate::math::sphere::{direction_of_texel, solid_angle_of_texel};
 use crate::math::statistics::quantile;
+use crate::math::{luminance, parallel};
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
 /// A lamp infinitely far away.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,23 +66,19 @@ pub fn render_sphere(
     lamps: &[DistantLamp],
 ) -> RgbImage {
     let normals = sphere_normals(size);
-    let pixels: Vec<Vec3> = normals
-        .pixels()
-        .par_iter()
-        .map(|normal| {
-            let Some(normal) = normal else { return Vec3::ZERO };
-            // Isotropic: any tangents do, and these are the eye's own, for the eye is at +z.
-            let mut sum = DVec3::ZERO;
-            for lamp in lamps {
-                let cosine = normal.dot(lamp.to_light);
-                if cosine > 0.0 {
-                    let at = angles_about(*normal, lamp.to_light, DVec3::Z);
-                    sum += DVec3::from_array(reflectance(at)) * lamp.irradiance * cosine;
-                }
+    let pixels: Vec<Vec3> = parallel::map_items(normals.pixels(), |normal| {
+        let Some(normal) = normal else { return Vec3::ZERO };
+        // Isotropic: any tangents do, and these are the eye's own, for the eye is at +z.
+        let mut sum = DVec3::ZERO;
+        for lamp in lamps {
+            let cosine = normal.dot(lamp.to_light);
+            if cosine > 0.0 {
+                let at = angles_about(*normal, lamp.to_light, DVec3::Z);
+                sum += DVec3::from_array(reflectance(at)) * lamp.irradiance * cosine;
             }
-            sum.as_vec3()
-        })
-        .collect();
+        }
+        sum.as_vec3()
+    });
     Image::from_pixels(size, size, pixels)
 }
 
@@ -146,25 +141,21 @@ pub fn render_sphere_in(
     // that.
     let count = size.max(128);
     let rings: Vec<Vec<Contribution>> =
-        (0..count).into_par_iter().map(|ring| contributions((ring as f64 + 0.5) / count as f64, reflectance)).collect();
+        parallel::map(count, |ring| contributions((ring as f64 + 0.5) / count as f64, reflectance));
     let normals = sphere_normals(size);
-    let pixels: Vec<Vec3> = normals
-        .pixels()
-        .par_iter()
-        .map(|normal| {
-            let Some(normal) = *normal else { return Vec3::ZERO };
-            let radius = normal.x.hypot(normal.y);
-            let tangent = (DVec3::Z - normal * normal.z).try_normalize().unwrap_or(DVec3::X);
-            let bitangent = normal.cross(tangent);
-            let mut sum = DVec3::ZERO;
-            for part in &rings[((radius * count as f64) as usize).min(count - 1)] {
-                let l = part.to_light;
-                let world = tangent * l.x + bitangent * l.y + normal * l.z;
-                sum += environment.radiance(world, part.solid_angle) * part.weight;
-            }
-            sum.as_vec3()
-        })
-        .collect();
+    let pixels: Vec<Vec3> = parallel::map_items(normals.pixels(), |normal| {
+        let Some(normal) = *normal else { return Vec3::ZERO };
+        let radius = normal.x.hypot(normal.y);
+        let tangent = (DVec3::Z - normal * normal.z).try_normalize().unwrap_or(DVec3::X);
+        let bitangent = normal.cross(tangent);
+        let mut sum = DVec3::ZERO;
+        for part in &rings[((radius * count as f64) as usize).min(count - 1)] {
+            let l = part.to_light;
+            let world = tangent * l.x + bitangent * l.y + normal * l.z;
+            sum += environment.radiance(world, part.solid_angle) * part.weight;
+        }
+        sum.as_vec3()
+    });
     Image::from_pixels(size, size, pixels)
 }
 

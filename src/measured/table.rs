@@ -4,8 +4,8 @@ use super::coordinates::HalfDifference;
 use super::grid::{self, CELL_COUNT, SLAB};
 use super::model::ReflectanceModel;
 use crate::error::{Error, ErrorKind, Result};
+use crate::math::parallel;
 use glam::DVec3;
-use rayon::prelude::*;
 
 /// Reflectance in 1/sr over stored value, per channel (the factors of MERL's reader).
 pub const CHANNEL_SCALE: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
@@ -50,7 +50,7 @@ impl MeasuredBrdf {
     /// or negative.
     pub fn from_batches(fill: impl Fn(&[HalfDifference], &mut [[f64; 3]]) + Sync) -> Self {
         let mut values = vec![[0.0; 3]; CELL_COUNT];
-        values.par_chunks_mut(SLAB).enumerate().for_each(|(slab, values)| {
+        parallel::each_chunk(&mut values, SLAB, &|slab, values| {
             let cells = slab * SLAB..(slab + 1) * SLAB;
             let above: Vec<bool> =
                 cells.clone().map(|cell| grid::is_above_horizon(grid::coordinates_of_cell(cell))).collect();
@@ -68,7 +68,7 @@ impl MeasuredBrdf {
             }
         });
         let mut raw = vec![INVALID; 3 * CELL_COUNT];
-        raw.par_chunks_mut(CELL_COUNT).enumerate().for_each(|(channel, raw)| {
+        parallel::each_chunk(&mut raw, CELL_COUNT, &|channel, raw| {
             for (raw, value) in raw.iter_mut().zip(&values) {
                 if value[channel] >= 0.0 {
                     *raw = value[channel] / CHANNEL_SCALE[channel];

@@ -9,8 +9,8 @@ use super::columns::{Nest, NestPoints};
 use super::flow::Flow;
 use super::pass::Pass;
 use super::target::TargetGrid;
+use crate::math::parallel;
 use crate::math::random::{SequentialRandom, mix};
-use rayon::prelude::*;
 
 /// Groups that one thread takes at once: fixed, so that sums are taken in the same order whatever the threads.
 const GROUPS_PER_CHUNK: usize = 8;
@@ -125,8 +125,7 @@ pub fn evaluate(flow: &Flow, tasks: &[Task], codes: &[f32], nest: Nest, key: u64
     // A few chunks at a time, added in order: memory stays small and the bits the same.
     let mut sum = Found { figures: Figures::default(), d_weights: Vec::new(), d_codes: Vec::new() };
     for first in (0..chunk_count).step_by(8) {
-        let found: Vec<Found> = (first..(first + 8).min(chunk_count)).into_par_iter().map(of_chunk).collect();
-        for found in found {
+        for found in parallel::map((chunk_count - first).min(8), |index| of_chunk(first + index)) {
             sum.figures.log_likelihood += found.figures.log_likelihood;
             sum.figures.divergence += found.figures.divergence;
             sum.figures.squared_log_error += found.figures.squared_log_error;

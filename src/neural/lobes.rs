@@ -7,7 +7,7 @@ use super::batch::LARGEST_EXPONENT;
 use super::columns::{Nest, NestPoints};
 use super::flow::Flow;
 use super::pass::Pass;
-use rayon::prelude::*;
+use crate::math::parallel;
 
 /// The stored value of a density, `expm1(exp(colour) p)` as released, and its derivative by the colour's logarithm (equal
 /// to that by the density's).
@@ -63,15 +63,12 @@ pub fn log_densities(flow: &Flow, codes: &[f32], groups: usize, columns: &CubeCo
     // Many codes at once would make large intermediate results: a few groups at a time.
     let blocks: Vec<(usize, usize)> =
         (0..groups.div_ceil(12)).flat_map(|block| (0..columns.chunks()).map(move |chunk| (block, chunk))).collect();
-    let parts: Vec<Vec<f64>> = blocks
-        .par_iter()
-        .map(|&(block, chunk)| {
-            let range = block * 12..((block + 1) * 12).min(groups);
-            let (nest, at, halves) = columns.part(chunk);
-            let nested = CubeColumns::nested(&at, halves, range.len());
-            Pass::of(flow).forward(flow, &codes[range.start * length..range.end * length], nest, &nested)
-        })
-        .collect();
+    let parts = parallel::map_items(&blocks, |&(block, chunk)| {
+        let range = block * 12..((block + 1) * 12).min(groups);
+        let (nest, at, halves) = columns.part(chunk);
+        let nested = CubeColumns::nested(&at, halves, range.len());
+        Pass::of(flow).forward(flow, &codes[range.start * length..range.end * length], nest, &nested)
+    });
     let mut densities: Vec<Vec<f32>> = (0..groups).map(|_| Vec::with_capacity(columns.halves.len())).collect();
     for ((block, _), part) in blocks.iter().zip(&parts) {
         let groups = (groups - block * 12).min(12);
@@ -92,23 +89,20 @@ pub fn pull_back_codes(
     d_log_density: &[Vec<f32>],
     d_codes: &mut [f32],
 ) {
-    let parts: Vec<Vec<f32>> = (0..columns.chunks())
-        .into_par_iter()
-        .map(|chunk| {
-            let (nest, at, halves) = columns.part(chunk);
-            let nested = CubeColumns::nested(&at, halves, groups);
-            let mut pass = Pass::of(flow);
-            pass.forward(flow, codes, nest, &nested);
-            let from = chunk * CHUNK * columns.per_column();
-            let adjoint: Vec<f64> = d_log_density
-                .iter()
-                .flat_map(|own| own[from..from + halves.len()].iter().map(|&value| f64::from(value)))
-                .collect();
-            let mut d_codes = vec![0.0; codes.len()];
-            pass.backward(flow, nest, &nested, &adjoint, &mut [], &mut d_codes);
-            d_codes
-        })
-        .collect();
+    let parts = parallel::map(columns.chunks(), |chunk| {
+        let (nest, at, halves) = columns.part(chunk);
+        let nested = CubeColumns::nested(&at, halves, groups);
+        let mut pass = Pass::of(flow);
+        pass.forward(flow, codes, nest, &nested);
+        let from = chunk * CHUNK * columns.per_column();
+        let adjoint: Vec<f64> = d_log_density
+            .iter()
+            .flat_map(|own| own[from..from + halves.len()].iter().map(|&value| f64::from(value)))
+            .collect();
+        let mut d_codes = vec![0.0; codes.len()];
+        pass.backward(flow, nest, &nested, &adjoint, &mut [], &mut d_codes);
+        d_codes
+    });
     for part in parts {
         d_codes.iter_mut().zip(&part).for_each(|(sum, own)| *sum += own);
     }

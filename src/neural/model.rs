@@ -13,6 +13,7 @@ use super::lobes::{CubeColumns, log_densities, pull_back_codes, stored_value};
 use super::nodes::GridShape;
 use super::warp::{AZIMUTH, DIFFERENCE, HALF, to_cube};
 use super::weights::Trained;
+use crate::math::parallel;
 use crate::measured::coordinates::HalfDifference;
 use crate::measured::grid::{
     CELL_COUNT, PHI_DIFFERENCE_COUNT, THETA_DIFFERENCE_COUNT, THETA_HALF_COUNT, cell_of_indices, coordinates_of_cell,
@@ -97,9 +98,11 @@ impl FlowModel {
         let (codes, colours) = self.unpack(parameters);
         let densities = log_densities(&self.trained.flow, &codes, 3 * self.lobes, columns);
         let mut stored = vec![[0.0f32; 3]; columns.halves.len()];
-        stored.par_iter_mut().enumerate().with_min_len(1024).for_each(|(index, value)| {
-            for (group, density) in densities.iter().enumerate() {
-                value[group % 3] += stored_value(colours[group], f64::from(density[index])).0 as f32;
+        parallel::each_chunk(&mut stored, 1024, &|chunk, stored| {
+            for (value, index) in stored.iter_mut().zip(1024 * chunk..) {
+                for (group, density) in densities.iter().enumerate() {
+                    value[group % 3] += stored_value(colours[group], f64::from(density[index])).0 as f32;
+                }
             }
         });
         stored

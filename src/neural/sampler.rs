@@ -9,10 +9,10 @@
 //! tenth of the draws follow the cosine alone, so that nothing has no chance.
 
 use crate::math::distribution::Discrete;
+use crate::math::parallel;
 use crate::measured::coordinates::HalfDifference;
 use crate::measured::model::ReflectanceModel;
 use glam::DVec3;
-use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Elevations of the held direction, even in the angle from the normal.
@@ -54,38 +54,35 @@ fn at_height(height: f64, turn: f64) -> DVec3 {
 impl HalfVectorSampler {
     /// Tables for a model with these parameters.
     pub fn new(model: &dyn ReflectanceModel, parameters: &[f64]) -> Self {
-        let elevations = (0..ELEVATIONS)
-            .into_par_iter()
-            .map(|index| {
-                let angle = (index as f64 + 0.5) / ELEVATIONS as f64 * FRAC_PI_2;
-                let to_eye = DVec3::new(angle.sin(), 0.0, angle.cos());
-                let mut at = Vec::with_capacity(HALVES * TURNS);
-                let mut share = Vec::with_capacity(HALVES * TURNS);
-                for half in 0..HALVES {
-                    for turn in 0..TURNS {
-                        let (normal, solid_angle) = middle(half, turn);
-                        let cosine = normal.dot(to_eye);
-                        let to_light = 2.0 * cosine * normal - to_eye;
-                        // The light's solid angle is four cosines times the half vector's.
-                        let above = cosine > 0.0 && to_light.z > 0.0;
-                        share.push(if above { to_light.z * 4.0 * cosine * solid_angle } else { 0.0 });
-                        at.push(HalfDifference::from_directions(to_light, to_eye));
-                    }
+        let elevations = parallel::map(ELEVATIONS, |index| {
+            let angle = (index as f64 + 0.5) / ELEVATIONS as f64 * FRAC_PI_2;
+            let to_eye = DVec3::new(angle.sin(), 0.0, angle.cos());
+            let mut at = Vec::with_capacity(HALVES * TURNS);
+            let mut share = Vec::with_capacity(HALVES * TURNS);
+            for half in 0..HALVES {
+                for turn in 0..TURNS {
+                    let (normal, solid_angle) = middle(half, turn);
+                    let cosine = normal.dot(to_eye);
+                    let to_light = 2.0 * cosine * normal - to_eye;
+                    // The light's solid angle is four cosines times the half vector's.
+                    let above = cosine > 0.0 && to_light.z > 0.0;
+                    share.push(if above { to_light.z * 4.0 * cosine * solid_angle } else { 0.0 });
+                    at.push(HalfDifference::from_directions(to_light, to_eye));
                 }
-                let mut values = vec![[0.0; 3]; at.len()];
-                model.evaluate(parameters, &at, &mut values);
-                let mut albedo = [0.0; 3];
-                let weights: Vec<f64> = values
-                    .iter()
-                    .zip(&share)
-                    .map(|(value, share)| {
-                        (0..3).for_each(|channel| albedo[channel] += value[channel] * share);
-                        value.iter().sum::<f64>() * share
-                    })
-                    .collect();
-                Elevation { cells: Discrete::new(&weights), albedo }
-            })
-            .collect();
+            }
+            let mut values = vec![[0.0; 3]; at.len()];
+            model.evaluate(parameters, &at, &mut values);
+            let mut albedo = [0.0; 3];
+            let weights: Vec<f64> = values
+                .iter()
+                .zip(&share)
+                .map(|(value, share)| {
+                    (0..3).for_each(|channel| albedo[channel] += value[channel] * share);
+                    value.iter().sum::<f64>() * share
+                })
+                .collect();
+            Elevation { cells: Discrete::new(&weights), albedo }
+        });
         HalfVectorSampler { elevations }
     }
 

@@ -4,10 +4,10 @@
 //! the paper's code learns from the same. A grid of the cube holds it, evened out by linear interpolation.
 
 use super::warp::{AZIMUTH, DIFFERENCE, HALF, from_cube};
+use crate::math::parallel;
 use crate::measured::coordinates::HalfDifference;
 use crate::measured::grid::THETA_DIFFERENCE_COUNT;
 use crate::measured::table::CHANNEL_SCALE;
-use rayon::prelude::*;
 
 /// Nodes along `theta_half`, in the middle of as many parts.
 pub const HALVES: usize = 64;
@@ -35,24 +35,21 @@ impl TargetGrid {
     pub fn of_reflectance(fill: impl Fn(&[HalfDifference], &mut [[f64; 3]]) + Sync) -> [TargetGrid; 3] {
         // What a table of MERL's cannot hold, beyond its last node, is held at that node.
         let last_node = (THETA_DIFFERENCE_COUNT - 1) as f64 / THETA_DIFFERENCE_COUNT as f64;
-        let slabs: Vec<Vec<[f64; 3]>> = (0..AZIMUTHS)
-            .into_par_iter()
-            .map(|azimuth| {
-                let mut at = Vec::with_capacity(HALVES * DIFFERENCES);
-                for difference in 0..DIFFERENCES {
-                    for half in 0..HALVES {
-                        let mut point = [0.0; 3];
-                        point[HALF] = (half as f64 + 0.5) / HALVES as f64;
-                        point[DIFFERENCE] = ((difference as f64 + 0.5) / DIFFERENCES as f64).min(last_node);
-                        point[AZIMUTH] = (azimuth as f64 + 0.5) / AZIMUTHS as f64;
-                        at.push(from_cube(point));
-                    }
+        let slabs = parallel::map(AZIMUTHS, |azimuth| {
+            let mut at = Vec::with_capacity(HALVES * DIFFERENCES);
+            for difference in 0..DIFFERENCES {
+                for half in 0..HALVES {
+                    let mut point = [0.0; 3];
+                    point[HALF] = (half as f64 + 0.5) / HALVES as f64;
+                    point[DIFFERENCE] = ((difference as f64 + 0.5) / DIFFERENCES as f64).min(last_node);
+                    point[AZIMUTH] = (azimuth as f64 + 0.5) / AZIMUTHS as f64;
+                    at.push(from_cube(point));
                 }
-                let mut values = vec![[0.0; 3]; at.len()];
-                fill(&at, &mut values);
-                values
-            })
-            .collect();
+            }
+            let mut values = vec![[0.0; 3]; at.len()];
+            fill(&at, &mut values);
+            values
+        });
         [0, 1, 2].map(|channel| {
             let values: Vec<f32> = slabs
                 .iter()

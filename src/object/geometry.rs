@@ -2,11 +2,10 @@
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::image::Image;
-use crate::math::sphere;
+use crate::math::{parallel, sphere};
 use crate::scene::{Camera, Mesh};
 use crate::trace::{Bvh, Ray};
 use glam::{Vec2, Vec3};
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Pixels that see the surface more obliquely than this cosine are left out: models and meshes are worst there.
@@ -104,11 +103,10 @@ impl ObjectGeometry {
             };
             &with_normals
         };
-        let rows: Vec<Vec<ObjectPixel>> = (0..camera.height)
-            .into_par_iter()
-            .map(|row| (0..camera.width).filter_map(|column| seen(mesh, &bvh, camera, row, column)).collect())
-            .collect();
-        Self::of_pixels(camera.width, camera.height, rows.into_iter().flatten().collect(), Some(bvh))
+        let rows: Vec<Vec<ObjectPixel>> = parallel::map(camera.height, |row| {
+            (0..camera.width).filter_map(|column| seen(mesh, &bvh, camera, row, column)).collect()
+        });
+        Self::of_pixels(camera.width, camera.height, rows.concat(), Some(bvh))
     }
 
     /// Keeps apart what is seen too obliquely.
@@ -156,8 +154,8 @@ impl ObjectGeometry {
             .collect();
         let words = directions.len().div_ceil(64);
         let mut bits = vec![0u64; words * pixels.len()];
-        bits.par_chunks_mut(words * CHUNK).zip(pixels.par_chunks(CHUNK)).for_each(|(bits, pixels)| {
-            for (bits, pixel) in bits.chunks_mut(words).zip(pixels) {
+        parallel::each_chunk(&mut bits, words * CHUNK, &|chunk, bits| {
+            for (bits, pixel) in bits.chunks_mut(words).zip(&pixels[chunk * CHUNK..]) {
                 for (texel, &direction) in directions.iter().enumerate() {
                     if pixel.normal.dot(direction) <= 0.0 || pixel.geometric_normal.dot(direction) <= 0.0 {
                         continue;

@@ -5,9 +5,8 @@
 
 use super::nodes::{NodeReader, NodeTable};
 use super::transport::Transport;
-use crate::math::sum_of_products;
+use crate::math::{parallel, sum_of_products};
 use glam::{Vec3, Vec3A};
-use rayon::prelude::*;
 
 /// Pixels a task; sums over chunks are taken in their order.
 const CHUNK: usize = 32;
@@ -46,7 +45,7 @@ impl LightMatrix {
             }
             texels
         });
-        let chunks = rows.par_chunks(CHUNK).map(LightChunk::of_rows).collect();
+        let chunks = parallel::map_chunks(&rows, CHUNK, |_, rows| LightChunk::of_rows(rows));
         LightMatrix { texels: transport.directions().len(), pixels: rows.len(), chunks }
     }
 
@@ -79,8 +78,7 @@ impl LightMatrix {
 
     /// The pixels of a light given channel by channel.
     pub fn forward(&self, light: &[Vec<f32>; 3]) -> Vec<[f32; 3]> {
-        let parts: Vec<Vec<[f32; 3]>> = self.chunks.par_iter().map(|chunk| chunk.forward(light)).collect();
-        parts.into_iter().flatten().collect()
+        parallel::map_items(&self.chunks, |chunk| chunk.forward(light)).concat()
     }
 
     /// The transpose of [`LightMatrix::forward`], channel by channel.
@@ -95,18 +93,13 @@ impl LightMatrix {
 
     fn transposed(&self, by_pixels: &[[f32; 3]], squared: bool) -> [Vec<f32>; 3] {
         const GROUP: usize = 4;
-        let parts: Vec<[Vec<f32>; 3]> = self
-            .chunks
-            .par_chunks(GROUP)
-            .zip(by_pixels.par_chunks(GROUP * CHUNK))
-            .map(|(chunks, by_pixels)| {
-                let mut sums = [0; 3].map(|_| vec![0.0f32; self.texels]);
-                for (chunk, by_pixels) in chunks.iter().zip(by_pixels.chunks(CHUNK)) {
-                    chunk.add_transposed(by_pixels, squared, &mut sums);
-                }
-                sums
-            })
-            .collect();
+        let parts: Vec<[Vec<f32>; 3]> = parallel::map_chunks(&self.chunks, GROUP, |group, chunks| {
+            let mut sums = [0; 3].map(|_| vec![0.0f32; self.texels]);
+            for (chunk, by_pixels) in chunks.iter().zip(by_pixels.chunks(CHUNK).skip(group * GROUP)) {
+                chunk.add_transposed(by_pixels, squared, &mut sums);
+            }
+            sums
+        });
         let mut sums = [0; 3].map(|_| vec![0.0f64; self.texels]);
         for part in parts {
             for (sums, part) in sums.iter_mut().zip(part) {
@@ -208,67 +201,55 @@ impl NodeMatrix {
             let touched = sums.into_iter().enumerate().filter(|(_, value)| *value != Vec3A::ZERO);
             touched.map(|(node, value)| (node as u16, value.to_array())).collect::<Vec<_>>()
         });
-        let chunks = rows
-            .par_chunks(CHUNK)
-            .map(|rows| {
-                let mut starts = vec![0u32];
-                for row in rows {
-                    starts.push(starts[starts.len() - 1] + row.len() as u32);
-                }
-                let columns = rows.iter().flatten().map(|(node, _)| *node).collect();
-                let values = rows.iter().flatten().map(|(_, value)| *value).collect();
-                NodeChunk { starts, columns, values }
-            })
-            .collect();
+        let chunks = parallel::map_chunks(&rows, CHUNK, |_, rows| {
+            let mut starts = vec![0u32];
+            for row in rows {
+                starts.push(starts[starts.len() - 1] + row.len() as u32);
+            }
+            let columns = rows.iter().flatten().map(|(node, _)| *node).collect();
+            let values = rows.iter().flatten().map(|(_, value)| *value).collect();
+            NodeChunk { starts, columns, values }
+        });
         NodeMatrix { nodes: grid.len(), chunks }
     }
 
     /// The pixels of a reflectance.
     pub fn forward(&self, table: &NodeTable) -> Vec<[f32; 3]> {
-        let parts: Vec<Vec<[f32; 3]>> = self
-            .chunks
-            .par_iter()
-            .map(|chunk| {
-                let pixel = |bounds: &[u32]| {
-                    let range = bounds[0] as usize..bounds[1] as usize;
-                    let mut sums = [0.0f64; 3];
-                    for (column, value) in chunk.columns[range.clone()].iter().zip(&chunk.values[range]) {
-                        let node = table.values[usize::from(*column)];
-                        for channel in 0..3 {
-                            sums[channel] += f64::from(value[channel] * node[channel]);
-                        }
+        let parts: Vec<Vec<[f32; 3]>> = parallel::map_items(&self.chunks, |chunk| {
+            let pixel = |bounds: &[u32]| {
+                let range = bounds[0] as usize..bounds[1] as usize;
+                let mut sums = [0.0f64; 3];
+                for (column, value) in chunk.columns[range.clone()].iter().zip(&chunk.values[range]) {
+                    let node = table.values[usize::from(*column)];
+                    for channel in 0..3 {
+                        sums[channel] += f64::from(value[channel] * node[channel]);
                     }
-                    sums.map(|sum| sum as f32)
-                };
-                chunk.starts.windows(2).map(pixel).collect()
-            })
-            .collect();
-        parts.into_iter().flatten().collect()
+                }
+                sums.map(|sum| sum as f32)
+            };
+            chunk.starts.windows(2).map(pixel).collect()
+        });
+        parts.concat()
     }
 
     /// The transpose of [`NodeMatrix::forward`]: derivatives by the values at nodes.
     pub fn adjoint(&self, by_pixels: &[[f32; 3]]) -> Vec<[f64; 3]> {
         const GROUP: usize = 8;
-        let parts: Vec<Vec<[f32; 3]>> = self
-            .chunks
-            .par_chunks(GROUP)
-            .zip(by_pixels.par_chunks(GROUP * CHUNK))
-            .map(|(chunks, by_pixels)| {
-                let mut sums = vec![[0.0f32; 3]; self.nodes];
-                for (chunk, by_pixels) in chunks.iter().zip(by_pixels.chunks(CHUNK)) {
-                    for (bounds, by_pixel) in chunk.starts.windows(2).zip(by_pixels) {
-                        let range = bounds[0] as usize..bounds[1] as usize;
-                        for (column, value) in chunk.columns[range.clone()].iter().zip(&chunk.values[range]) {
-                            let sum = &mut sums[usize::from(*column)];
-                            for channel in 0..3 {
-                                sum[channel] += value[channel] * by_pixel[channel];
-                            }
+        let parts: Vec<Vec<[f32; 3]>> = parallel::map_chunks(&self.chunks, GROUP, |group, chunks| {
+            let mut sums = vec![[0.0f32; 3]; self.nodes];
+            for (chunk, by_pixels) in chunks.iter().zip(by_pixels.chunks(CHUNK).skip(group * GROUP)) {
+                for (bounds, by_pixel) in chunk.starts.windows(2).zip(by_pixels) {
+                    let range = bounds[0] as usize..bounds[1] as usize;
+                    for (column, value) in chunk.columns[range.clone()].iter().zip(&chunk.values[range]) {
+                        let sum = &mut sums[usize::from(*column)];
+                        for channel in 0..3 {
+                            sum[channel] += value[channel] * by_pixel[channel];
                         }
                     }
                 }
-                sums
-            })
-            .collect();
+            }
+            sums
+        });
         let mut sums = vec![[0.0f64; 3]; self.nodes];
         for part in parts {
             for (sum, value) in sums.iter_mut().zip(part) {

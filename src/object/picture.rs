@@ -8,10 +8,9 @@ use super::nodes::{NodeGrid, NodeReader, NodeTable, weights};
 use super::transport::TexelDirections;
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::light::Environment;
-use crate::math::luminance;
+use crate::math::{luminance, parallel};
 use crate::measured::coordinates::HalfDifference;
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
 /// Pixels a task.
 const CHUNK: usize = 32;
@@ -88,20 +87,15 @@ fn pictures(
     lights: usize,
     shade: impl Fn(&ObjectPixel, &dyn Fn(usize) -> bool, &mut Vec<Vec3>) + Sync,
 ) -> Vec<RgbImage> {
-    let parts: Vec<Vec<Vec3>> = geometry
-        .pixels
-        .par_chunks(CHUNK)
-        .enumerate()
-        .map(|(chunk, pixels)| {
-            let mut results = Vec::with_capacity(pixels.len() * lights);
-            for (offset, pixel) in pixels.iter().enumerate() {
-                let index = chunk * CHUNK + offset;
-                shade(pixel, &|texel| visibility.is_none_or(|bits| bits.is_visible(index, texel)), &mut results);
-            }
-            results
-        })
-        .collect();
-    let values: Vec<Vec3> = parts.into_iter().flatten().collect();
+    let parts: Vec<Vec<Vec3>> = parallel::map_chunks(&geometry.pixels, CHUNK, |chunk, pixels| {
+        let mut results = Vec::with_capacity(pixels.len() * lights);
+        for (offset, pixel) in pixels.iter().enumerate() {
+            let index = chunk * CHUNK + offset;
+            shade(pixel, &|texel| visibility.is_none_or(|bits| bits.is_visible(index, texel)), &mut results);
+        }
+        results
+    });
+    let values: Vec<Vec3> = parts.concat();
     (0..lights).map(|light| picture_of(geometry, values.iter().skip(light).step_by(lights.max(1)).copied())).collect()
 }
 

@@ -16,7 +16,7 @@ use super::settings::ObjectSettings;
 use super::starts::{Start, StartedModel};
 use crate::error::{Error, ErrorKind, Result};
 use crate::light::Environment;
-use rayon::prelude::*;
+use crate::math::parallel;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Weight of the gradient prior while starts are tried; the net would be too slow for each.
@@ -91,8 +91,7 @@ pub fn screen(
         }
         Ok(candidate)
     };
-    let tried: Vec<Result<Candidate>> = model.starts.par_iter().map(try_one).collect();
-    let mut tried = tried.into_iter().collect::<Result<Vec<Candidate>>>()?;
+    let mut tried = parallel::map_items(&model.starts, try_one).into_iter().collect::<Result<Vec<Candidate>>>()?;
     tried.retain(|candidate| candidate.evidence.is_finite());
     tried.sort_by(|a, b| a.evidence.total_cmp(&b.evidence));
     tried.truncate(settings.followed.max(1));

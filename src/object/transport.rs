@@ -7,8 +7,8 @@
 pub use super::directions::TexelDirections;
 use super::geometry::{ObjectPixel, Visibility};
 use super::nodes::{NodeGrid, NodeReader, NodeTable, weights};
+use crate::math::parallel;
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Pixels a task; sums over chunks are taken in their order.
@@ -70,34 +70,30 @@ impl Transport {
         pixels: &[ObjectPixel],
         visibility: Option<&Visibility>,
     ) -> Self {
-        let chunks = pixels
-            .par_chunks(CHUNK)
-            .enumerate()
-            .map(|(index, chunk)| {
-                let mut starts = vec![0u32];
-                let mut entries = Vec::new();
-                for (offset, pixel) in chunk.iter().enumerate() {
-                    let own = index * CHUNK + offset;
-                    let is_visible = |texel: usize| visibility.is_none_or(|bits| bits.is_visible(own, texel));
-                    directions.for_each_batch(pixel, is_visible, |batch| {
-                        let places = grid.places(batch);
-                        entries.extend((0..batch.len()).map(|part| {
-                            let place = places.of(part);
-                            let fraction = place.fraction.map(|part| (part * 65535.0 + 0.5) as u16);
-                            Entry {
-                                texel: batch.texel(part) as u16,
-                                cell: place.cell,
-                                fraction,
-                                weight: batch.weight(part),
-                            }
-                        }));
-                    });
-                    starts.push(entries.len() as u32);
-                }
-                entries.shrink_to_fit();
-                TransportChunk { starts, entries }
-            })
-            .collect();
+        let chunks = parallel::map_chunks(pixels, CHUNK, |index, chunk| {
+            let mut starts = vec![0u32];
+            let mut entries = Vec::new();
+            for (offset, pixel) in chunk.iter().enumerate() {
+                let own = index * CHUNK + offset;
+                let is_visible = |texel: usize| visibility.is_none_or(|bits| bits.is_visible(own, texel));
+                directions.for_each_batch(pixel, is_visible, |batch| {
+                    let places = grid.places(batch);
+                    entries.extend((0..batch.len()).map(|part| {
+                        let place = places.of(part);
+                        let fraction = place.fraction.map(|part| (part * 65535.0 + 0.5) as u16);
+                        Entry {
+                            texel: batch.texel(part) as u16,
+                            cell: place.cell,
+                            fraction,
+                            weight: batch.weight(part),
+                        }
+                    }));
+                });
+                starts.push(entries.len() as u32);
+            }
+            entries.shrink_to_fit();
+            TransportChunk { starts, entries }
+        });
         Transport { grid, directions, pixels: pixels.len(), chunks }
     }
 
@@ -158,11 +154,9 @@ impl Transport {
 
     /// Calls `work` for each pixel's entries, in parallel; results in the order of the pixels.
     pub(super) fn per_pixel<T: Send>(&self, work: impl Fn(&[Entry]) -> T + Sync) -> Vec<T> {
-        let parts: Vec<Vec<T>> = self
-            .chunks
-            .par_iter()
-            .map(|chunk| (0..chunk.len()).map(|pixel| work(chunk.of_pixel(pixel))).collect())
-            .collect();
+        let parts: Vec<Vec<T>> = parallel::map_items(&self.chunks, |chunk| {
+            (0..chunk.len()).map(|pixel| work(chunk.of_pixel(pixel))).collect()
+        });
         parts.into_iter().flatten().collect()
     }
 
@@ -179,24 +173,19 @@ impl Transport {
     ) -> Vec<DVec3> {
         // A group of chunks shares one table of sums: fewer tables, still a fixed order.
         const GROUP: usize = 8;
-        let parts: Vec<Vec<DVec3>> = self
-            .chunks
-            .par_chunks(GROUP)
-            .enumerate()
-            .map(|(group, chunks)| {
-                let mut sums = vec![DVec3::ZERO; length];
-                for (index, chunk) in chunks.iter().enumerate() {
-                    let first = (group * GROUP + index) * CHUNK;
-                    for pixel in 0..chunk.len() {
-                        let by_pixel = by_pixels[first + pixel];
-                        if by_pixel != Vec3::ZERO {
-                            chunk.of_pixel(pixel).iter().for_each(|entry| add(entry, by_pixel, &mut sums));
-                        }
+        let parts: Vec<Vec<DVec3>> = parallel::map_chunks(&self.chunks, GROUP, |group, chunks| {
+            let mut sums = vec![DVec3::ZERO; length];
+            for (index, chunk) in chunks.iter().enumerate() {
+                let first = (group * GROUP + index) * CHUNK;
+                for pixel in 0..chunk.len() {
+                    let by_pixel = by_pixels[first + pixel];
+                    if by_pixel != Vec3::ZERO {
+                        chunk.of_pixel(pixel).iter().for_each(|entry| add(entry, by_pixel, &mut sums));
                     }
                 }
-                sums
-            })
-            .collect();
+            }
+            sums
+        });
         let mut sums = vec![DVec3::ZERO; length];
         for part in parts {
             sums.iter_mut().zip(part).for_each(|(sum, value)| *sum += value);

@@ -10,10 +10,10 @@ use super::first_hits::CameraRays;
 use super::packet::{PACKET, PathStart, camera_pairs};
 use super::path::{PathArena, PathTracer};
 use super::sums::{ParameterGradient, Parameters, radiance, radiance_backward};
+use crate::math::parallel;
 use crate::math::random::{SampleStream, StreamKey};
 use crate::math::real::Real;
 use glam::Vec3;
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Pixels of one chunk.
@@ -180,14 +180,11 @@ pub fn accumulate<R: Real>(
         if stop.load(Ordering::Relaxed) {
             break;
         }
-        let results: Vec<(PassTotals<R>, ChunkGradient<R>)> = wave
-            .par_iter()
-            .map(|chunk| {
-                let mut table = ChunkGradient::new(parameters.light.len());
-                let totals = work_chunk(tracer, rays, chunk, key, parameters, loss, &mut table, stop);
-                (totals, table)
-            })
-            .collect();
+        let results = parallel::map_items(wave, |chunk| {
+            let mut table = ChunkGradient::new(parameters.light.len());
+            let totals = work_chunk(tracer, rays, chunk, key, parameters, loss, &mut table, stop);
+            (totals, table)
+        });
         for (part, table) in results {
             totals.loss += part.loss;
             totals.pixels += part.pixels;

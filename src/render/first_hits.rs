@@ -5,11 +5,11 @@
 //! draws them anew.
 
 use super::surface::Surface;
+use crate::math::parallel;
 use crate::math::random::{SampleStream, StreamKey};
 use crate::scene::Camera;
 use crate::trace::{Hit, Ray};
 use glam::Vec2;
-use rayon::prelude::*;
 
 /// How the samples of a pixel are spread.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -76,19 +76,18 @@ impl FirstHits {
         seed: u64,
         view: u32,
     ) -> Self {
-        let hits = (0..camera.width * camera.height)
-            .into_par_iter()
-            .flat_map_iter(|pixel| {
-                (0..places_of(samples)).map(move |place| {
-                    let ray = frozen_ray(camera, filter, seed, view, pixel, place);
-                    match surface.closest(&ray) {
-                        Some(hit) => PackedHit { triangle: hit.triangle, u: hit.u, v: hit.v },
-                        None => PackedHit { triangle: NO_TRIANGLE, u: 0.0, v: 0.0 },
-                    }
-                })
-            })
-            .collect();
-        FirstHits { samples, places: places_of(samples), seed, view, hits }
+        let places = places_of(samples);
+        let nothing = PackedHit { triangle: NO_TRIANGLE, u: 0.0, v: 0.0 };
+        let mut hits = vec![nothing; camera.width * camera.height * places];
+        parallel::each_chunk(&mut hits, places, &|pixel, hits| {
+            for (place, own) in hits.iter_mut().enumerate() {
+                let ray = frozen_ray(camera, filter, seed, view, pixel, place);
+                if let Some(hit) = surface.closest(&ray) {
+                    *own = PackedHit { triangle: hit.triangle, u: hit.u, v: hit.v };
+                }
+            }
+        });
+        FirstHits { samples, places, seed, view, hits }
     }
 }
 

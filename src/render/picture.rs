@@ -8,10 +8,10 @@ use super::progressive::PictureTracer;
 use super::sums::Parameters;
 use super::surface::Surface;
 use crate::image::{GreyImage, Image, RgbImage};
+use crate::math::parallel;
 use crate::math::random::{SampleStream, StreamKey};
 use crate::scene::Camera;
 use glam::Vec3;
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A picture in linear radiance.
@@ -65,25 +65,28 @@ pub(super) fn picture_of_groups<Scratch>(
     of_group: impl Fn(&mut Scratch, usize, u32) -> (Vec3, f32) + Sync + Send,
 ) -> Picture {
     let groups = groups.max(1);
-    let pixels: Vec<(Vec3, Vec3, f32, bool)> = (0..camera.width * camera.height)
-        .into_par_iter()
-        .map_init(scratch, |scratch, pixel| {
-            if stop.load(Ordering::Relaxed) {
-                return (Vec3::ZERO, Vec3::ZERO, 0.0, true);
-            }
-            let (mut mean, mut squared_deviations, mut escaped) = (Vec3::ZERO, Vec3::ZERO, 0.0);
-            for group in 0..groups {
-                let (value, escaped_of_group) = of_group(scratch, pixel, group as u32);
-                let delta = value - mean;
-                mean += delta / (group + 1) as f32;
-                squared_deviations += delta * (value - mean);
-                escaped += escaped_of_group;
-            }
-            let variance = squared_deviations / ((groups - 1).max(1) * groups) as f32;
-            let coverage = 1.0 - escaped / groups as f32;
-            if mean.is_finite() { (mean, variance, coverage, true) } else { (Vec3::ZERO, Vec3::ZERO, coverage, false) }
-        })
-        .collect();
+    let of_pixel = |scratch: &mut Scratch, pixel: usize| {
+        if stop.load(Ordering::Relaxed) {
+            return (Vec3::ZERO, Vec3::ZERO, 0.0, true);
+        }
+        let (mut mean, mut squared_deviations, mut escaped) = (Vec3::ZERO, Vec3::ZERO, 0.0);
+        for group in 0..groups {
+            let (value, escaped_of_group) = of_group(scratch, pixel, group as u32);
+            let delta = value - mean;
+            mean += delta / (group + 1) as f32;
+            squared_deviations += delta * (value - mean);
+            escaped += escaped_of_group;
+        }
+        let variance = squared_deviations / ((groups - 1).max(1) * groups) as f32;
+        let coverage = 1.0 - escaped / groups as f32;
+        if mean.is_finite() { (mean, variance, coverage, true) } else { (Vec3::ZERO, Vec3::ZERO, coverage, false) }
+    };
+    let count = camera.width * camera.height;
+    let of_chunk = |chunk: usize| -> Vec<(Vec3, Vec3, f32, bool)> {
+        let mut scratch = scratch();
+        (64 * chunk..count.min(64 * (chunk + 1))).map(|pixel| of_pixel(&mut scratch, pixel)).collect()
+    };
+    let pixels = parallel::map(count.div_ceil(64), of_chunk).concat();
     let (width, height) = (camera.width, camera.height);
     let image = |pixel: fn(&(Vec3, Vec3, f32, bool)) -> Vec3| {
         Image::from_pixels(width, height, pixels.iter().map(pixel).collect())
@@ -123,34 +126,31 @@ pub fn layers(surface: &Surface, camera: &Camera, parameters: &Parameters<f32>, 
     }
     let samples = samples.max(1);
     let rays = CameraRays::fresh(surface, camera, PixelFilter::Box, samples);
-    let pixels: Vec<Pixel> = (0..camera.width * camera.height)
-        .into_par_iter()
-        .map(|pixel| {
-            let mut sum = Pixel::default();
-            for sample in 0..samples {
-                let mut stream = SampleStream::new(StreamKey::new(0, 0, 0, pixel as u32), sample as u32);
-                let (ray, Some(hit)) = rays.at(pixel, sample, stream.next_pair()) else { continue };
-                let point = surface.point(&hit);
-                if point.geometric_normal.dot(ray.direction) >= 0.0 {
-                    continue;
-                }
-                let material = parameters.texels.fetch(&parameters.texels.tap(point.uv, 0));
-                sum.diffuse += Vec3::from_array(material.diffuse);
-                sum.specular += Vec3::from_array(material.specular);
-                sum.roughness += (2.0 * material.log_width).exp();
-                sum.normal += point.shading_normal;
-                sum.coverage += 1.0;
+    let pixels = parallel::map(camera.width * camera.height, |pixel| {
+        let mut sum = Pixel::default();
+        for sample in 0..samples {
+            let mut stream = SampleStream::new(StreamKey::new(0, 0, 0, pixel as u32), sample as u32);
+            let (ray, Some(hit)) = rays.at(pixel, sample, stream.next_pair()) else { continue };
+            let point = surface.point(&hit);
+            if point.geometric_normal.dot(ray.direction) >= 0.0 {
+                continue;
             }
-            let share = if sum.coverage > 0.0 { 1.0 / sum.coverage } else { 0.0 };
-            Pixel {
-                diffuse: sum.diffuse * share,
-                specular: sum.specular * share,
-                roughness: sum.roughness * share,
-                normal: sum.normal.normalize_or_zero(),
-                coverage: sum.coverage / samples as f32,
-            }
-        })
-        .collect();
+            let material = parameters.texels.fetch(&parameters.texels.tap(point.uv, 0));
+            sum.diffuse += Vec3::from_array(material.diffuse);
+            sum.specular += Vec3::from_array(material.specular);
+            sum.roughness += (2.0 * material.log_width).exp();
+            sum.normal += point.shading_normal;
+            sum.coverage += 1.0;
+        }
+        let share = if sum.coverage > 0.0 { 1.0 / sum.coverage } else { 0.0 };
+        Pixel {
+            diffuse: sum.diffuse * share,
+            specular: sum.specular * share,
+            roughness: sum.roughness * share,
+            normal: sum.normal.normalize_or_zero(),
+            coverage: sum.coverage / samples as f32,
+        }
+    });
     let (width, height) = (camera.width, camera.height);
     let rgb = |pick: fn(&Pixel) -> Vec3| Image::from_pixels(width, height, pixels.iter().map(pick).collect());
     let grey = |pick: fn(&Pixel) -> f32| Image::from_pixels(width, height, pixels.iter().map(pick).collect());

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::process::Output;
 
 /// Options of a fit that takes a moment.
-const SHORT: [&str; 4] = ["--solver-rounds", "2", "--solver-refine", "0"];
+const SHORT: [&str; 6] = ["--solver-rounds", "2", "--solver-refine", "0", "--solver-grid", "32"];
 
 fn fit(scene: &Path, run: &Path, more: &[&str]) -> Output {
     patina().arg("fit").arg(scene).arg("-o").arg(run).args(SHORT).args(more).output().unwrap()

@@ -22,6 +22,9 @@ pub struct DemoOptions {
     /// How maps and environment are estimated [default: solver].
     #[arg(long, value_enum)]
     pub method: Option<Method>,
+    /// End the fit after about so many seconds, as `patina fit --seconds` does.
+    #[arg(long, value_name = "N", value_parser = seconds)]
+    pub seconds: Option<f64>,
 }
 
 /// How a scene is read.

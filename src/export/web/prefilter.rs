@@ -3,9 +3,9 @@
 use crate::image::Image;
 use crate::light::Environment;
 use crate::material::lobe::{LobeGeometry, LobeModel, MIN_WIDTH, Material};
+use crate::math::parallel;
 use crate::math::sphere::{direction_of_texel, solid_angle_of_texel};
 use glam::Vec3;
-use rayon::prelude::*;
 use std::f32::consts::{PI, TAU};
 
 /// Widths that are blurred for: level `i` of `n` holds `(i / (n - 1))^2`.
@@ -100,11 +100,8 @@ fn blurred(source: &[(Vec3, Vec3)], weight: impl Fn(f32) -> f32 + Sync) -> Image
 }
 
 fn image(width: usize, height: usize, value: impl Fn(Vec3) -> Vec3 + Sync) -> Image<Vec3> {
-    let pixels = (0..width * height)
-        .into_par_iter()
-        .map(|index| value(direction_of_texel(index / width, index % width, width, height)))
-        .collect();
-    Image::from_pixels(width, height, pixels)
+    let pixel = |index| value(direction_of_texel(index / width, index % width, width, height));
+    Image::from_pixels(width, height, parallel::map(width * height, pixel))
 }
 
 /// Reflectance of the lobe under even light as `F0 A + B`: pairs (A, B), rows by the width `(row + 1/2) / side`, columns by
@@ -112,39 +109,36 @@ fn image(width: usize, height: usize, value: impl Fn(Vec3) -> Vec3 + Sync) -> Im
 pub fn reflectance_table(model: LobeModel) -> Vec<[f32; 2]> {
     const HALVES: usize = 48;
     const AZIMUTHS: usize = 24;
-    (0..TABLE_SIDE * TABLE_SIDE)
-        .into_par_iter()
-        .map(|index| {
-            let place = |place: usize| (place as f32 + 0.5) / TABLE_SIDE as f32;
-            let (width, cos_out) = (place(index / TABLE_SIDE).max(MIN_WIDTH), place(index % TABLE_SIDE));
-            let viewer = Vec3::new((1.0 - cos_out * cos_out).sqrt(), 0.0, cos_out);
-            let at = |f0: f32| Material { diffuse: [0.0; 3], specular: [f0; 3], log_width: width.ln() };
-            let inverse_width_squared = 1.0 / (width * width);
-            let (full, grazing) = (at(1.0), at(0.0));
-            let mut sums = [0.0f32; 2];
-            for half_index in 0..HALVES {
-                // Half vectors as the lobe has them.
-                let u = (half_index as f32 + 0.5) / HALVES as f32;
-                let sin_squared = model.sine_squared_of_sample(u, inverse_width_squared);
-                let (sin_half, cos_half) = (sin_squared.sqrt(), (1.0 - sin_squared).max(0.0).sqrt());
-                for azimuth in 0..AZIMUTHS {
-                    let (sin, cos) = (TAU * (azimuth as f32 + 0.5) / AZIMUTHS as f32).sin_cos();
-                    let half = Vec3::new(sin_half * cos, sin_half * sin, cos_half);
-                    let light = half * (2.0 * viewer.dot(half)) - viewer;
-                    let Some(geometry) = LobeGeometry::new(Vec3::Z, light, viewer) else { continue };
-                    // p(i) = D (n.h) / (4 h.o).
-                    let half_density = model.density_of_half(geometry.ln_cos_half, inverse_width_squared);
-                    let density = half_density / (4.0 * geometry.half_dot_out);
-                    if density > 0.0 {
-                        let rise = grazing.reflect_by(model, &geometry, 1.0)[0] / density;
-                        sums[0] += full.reflect_by(model, &geometry, 1.0)[0] / density - rise;
-                        sums[1] += rise;
-                    }
+    parallel::map(TABLE_SIDE * TABLE_SIDE, |index| {
+        let place = |place: usize| (place as f32 + 0.5) / TABLE_SIDE as f32;
+        let (width, cos_out) = (place(index / TABLE_SIDE).max(MIN_WIDTH), place(index % TABLE_SIDE));
+        let viewer = Vec3::new((1.0 - cos_out * cos_out).sqrt(), 0.0, cos_out);
+        let at = |f0: f32| Material { diffuse: [0.0; 3], specular: [f0; 3], log_width: width.ln() };
+        let inverse_width_squared = 1.0 / (width * width);
+        let (full, grazing) = (at(1.0), at(0.0));
+        let mut sums = [0.0f32; 2];
+        for half_index in 0..HALVES {
+            // Half vectors as the lobe has them.
+            let u = (half_index as f32 + 0.5) / HALVES as f32;
+            let sin_squared = model.sine_squared_of_sample(u, inverse_width_squared);
+            let (sin_half, cos_half) = (sin_squared.sqrt(), (1.0 - sin_squared).max(0.0).sqrt());
+            for azimuth in 0..AZIMUTHS {
+                let (sin, cos) = (TAU * (azimuth as f32 + 0.5) / AZIMUTHS as f32).sin_cos();
+                let half = Vec3::new(sin_half * cos, sin_half * sin, cos_half);
+                let light = half * (2.0 * viewer.dot(half)) - viewer;
+                let Some(geometry) = LobeGeometry::new(Vec3::Z, light, viewer) else { continue };
+                // p(i) = D (n.h) / (4 h.o).
+                let half_density = model.density_of_half(geometry.ln_cos_half, inverse_width_squared);
+                let density = half_density / (4.0 * geometry.half_dot_out);
+                if density > 0.0 {
+                    let rise = grazing.reflect_by(model, &geometry, 1.0)[0] / density;
+                    sums[0] += full.reflect_by(model, &geometry, 1.0)[0] / density - rise;
+                    sums[1] += rise;
                 }
             }
-            sums.map(|sum| sum / (HALVES * AZIMUTHS) as f32)
-        })
-        .collect()
+        }
+        sums.map(|sum| sum / (HALVES * AZIMUTHS) as f32)
+    })
 }
 
 #[cfg(test)]

@@ -6,11 +6,11 @@
 use crate::error::Result;
 use crate::light::Environment;
 use crate::math::frame::{Frame, sample_cosine_hemisphere};
+use crate::math::parallel;
 use crate::math::sphere::{direction_of_texel, solid_angle_of_texel};
 use crate::scene::Mesh;
 use crate::trace::{Bvh, Ray};
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// Functions of bands 0 to 2.
 pub const COUNT: usize = 9;
@@ -59,8 +59,8 @@ pub fn transfer(mesh: &Mesh) -> Result<Vec<[f32; COUNT]>> {
     let bvh = Bvh::build(&mesh.positions, &mesh.triangles)?;
     let (low, high) = bvh.bounds();
     let lift = 1e-4 * (high - low).length();
-    let of_vertex = |(&position, normal): (&Vec3, &Vec3)| {
-        let normal = normal.try_normalize().unwrap_or(Vec3::Y);
+    let of_vertex = |vertex: usize| {
+        let (position, normal) = (mesh.positions[vertex], mesh.normals[vertex].try_normalize().unwrap_or(Vec3::Y));
         let frame = Frame::around(normal);
         let mut sum = [0.0; COUNT];
         for index in 0..SIDE * SIDE {
@@ -72,7 +72,7 @@ pub fn transfer(mesh: &Mesh) -> Result<Vec<[f32; COUNT]>> {
         }
         sum.map(|sum| sum / (SIDE * SIDE) as f32)
     };
-    Ok(mesh.positions.par_iter().zip(&mesh.normals).map(of_vertex).collect())
+    Ok(parallel::map(mesh.positions.len().min(mesh.normals.len()), of_vertex))
 }
 
 /// Share of the sky, by the cosine, that a vertex sees.

@@ -6,7 +6,7 @@
 
 use super::choice::clustered::ClusteredMean;
 use super::pixels::Pixels;
-use rayon::prelude::*;
+use crate::math::parallel;
 
 /// Texels along the side of a square.
 pub const SQUARE: usize = 8;
@@ -33,7 +33,7 @@ impl SquareGains {
     /// Adds up what each pixel gains, in nats, where its first texel lies in an atlas of this size.
     pub fn new(size_texels: usize, pixels: &Pixels, gain_nats: impl Fn(usize) -> f64 + Sync) -> Self {
         let (across, views) = (size_texels.div_ceil(SQUARE), pixels.views());
-        let squares = (0..across).into_par_iter().flat_map_iter(|row| {
+        let squares = parallel::map(across, |row| {
             let mut sums = vec![(0u32, 0.0f64); across * views];
             for pixel in
                 pixels.of_texels(row * SQUARE * size_texels..((row + 1) * SQUARE).min(size_texels) * size_texels)
@@ -49,7 +49,7 @@ impl SquareGains {
             };
             sums.chunks(views.max(1)).map(of_square).collect::<Vec<_>>()
         });
-        Self { size_texels, across, views, squares: squares.collect() }
+        Self { size_texels, across, views, squares: squares.into_iter().flatten().collect() }
     }
 
     /// The texels of squares whose mean gain is one of these.
@@ -76,9 +76,9 @@ impl SquareGains {
                 sums.iter().for_each(|&(pixels, nats)| mean.add_view(nats, f64::from(pixels)));
                 mean
             };
-            (0..self.across).map(of_square)
+            (0..self.across).map(of_square).collect::<Vec<_>>()
         };
-        (0..self.across).into_par_iter().flat_map_iter(of_row).collect()
+        parallel::map(self.across, of_row).concat()
     }
 }
 

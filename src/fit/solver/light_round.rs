@@ -17,6 +17,7 @@ use super::report::{ErrorSums, StepReport, median};
 use super::round::{BlockWork, Round, open_prior};
 use super::scene::{BackgroundPixel, SolverScene};
 use crate::material::Material;
+use crate::math::parallel;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -135,44 +136,39 @@ impl SolverScene {
         let least = if self.settings.fixed_maps { LEAST_WITH_GIVEN_MAPS } else { LEAST_OBSERVATIONS };
         let chosen = plan::choose(blocks, self.settings.blocks, least, self.settings.seed, number);
         let part = chosen.len().div_ceil(PARTS).max(1);
-        let parts: Vec<([NormalEquations; 3], Solved, [Vec<KeptUnknown>; 3])> = chosen
-            .par_chunks(part)
-            .map(|chosen| {
-                let mut equations = [(); 3].map(|()| NormalEquations::new(shape.count()));
-                let mut done = Vec::with_capacity(chosen.len());
-                let mut rows = [(); 3].map(|()| BlockRows::default());
-                let mut kept: [Vec<KeptUnknown>; 3] = Default::default();
-                for &index in chosen {
-                    if stop.load(Ordering::Relaxed) {
-                        break;
-                    }
-                    let mut work = BlockWork::default();
-                    round.gather(&blocks[index], self.settings.observations, &mut work);
-                    let is_solved = match self.settings.fixed_maps {
-                        true => round.take_given(estimate, prior, &mut work),
-                        false => round.solve(&blocks[index], prior, &mut work),
-                    };
-                    if !is_solved {
-                        continue;
-                    }
-                    if self.settings.fixed_maps {
-                        round.given_rows(estimate, &work, shape, &mut rows);
-                        equations.iter_mut().zip(&rows).for_each(|(equations, rows)| equations.add(rows));
-                    } else if !self.settings.fixed_light {
-                        round.rows(&blocks[index], &work, shape, &mut rows);
-                        for (equations, rows) in equations.iter_mut().zip(&rows) {
-                            equations.add(rows);
-                        }
-                        kept.iter_mut()
-                            .zip(&mut rows)
-                            .for_each(|(kept, rows)| kept.push(std::mem::take(&mut rows.kept)));
-                    }
-                    done.push((index, work));
+        let parts = parallel::map_chunks(&chosen, part, |_, chosen| {
+            let mut equations = [(); 3].map(|()| NormalEquations::new(shape.count()));
+            let mut done = Vec::with_capacity(chosen.len());
+            let mut rows = [(); 3].map(|()| BlockRows::default());
+            let mut kept: [Vec<KeptUnknown>; 3] = Default::default();
+            for &index in chosen {
+                if stop.load(Ordering::Relaxed) {
+                    break;
                 }
-                equations.iter_mut().for_each(NormalEquations::flush);
-                (equations, done, kept)
-            })
-            .collect();
+                let mut work = BlockWork::default();
+                round.gather(&blocks[index], self.settings.observations, &mut work);
+                let is_solved = match self.settings.fixed_maps {
+                    true => round.take_given(estimate, prior, &mut work),
+                    false => round.solve(&blocks[index], prior, &mut work),
+                };
+                if !is_solved {
+                    continue;
+                }
+                if self.settings.fixed_maps {
+                    round.given_rows(estimate, &work, shape, &mut rows);
+                    equations.iter_mut().zip(&rows).for_each(|(equations, rows)| equations.add(rows));
+                } else if !self.settings.fixed_light {
+                    round.rows(&blocks[index], &work, shape, &mut rows);
+                    for (equations, rows) in equations.iter_mut().zip(&rows) {
+                        equations.add(rows);
+                    }
+                    kept.iter_mut().zip(&mut rows).for_each(|(kept, rows)| kept.push(std::mem::take(&mut rows.kept)));
+                }
+                done.push((index, work));
+            }
+            equations.iter_mut().for_each(NormalEquations::flush);
+            (equations, done, kept)
+        });
         let mut total = [(); 3].map(|()| NormalEquations::new(shape.count()));
         let mut done = Vec::new();
         let mut kept: [Vec<KeptUnknown>; 3] = Default::default();
@@ -253,15 +249,12 @@ impl SolverScene {
         for growth in GROWTHS {
             let before = shape.coefficients_of_channels(&light);
             let narrow = narrow_scales(shape, &light, &before, growth);
-            let channels: Vec<(Vec<f32>, ChannelKnown)> = (0..3usize)
-                .into_par_iter()
-                .map(|c| {
-                    let mut x = before[c].clone();
-                    let gauge = Gauge { row: &self.gauge.0, mean: held[c] };
-                    let known = solve_channel(&equations[c], shape, &prior, &gauge, &narrow, &mut x);
-                    (shape.expand(&x), known)
-                })
-                .collect();
+            let channels: Vec<(Vec<f32>, ChannelKnown)> = parallel::map(3, |c| {
+                let mut x = before[c].clone();
+                let gauge = Gauge { row: &self.gauge.0, mean: held[c] };
+                let known = solve_channel(&equations[c], shape, &prior, &gauge, &narrow, &mut x);
+                (shape.expand(&x), known)
+            });
             if stop.load(Ordering::Relaxed) {
                 return None;
             }

@@ -13,7 +13,7 @@ use super::round::{BlockWork, Round, open_prior};
 use super::scene::SolverScene;
 use super::tile::{TILE, Tile};
 use crate::material::Material;
-use rayon::prelude::*;
+use crate::math::parallel;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -49,10 +49,9 @@ impl SolverScene {
         let mut tails = TailSums::new(self.views.len());
         let tiles = self.tiles();
         for group in tiles.chunks(TILES_AT_ONCE) {
-            let results: Vec<TileResult> = group
-                .par_iter()
-                .map(|(first, blocks)| self.solve_tile(&round, *first, blocks, &prior, check.as_ref(), stop))
-                .collect();
+            let results = parallel::map_items(group, |(first, blocks)| {
+                self.solve_tile(&round, *first, blocks, &prior, check.as_ref(), stop)
+            });
             if stop.load(Ordering::Relaxed) {
                 return None;
             }

@@ -11,6 +11,7 @@ use super::freedom::Freedom;
 use super::light_scale::{OF_DIELECTRICS, is_dielectric};
 use super::pixel_system::Lanes;
 use crate::material::Material;
+use crate::math::parallel;
 use rayon::prelude::*;
 
 /// Scale of the differences of neighbours' F0, by their logarithms, and of the logarithms of their widths.
@@ -46,6 +47,8 @@ pub struct Parabola<'a> {
     relative: Vec<Lanes>,
     /// Weight of the difference to the right and to the lower neighbour, group by group; 0 where there is none.
     weights: Vec<[[f32; 3]; 2]>,
+    /// Precision of what is believed of each number of a lobe.
+    of_lobes: Vec<[f32; 4]>,
 }
 
 impl Neighbours {
@@ -115,7 +118,7 @@ impl Neighbours {
     /// regions. In nats.
     pub fn energies(&self, texels: &[Material<f32>]) -> [f64; 2] {
         let logarithms: Vec<[f32; 7]> = texels.par_iter().map(|texel| self.logarithms(texel)).collect();
-        let of_chunk = |(which, chunk): (usize, &[Material<f32>])| {
+        let of_chunk = |which: usize, chunk: &[Material<f32>]| {
             let mut sums = [0.0f64; 2];
             for (offset, texel) in chunk.iter().enumerate() {
                 let own = which * CHUNK + offset;
@@ -135,7 +138,7 @@ impl Neighbours {
             }
             sums
         };
-        let of_chunks: Vec<[f64; 2]> = texels.par_chunks(CHUNK).enumerate().map(of_chunk).collect();
+        let of_chunks = parallel::map_chunks(texels, CHUNK, of_chunk);
         of_chunks.iter().fold([0.0; 2], |total, own| [total[0] + own[0], total[1] + own[1]])
     }
 
@@ -191,13 +194,12 @@ impl Neighbours {
                 })
             })
             .collect();
-        let mut made = Parabola { of: self, slope: Vec::new(), relative, weights };
+        let of_lobes: Vec<[f32; 4]> =
+            (0..texels.len()).into_par_iter().map(|own| [0, 1, 2, 3].map(|number| self.lobe(own, number).1)).collect();
+        let mut made = Parabola { of: self, slope: Vec::new(), relative, weights, of_lobes };
         let mut slope = vec![[0.0f32; 8]; texels.len()];
-        made.add_differences(&|texel, lane| if lane < 7 { logarithms[texel][lane] } else { 0.0 }, &mut slope);
-        slope.par_iter_mut().enumerate().filter(|(texel, _)| self.shown[*texel]).for_each(|(texel, slope)| {
-            let away = self.away(texel, &texels[texel]);
-            (0..4).for_each(|number| slope[3 + number] += away[number] * self.lobe(texel, number).1);
-        });
+        let lanes = |texel: usize| std::array::from_fn(|lane| *logarithms[texel].get(lane).unwrap_or(&0.0));
+        made.add_to(&mut slope, lanes, |texel| self.away(texel, &texels[texel]));
         made.slope = slope;
         made
     }
@@ -221,26 +223,32 @@ impl Parabola<'_> {
 
     /// Adds the curvature times a step.
     pub fn add_product(&self, step: &[Lanes], product: &mut [Lanes]) {
-        self.add_differences(&|texel, lane| self.relative[texel][lane] * step[texel][lane], product);
-        product.par_iter_mut().enumerate().filter(|(texel, _)| self.of.shown[*texel]).for_each(|(texel, product)| {
-            for number in 0..4 {
-                product[3 + number] += self.of.lobe(texel, number).1 * step[texel][3 + number];
-            }
-        });
+        let logarithm = |texel: usize| std::array::from_fn(|lane| self.relative[texel][lane] * step[texel][lane]);
+        self.add_to(product, logarithm, |texel| [3, 4, 5, 6].map(|lane| step[texel][lane]));
     }
 
-    /// Adds, to each texel, weights times differences of `value` to its four neighbours, times what a step is in logarithms.
-    fn add_differences(&self, value: &(dyn Fn(usize, usize) -> f32 + Sync), sums: &mut [Lanes]) {
-        let size = self.of.size;
-        sums.par_iter_mut().enumerate().filter(|(texel, _)| self.of.shown[*texel]).for_each(|(texel, sum)| {
-            let relative = &self.relative[texel];
-            self.for_neighbours(texel, size, |other, weights| {
-                for (group, lanes) in GROUPS.into_iter().enumerate() {
-                    for lane in lanes {
-                        sum[lane] += relative[lane] * weights[group] * (value(texel, lane) - value(other, lane));
+    /// Adds, to each texel, weights times differences of `value` to its four neighbours, times what a step is in logarithms,
+    /// and the precision of its lobe times `away`.
+    fn add_to(
+        &self,
+        sums: &mut [Lanes],
+        value: impl Fn(usize) -> Lanes + Sync,
+        away: impl Fn(usize) -> [f32; 4] + Sync,
+    ) {
+        parallel::each_chunk(sums, CHUNK, &|chunk, sums| {
+            let texels = (chunk * CHUNK..).zip(sums).filter(|(texel, _)| self.of.shown[*texel]);
+            for (texel, sum) in texels {
+                let (relative, own) = (&self.relative[texel], value(texel));
+                self.for_neighbours(texel, self.of.size, |other, &[diffuse, specular, width]| {
+                    let weights = [diffuse, diffuse, diffuse, specular, specular, specular, width, 0.0];
+                    let other = value(other);
+                    for lane in 0..8 {
+                        sum[lane] += relative[lane] * weights[lane] * (own[lane] - other[lane]);
                     }
-                }
-            });
+                });
+                let (away, precision) = (away(texel), &self.of_lobes[texel]);
+                (0..4).for_each(|number| sum[3 + number] += away[number] * precision[number]);
+            }
         });
     }
 
@@ -265,7 +273,7 @@ impl Parabola<'_> {
         self.for_neighbours(texel, self.of.size, |_, weights| (0..3).for_each(|group| sum[group] += weights[group]));
         let relative = &self.relative[texel];
         std::array::from_fn(|lane| {
-            let of_lobe = if (3..7).contains(&lane) { self.of.lobe(texel, lane - 3).1 } else { 0.0 };
+            let of_lobe = if (3..7).contains(&lane) { self.of_lobes[texel][lane - 3] } else { 0.0 };
             if lane < 7 { sum[lane / 3] * relative[lane] * relative[lane] + of_lobe } else { 0.0 }
         })
     }

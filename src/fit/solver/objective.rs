@@ -8,6 +8,7 @@ use super::pixel_noise::{PixelNoise, Residual};
 use super::pixel_system::PixelRow;
 use super::pixels::Pixels;
 use super::sight::Sight;
+use crate::math::parallel;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -92,23 +93,18 @@ impl Learned {
 
     fn better_gains(&self, pixels: &Pixels, sight: &Sight) -> Vec<[f32; 3]> {
         let views = pixels.views();
-        let parts: Vec<Vec<GainSums>> = sight
-            .radiance
-            .par_chunks(CHUNK)
-            .enumerate()
-            .map(|(which, chunk)| {
-                let mut sums = vec![GainSums::default(); views];
-                for (offset, radiance) in chunk.iter().enumerate() {
-                    let index = which * CHUNK + offset;
-                    let own = pixels.pixel(index);
-                    if !own.clipped {
-                        let weight = self.noise.weight(self.residual(pixels, sight, index).1);
-                        sums[own.view as usize].add(weight, own.radiance, *radiance);
-                    }
+        let parts = parallel::map_chunks(&sight.radiance, CHUNK, |which, chunk| {
+            let mut sums = vec![GainSums::default(); views];
+            for (offset, radiance) in chunk.iter().enumerate() {
+                let index = which * CHUNK + offset;
+                let own = pixels.pixel(index);
+                if !own.clipped {
+                    let weight = self.noise.weight(self.residual(pixels, sight, index).1);
+                    sums[own.view as usize].add(weight, own.radiance, *radiance);
                 }
-                sums
-            })
-            .collect();
+            }
+            sums
+        });
         let mut total = vec![GainSums::default(); views];
         for part in &parts {
             total.iter_mut().zip(part).for_each(|(total, part)| total.merge(part));
@@ -137,10 +133,8 @@ impl Learned {
     pub fn objective(&self, pixels: &Pixels, sight: &Sight, [neighbours, lobes]: [f64; 2]) -> Objective {
         let count = pixels.count();
         let nats = |index: usize| self.nats(pixels, sight, index);
-        let sums: Vec<f64> = (0..count.div_ceil(CHUNK))
-            .into_par_iter()
-            .map(|chunk| (chunk * CHUNK..((chunk + 1) * CHUNK).min(count)).map(nats).sum())
-            .collect();
+        let of_chunk = |chunk: usize| -> f64 { (chunk * CHUNK..((chunk + 1) * CHUNK).min(count)).map(nats).sum() };
+        let sums = parallel::map(count.div_ceil(CHUNK), of_chunk);
         Objective { pixels: sums.into_iter().sum(), neighbours, lobes }
     }
 }

@@ -7,13 +7,17 @@
 //! fast as scattering each part into maps of its own.
 
 use super::pixels::Pixels;
-use rayon::prelude::*;
+use crate::math::parallel;
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 /// Number of parts, whatever the number of threads: sums are the same then.
 const PARTS: usize = 64;
 /// Rows of the maps above and below its own texels that a part holds as well.
 const MARGIN: usize = 4;
+
+/// Texels that are added up together.
+const CHUNK: usize = 1 << 14;
 
 /// The seven numbers of a texel in the order of [`Material::to_array`](crate::material::Material::to_array), and a gap:
 /// they fill one wide register.
@@ -104,48 +108,45 @@ impl PixelSystem {
             range.clone().step_by(step).map(move |first| first..(first + step).min(range.end))
         };
         let ranges: Vec<Range<usize>> = cut(0..whole, PARTS).chain(cut(whole..count, PARTS / 4)).collect();
-        let parts = ranges.into_par_iter().map(|range| Part::new(pixels, range, map_size)).collect();
+        let parts = parallel::map_items(&ranges, |range| Part::new(pixels, range.clone(), map_size));
         PixelSystem { parts, texels: map_size * map_size }
     }
 
     /// Means of the texels' numbers under each piece.
     pub fn means(&mut self, texels: &[Lanes]) -> Vec<Lanes> {
-        let of_parts: Vec<Vec<Lanes>> = self
-            .parts
-            .par_iter_mut()
-            .map(|part| {
-                part.hold(texels);
-                (0..part.tap_ends.len()).map(|place| part.under(part.taps_of(place))).collect()
-            })
-            .collect();
-        of_parts.concat()
+        self.of_parts(|part| {
+            part.hold(texels);
+            (0..part.tap_ends.len()).map(|place| part.under(part.taps_of(place))).collect()
+        })
     }
 
     /// Radiance that texels send to each pixel, by the rows of its pieces.
     pub fn sent(&mut self, rows: &[PieceRow], texels: &[Lanes]) -> Vec<[f32; 3]> {
-        let of_parts: Vec<Vec<[f32; 3]>> = self
-            .parts
-            .par_iter_mut()
-            .map(|part| {
-                part.hold(texels);
-                let rows = &rows[part.pieces.clone()];
-                let one = |place: usize| {
-                    let first = if place == 0 { 0 } else { part.ends[place - 1] };
-                    let mut sent = [0.0; 3];
-                    for piece in first as usize..part.ends[place] as usize {
-                        rows[piece].add(&part.under(part.taps_of(piece)), &mut sent);
-                    }
-                    sent
-                };
-                (0..part.ends.len()).map(one).collect()
-            })
-            .collect();
-        of_parts.concat()
+        self.of_parts(|part| {
+            part.hold(texels);
+            let rows = &rows[part.pieces.clone()];
+            let one = |place: usize| {
+                let first = if place == 0 { 0 } else { part.ends[place - 1] };
+                let mut sent = [0.0; 3];
+                for piece in first as usize..part.ends[place] as usize {
+                    rows[piece].add(&part.under(part.taps_of(piece)), &mut sent);
+                }
+                sent
+            };
+            (0..part.ends.len()).map(one).collect()
+        })
+    }
+
+    fn of_parts<T: Clone + Send>(&mut self, of: impl Fn(&mut Part) -> Vec<T> + Sync) -> Vec<T> {
+        let parts: Vec<Mutex<&mut Part>> = self.parts.iter_mut().map(Mutex::new).collect();
+        parallel::map_items(&parts, |part| of(&mut part.lock().unwrap_or_else(PoisonError::into_inner))).concat()
     }
 
     /// Transposed matrix times weights times what is left of the photos: half of the negative slope of their weighted squares.
     pub fn pull(&mut self, rows: Rows) -> Vec<Lanes> {
-        self.summed(rows, None, |pixel, _| pixel.left, |row, radiance| row.transposed(radiance))
+        let mut sums = vec![[0.0; 8]; self.texels];
+        self.summed(rows, None, |pixel, _| pixel.left, |row, radiance| row.transposed(radiance), &mut sums);
+        sums
     }
 
     /// Sums over the pixels of each texel, by share, of weights times squares: an upper bound of the diagonal of the normal
@@ -160,24 +161,27 @@ impl PixelSystem {
             }
             lanes
         };
-        self.summed(rows, None, |pixel, _| pixel.gain, squares)
+        let mut sums = vec![[0.0; 8]; self.texels];
+        self.summed(rows, None, |pixel, _| pixel.gain, squares, &mut sums);
+        sums
     }
 
-    /// Transposed matrix times weights times matrix times numbers of texels.
-    pub fn product(&mut self, rows: Rows, texels: &[Lanes]) -> Vec<Lanes> {
-        self.summed(rows, Some(texels), |_, sent| sent, |row, radiance| row.transposed(radiance))
+    /// Transposed matrix times weights times matrix times numbers of texels, in place of what `product` holds.
+    pub fn product(&mut self, rows: Rows, texels: &[Lanes], product: &mut [Lanes]) {
+        self.summed(rows, Some(texels), |_, sent| sent, |row, radiance| row.transposed(radiance), product);
     }
 
-    /// Sums over the pieces of each texel: `of_piece` of what `of_pixel` makes of a pixel and what texels send it, times
-    /// its weight.
+    /// Sums over the pieces of each texel, in place of what `total` holds: `of_piece` of what `of_pixel` makes of a pixel and
+    /// what texels send it, times its weight.
     fn summed(
         &mut self,
         rows: Rows,
         texels: Option<&[Lanes]>,
         of_pixel: impl Fn(&PixelRow, [f32; 3]) -> [f32; 3] + Sync,
         of_piece: impl Fn(&PieceRow, [f32; 3]) -> Lanes + Sync,
-    ) -> Vec<Lanes> {
-        self.parts.par_iter_mut().for_each(|part| {
+        total: &mut [Lanes],
+    ) {
+        let of_part = |part: &mut Part| {
             if let Some(texels) = texels {
                 part.hold(texels);
             }
@@ -210,15 +214,12 @@ impl PixelSystem {
                 }
             }
             part.sums = sums;
+        };
+        parallel::each_chunk(&mut self.parts, 1, &|_, parts| parts.iter_mut().for_each(of_part));
+        parallel::each_chunk(total, CHUNK, &|chunk, total| {
+            total.fill([0.0; 8]);
+            self.parts.iter().for_each(|part| part.add_sums(chunk * CHUNK, total));
         });
-        let mut total = vec![[0.0f32; 8]; self.texels];
-        for part in &self.parts {
-            let (near, far) = part.sums.split_at(part.near.len());
-            let add = |total: &mut Lanes, sum: &Lanes| (0..8).for_each(|k| total[k] += sum[k]);
-            total[part.near.clone()].iter_mut().zip(near).for_each(|(total, sum)| add(total, sum));
-            part.far.iter().zip(far).for_each(|(&texel, sum)| add(&mut total[texel as usize], sum));
-        }
-        total
     }
 }
 
@@ -257,6 +258,21 @@ impl Part {
     fn taps_of(&self, place: usize) -> &[(u32, f32)] {
         let start = if place == 0 { 0 } else { self.tap_ends[place - 1] };
         &self.taps[start as usize..self.tap_ends[place] as usize]
+    }
+
+    /// Adds its sums to those of the texels from `first` on.
+    fn add_sums(&self, first: usize, total: &mut [Lanes]) {
+        let add = |total: &mut Lanes, sum: &Lanes| (0..8).for_each(|k| total[k] += sum[k]);
+        let (near, far) = self.sums.split_at(self.near.len());
+        let own = self.near.start.max(first)..self.near.end.min(first + total.len());
+        if !own.is_empty() {
+            let near = &near[own.start - self.near.start..own.end - self.near.start];
+            total[own.start - first..own.end - first].iter_mut().zip(near).for_each(|(total, sum)| add(total, sum));
+        }
+        let end = first + total.len();
+        let [begin, end] = [first, end].map(|texel| self.far.partition_point(|&own| (own as usize) < texel));
+        let far = self.far[begin..end].iter().zip(&far[begin..end]);
+        far.for_each(|(&texel, sum)| add(&mut total[texel as usize - first], sum));
     }
 
     /// Copies what the part needs of the texels.

@@ -4,6 +4,7 @@ use super::pixel_system::{Lanes, PieceRow, PixelSystem};
 use super::pixels::{Piece, Pixels};
 use super::scene::SolverScene;
 use crate::material::Material;
+use crate::math::parallel;
 use crate::render::cached::{CachedTransport, SeenRows};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -71,46 +72,44 @@ impl SolverScene {
             (planes, at_points)
         });
         let count = pixels.count();
-        let chunks: Vec<(Vec<PieceRow>, Vec<[f32; 3]>)> = (0..count.div_ceil(TOGETHER))
-            .into_par_iter()
-            .map_init(SeenRows::default, |seen, chunk| {
-                let range = chunk * TOGETHER..((chunk + 1) * TOGETHER).min(count);
-                let first = pixels.pieces(range.start).start;
-                let mut rows = vec![PieceRow::default(); pixels.pieces(range.end - 1).end - first];
-                let mut radiance = vec![[0.0f32; 3]; range.len()];
-                if stop.load(Ordering::Relaxed) {
-                    return (rows, radiance);
+        let chunks = parallel::map(count.div_ceil(TOGETHER), |chunk| {
+            let range = chunk * TOGETHER..((chunk + 1) * TOGETHER).min(count);
+            let first = pixels.pieces(range.start).start;
+            let mut rows = vec![PieceRow::default(); pixels.pieces(range.end - 1).end - first];
+            let mut radiance = vec![[0.0f32; 3]; range.len()];
+            if stop.load(Ordering::Relaxed) {
+                return (rows, radiance);
+            }
+            let mut order: Vec<(u32, usize, usize)> = range
+                .clone()
+                .flat_map(|pixel| (0..pixels.pieces(pixel).len()).map(move |which| (pixel, which)))
+                .map(|(pixel, which)| (pixels.piece(pixel, which).point.lobe_point, pixel, which))
+                .collect();
+            order.sort_unstable();
+            let mut seen = SeenRows::default();
+            for (_, pixel, which) in order {
+                let Piece { footprints, point } = pixels.piece(pixel, which);
+                let index = pixels.pieces(pixel).start + which;
+                let (row, mean) = (&mut rows[index - first], &means[index]);
+                let radiance = &mut radiance[pixel - range.start];
+                let Some((planes, at_points)) = &lit else {
+                    row.arriving = [point.share; 3];
+                    (0..3).for_each(|c| radiance[c] += point.share * mean[c]);
+                    continue;
+                };
+                let arriving = CachedTransport::interpolate(&at_points.arriving, footprints, point);
+                let has_slope = slopes == Slopes::OfWidths;
+                let sums = self.transport.lobe_at(point, (planes, at_points), &mut seen, mean[6].exp(), has_slope);
+                for c in 0..3 {
+                    let sent = arriving[c] * mean[c] + mean[3 + c] * sums.base[c] + sums.grazing[c];
+                    radiance[c] += point.share * sent;
+                    row.arriving[c] = point.share * arriving[c];
+                    row.base[c] = point.share * sums.base[c];
+                    row.slope[c] = point.share * (mean[3 + c] * sums.d_base[c] + sums.d_grazing[c]);
                 }
-                let mut order: Vec<(u32, usize, usize)> = range
-                    .clone()
-                    .flat_map(|pixel| (0..pixels.pieces(pixel).len()).map(move |which| (pixel, which)))
-                    .map(|(pixel, which)| (pixels.piece(pixel, which).point.lobe_point, pixel, which))
-                    .collect();
-                order.sort_unstable();
-                for (_, pixel, which) in order {
-                    let Piece { footprints, point } = pixels.piece(pixel, which);
-                    let index = pixels.pieces(pixel).start + which;
-                    let (row, mean) = (&mut rows[index - first], &means[index]);
-                    let radiance = &mut radiance[pixel - range.start];
-                    let Some((planes, at_points)) = &lit else {
-                        row.arriving = [point.share; 3];
-                        (0..3).for_each(|c| radiance[c] += point.share * mean[c]);
-                        continue;
-                    };
-                    let arriving = CachedTransport::interpolate(&at_points.arriving, footprints, point);
-                    let has_slope = slopes == Slopes::OfWidths;
-                    let sums = self.transport.lobe_at(point, (planes, at_points), seen, mean[6].exp(), has_slope);
-                    for c in 0..3 {
-                        let sent = arriving[c] * mean[c] + mean[3 + c] * sums.base[c] + sums.grazing[c];
-                        radiance[c] += point.share * sent;
-                        row.arriving[c] = point.share * arriving[c];
-                        row.base[c] = point.share * sums.base[c];
-                        row.slope[c] = point.share * (mean[3 + c] * sums.d_base[c] + sums.d_grazing[c]);
-                    }
-                }
-                (rows, radiance)
-            })
-            .collect();
+            }
+            (rows, radiance)
+        });
         if stop.load(Ordering::Relaxed) {
             return None;
         }

@@ -6,12 +6,12 @@
 use super::estimate::Estimate;
 use super::scene::SolverScene;
 use crate::material::texels::{PyramidWeights, TexelPyramid, texels_from_maps};
+use crate::math::parallel;
 use crate::render::cached::ViewFootprints;
 use crate::render::path::PathArena;
 use crate::render::picture::PictureSettings;
 use crate::render::progressive::PictureTracer;
 use crate::render::{Parameters, Surface};
-use rayon::prelude::*;
 use std::borrow::Cow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -74,19 +74,17 @@ impl SolverScene {
             let whole: Vec<usize> = (0..picture.len()).filter(|&pixel| footprints.escaped[pixel] == 0.0).collect();
             let chosen: Vec<usize> =
                 whole.iter().step_by(whole.len().div_ceil(PIXELS_OF_VIEW).max(1)).copied().collect();
-            let of_pixels: Vec<Sums> = chosen
-                .par_iter()
-                .map_init(PathArena::default, |arena, &pixel| {
-                    if stop.load(Ordering::Relaxed) {
-                        return [0.0; 4];
-                    }
-                    let [first, second] =
-                        [0, 1].map(|pass| tracer.pixel(camera, view as u32, pixel, SAMPLES, pass, arena).0.as_dvec3());
-                    let own = glam::Vec3::from_array(picture[pixel]).as_dvec3();
-                    let mean = 0.5 * (first + second);
-                    [(own - first).dot(own - second), first.dot(second), (own - mean).element_sum(), mean.element_sum()]
-                })
-                .collect();
+            let of_pixels = parallel::map_items(&chosen, |&pixel| {
+                if stop.load(Ordering::Relaxed) {
+                    return [0.0; 4];
+                }
+                let mut arena = PathArena::default();
+                let [first, second] =
+                    [0, 1].map(|pass| tracer.pixel(camera, view as u32, pixel, SAMPLES, pass, &mut arena).0.as_dvec3());
+                let own = glam::Vec3::from_array(picture[pixel]).as_dvec3();
+                let mean = 0.5 * (first + second);
+                [(own - first).dot(own - second), first.dot(second), (own - mean).element_sum(), mean.element_sum()]
+            });
             // In order, so that the sum has the same bits whatever the number of threads.
             for pixel in of_pixels.iter().filter(|pixel| pixel.iter().all(|value| value.is_finite())) {
                 for (sum, value) in sums.iter_mut().zip(pixel) {

@@ -41,9 +41,9 @@ use crate::error::Finding;
 use crate::export::loss_log::number_or_nan;
 use crate::fit::Fitter;
 use crate::image::Image;
+use crate::math::parallel;
 use crate::scene::PixelState;
 use pictures::{Compared, Comparison, compare, compressed};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use shift::Shift;
 use space::MissingPart;
@@ -114,7 +114,7 @@ pub fn check(fitter: &Fitter, stop: &AtomicBool) -> Capture {
     let Some(comparison) = compare(fitter, stop) else { return Capture::default() };
     let scene = fitter.scene();
     let mut says: Vec<ViewSays> =
-        comparison.views.par_iter().map(|own| look_at(&comparison, own, &scene.views[own.view].name)).collect();
+        parallel::map_items(&comparison.views, |own| look_at(&comparison, own, &scene.views[own.view].name));
     // The light takes over what all exposures have in common.
     let logs: Vec<f64> = says.iter().map(|own| own.figures.gain.ln()).filter(|log| log.is_finite()).collect();
     let middle = crate::math::statistics::quantile(&logs, 0.5);

@@ -5,12 +5,11 @@ use crate::fit::targets::Target;
 use crate::fit::{Fitter, ViewUse};
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::math::statistics::quantile;
-use crate::math::{evenly_spread, luminance};
+use crate::math::{evenly_spread, luminance, parallel};
 use crate::render::picture::{Picture, PictureSettings, render};
 use crate::render::{Parameters, Surface};
 use crate::scene::{Background, Camera, PixelState, Scene};
 use glam::{Vec2, Vec3};
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Views that are looked at, at most.
@@ -87,10 +86,9 @@ pub fn compare(fitter: &Fitter, stop: &AtomicBool) -> Option<Comparison> {
     let parameters = fitter.parameters();
     let chosen = spread(fitter.view_uses());
     let most_pixels = MOST_PIXELS / chosen.len().max(1);
-    let targets: Vec<Target> = chosen
-        .par_iter()
-        .map(|&view| Target::new(scene, view, scene.views[view].camera.level_within(most_pixels)))
-        .collect();
+    let targets: Vec<Target> = parallel::map_items(&chosen, |&view| {
+        Target::new(scene, view, scene.views[view].camera.level_within(most_pixels))
+    });
     let pixels: usize = targets.iter().map(Target::pixel_count).sum();
     let samples = (PATHS / (2 * pixels).max(1)).clamp(PATHS_OF_PIXEL.0, PATHS_OF_PIXEL.1);
     let settings = PictureSettings {
@@ -152,13 +150,12 @@ fn compared(
     let coverage = Image::from_fn(width, height, |row, column| {
         0.5 * (drawn[0].coverage[(row, column)] + drawn[1].coverage[(row, column)])
     });
-    let centres: Vec<f32> = (0..width * height)
-        .into_par_iter()
-        .map(|pixel| {
-            let place = Vec2::new((pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5);
-            surface.closest(&camera.ray_through(place)).map_or(NO_SURFACE, |hit| hit.t)
-        })
-        .collect();
+    let distance = |row: usize, column: usize| {
+        let place = Vec2::new(column as f32 + 0.5, row as f32 + 0.5);
+        surface.closest(&camera.ray_through(place)).map_or(NO_SURFACE, |hit| hit.t)
+    };
+    let row = |row: usize| (0..width).map(|column| distance(row, column)).collect::<Vec<_>>();
+    let centres: Vec<f32> = parallel::map(height, row).concat();
     Compared {
         view: target.view,
         photo_pixels: own.camera.width as f64 / width as f64,

@@ -2,9 +2,9 @@
 
 use super::pictures::{Compared, Comparison, NO_SURFACE};
 use crate::image::Image;
+use crate::math::parallel;
 use crate::render::Surface;
 use glam::{Vec2, Vec3};
-use rayon::prelude::*;
 
 /// Points of all views together, at most.
 const MOST_POINTS: usize = 5000;
@@ -50,27 +50,25 @@ pub fn points_of(comparison: &Comparison, surface: &Surface, unlike: &[Image<boo
         })
         .filter(|(own, row, column)| own.distance[(*row, *column)] < NO_SURFACE)
         .collect();
-    places
-        .into_par_iter()
-        .filter_map(|(own, row, column)| {
-            let ray = own.camera.ray_through(centre(row, column));
-            let point = surface.point_facing(&surface.closest(&ray)?, -ray.direction);
-            let sights = comparison.views.iter().zip(unlike);
-            let sights = sights
-                .filter_map(|(other, unlike)| {
-                    let eye = other.camera.position_in_world();
-                    let direction = (eye - point.position).try_normalize()?;
-                    if direction.dot(point.geometric_normal) < LEAST_COSINE {
-                        return None;
-                    }
-                    let (row, column) = pixel_of(other, point.position)?;
-                    let is_hidden = surface.bvh().is_hidden_from(point.position, point.geometric_normal, eye);
-                    (!is_hidden).then(|| (direction, unlike[(row, column)]))
-                })
-                .collect();
-            Some(Point { position: point.position, sights })
-        })
-        .collect()
+    let points = parallel::map_items(&places, |&(own, row, column)| {
+        let ray = own.camera.ray_through(centre(row, column));
+        let point = surface.point_facing(&surface.closest(&ray)?, -ray.direction);
+        let sights = comparison.views.iter().zip(unlike);
+        let sights = sights
+            .filter_map(|(other, unlike)| {
+                let eye = other.camera.position_in_world();
+                let direction = (eye - point.position).try_normalize()?;
+                if direction.dot(point.geometric_normal) < LEAST_COSINE {
+                    return None;
+                }
+                let (row, column) = pixel_of(other, point.position)?;
+                let is_hidden = surface.bvh().is_hidden_from(point.position, point.geometric_normal, eye);
+                (!is_hidden).then(|| (direction, unlike[(row, column)]))
+            })
+            .collect();
+        Some(Point { position: point.position, sights })
+    });
+    points.into_iter().flatten().collect()
 }
 
 /// Centre of a pixel.

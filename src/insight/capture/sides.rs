@@ -2,10 +2,10 @@
 
 use super::pictures::{Compared, Comparison};
 use super::points::pixel_of;
+use crate::math::parallel;
 use crate::math::random::SequentialRandom;
 use crate::render::Surface;
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// Points of the mesh, evenly by area, that are looked for in the views.
 const POINTS: usize = 2000;
@@ -22,10 +22,10 @@ pub struct Sides {
 /// Measures it. `None` for fewer than three views, and for cameras that look outwards or stand above: there is no circle.
 pub fn sides_of(comparison: &Comparison, surface: &Surface) -> Option<Sides> {
     let points = points_by_area(surface);
-    let unseen = points
-        .par_iter()
-        .filter(|(position, normal)| !comparison.views.iter().any(|own| sees(own, surface, *position, *normal)))
-        .count();
+    let seen = parallel::map_items(&points, |&(position, normal)| {
+        comparison.views.iter().any(|own| sees(own, surface, position, normal))
+    });
+    let unseen = seen.into_iter().filter(|seen| !seen).count();
     let middle = points.iter().map(|(position, _)| *position).sum::<Vec3>() / points.len().max(1) as f32;
     let mut azimuths = Vec::new();
     for own in &comparison.views {

@@ -9,9 +9,9 @@ use super::pictures::{Comparison, NO_SURFACE};
 use super::points::{Point, pixel_of};
 use crate::image::Image;
 use crate::math::clusters::clusters;
+use crate::math::parallel;
 use crate::math::statistics::quantile;
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// Cells along the longest side.
 const CELLS: usize = 40;
@@ -51,10 +51,9 @@ pub fn missing_part(comparison: &Comparison, points: &[Point], unlike: &[Image<b
         let index = Vec3::new((cell % nx) as f32, (cell / nx % ny) as f32, (cell / (nx * ny)) as f32);
         low + (index + 0.5) * cell_length
     };
-    let is_missing: Vec<bool> = (0..nx * ny * nz)
-        .into_par_iter()
-        .map(|cell| is_unlike_from_everywhere(comparison, unlike, place(cell), cell_length))
-        .collect();
+    let is_missing = |cell: usize| is_unlike_from_everywhere(comparison, unlike, place(cell), cell_length);
+    let row = |row: usize| (nx * row..nx * (row + 1)).map(is_missing).collect::<Vec<_>>();
+    let is_missing: Vec<bool> = parallel::map(ny * nz, row).concat();
     // Of clusters of one size the first.
     let cells = clusters(&is_missing, [nx, ny, nz]).into_iter().rev().max_by_key(Vec::len)?;
     if cells.len() < FEWEST_CELLS {

@@ -5,8 +5,8 @@ use super::images::{MOST_VIEWS_SHOWN, ReportImages, ViewPictures, views_to_show}
 use super::number::{escaped, fixed, percent, short, significant};
 use super::{picture, tables};
 use crate::image::{GreyImage, RgbImage};
+use crate::math::parallel;
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// Bytes of HTML that the pictures of the views, and those of the relit strips, may take together.
 const MOST_VIEW_BYTES: usize = 8_000_000;
@@ -29,12 +29,13 @@ fn within<T: Sync>(parts: &[T], most_bytes: usize, encode: impl Fn(&T, usize, u8
     for (index, (width, quality)) in SIZES.into_iter().enumerate() {
         if index + 1 < SIZES.len() && parts.len() > 8 {
             let sample: Vec<&T> = parts.iter().step_by(every).collect();
-            let bytes: usize = sample.par_iter().map(|part| encode(part, width, quality).len()).sum();
+            let lengths = parallel::map_items(&sample, |part| encode(part, width, quality).len());
+            let bytes: usize = lengths.into_iter().sum();
             if bytes / sample.len() * parts.len() > most_bytes + most_bytes / 4 {
                 continue;
             }
         }
-        encoded = parts.par_iter().map(|part| encode(part, width, quality)).collect();
+        encoded = parallel::map_items(parts, |part| encode(part, width, quality));
         if encoded.iter().map(String::len).sum::<usize>() <= most_bytes {
             break;
         }
@@ -55,7 +56,7 @@ pub fn views(data: &ReportData, images: &ReportImages) -> String {
     }
     // One scale for all error pictures, so that they can be compared with each other.
     let values: Vec<Vec<f64>> =
-        shown_views.par_iter().map(|view| counted_differences(view, images.exposure_stops)).collect();
+        parallel::map_items(&shown_views, |view| counted_differences(view, images.exposure_stops));
     let full_scale = picture::round_full_scale(&values.concat());
 
     let triples = within(&shown_views, MOST_VIEW_BYTES, |view, width, quality| {

@@ -2,6 +2,7 @@
 
 use crate::fit::targets::Target;
 use crate::material::{Material, TextureTap};
+use crate::math::parallel;
 use crate::math::sphere::BilinearTap;
 use crate::render::accumulate::{PassKey, sum_pixel, trace_pixel};
 use crate::render::first_hits::CameraRays;
@@ -10,7 +11,6 @@ use crate::render::sums::{GradientSink, radiance_backward};
 use crate::render::{Parameters, PathArena, PathTracer, Surface};
 use crate::scene::{Camera, PixelState, Scene};
 use glam::{Vec2, Vec3};
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What a pixel says.
@@ -59,37 +59,39 @@ pub(super) fn pixels_of_view(
     let rays = CameraRays::fresh(tracer.surface(), camera, settings.filter, samples);
     let key = PassKey::halves(settings.seed ^ 0x1a7e, 0, target.view as u32);
     let paths = tracer.paths();
-    (0..target.pixel_count())
-        .into_par_iter()
-        .map_init(PathArena::default, |arena, pixel| {
-            let (photo, state) = target.at(scene, pixel);
-            let mut says = PixelSays {
-                photo,
-                model: Vec3::ZERO,
-                state,
-                is_covered: false,
-                place: None,
-                squared: f32::NAN,
-                gradient: Vec3::ZERO,
-            };
-            if stop.load(Ordering::Relaxed) {
-                return says;
-            }
-            trace_pixel(&paths, &rays, pixel, key, arena);
-            let estimate = sum_pixel(tracer.parameters(), arena, settings.lobe_strength);
-            let (first, second) = (Vec3::from_array(estimate.first) * gain, Vec3::from_array(estimate.second) * gain);
-            says.model = 0.5 * (first + second);
-            says.is_covered = estimate.escaped == 0.0;
-            says.place = centre_of(tracer.surface(), camera, pixel, map_size);
-            if says.place.is_some() && state.is_surface() {
-                let (rest, other_rest) = (photo - first, photo - second);
-                let derivative = |half: usize| gain * derivative_of_half(&paths, tracer.parameters(), arena, half);
-                says.squared = (rest * other_rest).element_sum() / 3.0;
-                says.gradient = -(rest * derivative(1) + other_rest * derivative(0));
-            }
-            says
-        })
-        .collect()
+    let says_of = |arena: &mut PathArena, pixel: usize| {
+        let (photo, state) = target.at(scene, pixel);
+        let mut says = PixelSays {
+            photo,
+            model: Vec3::ZERO,
+            state,
+            is_covered: false,
+            place: None,
+            squared: f32::NAN,
+            gradient: Vec3::ZERO,
+        };
+        if stop.load(Ordering::Relaxed) {
+            return says;
+        }
+        trace_pixel(&paths, &rays, pixel, key, arena);
+        let estimate = sum_pixel(tracer.parameters(), arena, settings.lobe_strength);
+        let (first, second) = (Vec3::from_array(estimate.first) * gain, Vec3::from_array(estimate.second) * gain);
+        says.model = 0.5 * (first + second);
+        says.is_covered = estimate.escaped == 0.0;
+        says.place = centre_of(tracer.surface(), camera, pixel, map_size);
+        if says.place.is_some() && state.is_surface() {
+            let (rest, other_rest) = (photo - first, photo - second);
+            let derivative = |half: usize| gain * derivative_of_half(&paths, tracer.parameters(), arena, half);
+            says.squared = (rest * other_rest).element_sum() / 3.0;
+            says.gradient = -(rest * derivative(1) + other_rest * derivative(0));
+        }
+        says
+    };
+    let row = |row: usize| {
+        let mut arena = PathArena::default();
+        (row * camera.width..(row + 1) * camera.width).map(|pixel| says_of(&mut arena, pixel)).collect::<Vec<_>>()
+    };
+    parallel::map(camera.height, row).concat()
 }
 
 /// Where the middle of a pixel meets the front of the surface, and the level of maps of `map_size` it reads.

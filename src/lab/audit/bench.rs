@@ -6,13 +6,12 @@ use crate::fit::loss::ViewLoss;
 use crate::fit::targets::Target;
 use crate::light::EnvironmentSampler;
 use crate::material::texels::PyramidWeights;
-use crate::math::evenly_spread;
 use crate::math::real::Real;
+use crate::math::{evenly_spread, parallel};
 use crate::render::accumulate::{PassKey, PixelLoss, accumulate, sum_pixel, trace_pixel};
 use crate::render::first_hits::{CameraRays, PixelFilter};
 use crate::render::{ParameterGradient, Parameters, PathArena, PathSettings, PathTracer, Surface};
 use crate::scene::{Background, Mesh, Scene};
-use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
 
 /// Angle a bounced ray stands for, in radians: as in a fit.
@@ -151,7 +150,7 @@ impl<'a> Bench<'a> {
                     loss.at(pixel, &estimate)?;
                     Some(PixelRecord { view, pixel, arena, escaped: estimate.escaped })
                 };
-                self.views[view].pixels.par_iter().filter_map(trace).collect::<Vec<_>>()
+                parallel::map_items(&self.views[view].pixels, trace).into_iter().flatten()
             })
             .collect()
     }

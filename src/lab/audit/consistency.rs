@@ -12,11 +12,11 @@ use super::report::Difference;
 use crate::fit::consistency::{Agreement, ViewGradient};
 use crate::fit::loss::ViewLoss;
 use crate::material::texels::TexelPyramid;
+use crate::math::parallel;
 use crate::math::real::{Dual, Real};
 use crate::render::accumulate::{PixelLoss, sum_pixel};
 use crate::render::sums::radiance_backward;
 use crate::render::{ParameterGradient, Parameters};
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Compares the gradient of `V` for some of the given parameters, evenly over their kinds.
@@ -44,7 +44,7 @@ pub fn differences(
     let single = gradient_of_value(bench, bench.parameters, &directions, |value| value as f32, stop).convert(f64::from);
 
     let chosen = evenly_over_kinds(among, bench.consistency_parameters());
-    let work = |batch: &[Parameter]| {
+    let work = |_, batch: &[Parameter]| {
         let mut moved = parameters.clone();
         let losses = bench.losses();
         let difference = |&parameter: &Parameter| {
@@ -79,7 +79,7 @@ pub fn differences(
         };
         batch.iter().map(difference).collect::<Vec<_>>()
     };
-    chosen.par_chunks(16).flat_map_iter(work).collect()
+    parallel::map_chunks(&chosen, 16, work).into_iter().flatten().collect()
 }
 
 /// `sum_i H_i v_i` by dual numbers, on the base level.

@@ -7,11 +7,11 @@ use super::readers::{Parameter, Readers};
 use super::report::{AuditReport, Difference};
 use crate::error::{Error, ErrorKind, Result};
 use crate::material::texels::PyramidWeights;
+use crate::math::parallel;
 use crate::math::random::SequentialRandom;
 use crate::math::real::Real;
 use crate::render::{ParameterGradient, Parameters, Surface};
 use crate::scene::Scene;
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -170,7 +170,7 @@ fn central_differences(
     chosen: &[Parameter],
     stop: &AtomicBool,
 ) -> Vec<f64> {
-    let work = |batch: &[Parameter]| {
+    let work = |_, batch: &[Parameter]| {
         let mut moved = parameters.clone();
         let losses = bench.losses();
         let difference = |&parameter: &Parameter| {
@@ -184,7 +184,7 @@ fn central_differences(
         };
         batch.iter().map(difference).collect::<Vec<_>>()
     };
-    chosen.par_chunks(BATCH).flat_map_iter(work).collect()
+    parallel::map_chunks(chosen, BATCH, work).concat()
 }
 
 /// Number of paths that meet the surface 0, 1, 2, ... times.

@@ -10,6 +10,7 @@
 //! do not depend on the threads.
 
 use crate::error::{Error, ErrorKind, Result};
+use crate::math::parallel;
 use crate::math::random::mix;
 use crate::measured::metrics::{LOG_FLOOR, TableError, table_error};
 use crate::measured::table::MeasuredBrdf;
@@ -23,7 +24,6 @@ use crate::neural::model::FlowModel;
 use crate::neural::pass::Pass;
 use crate::neural::train::project_to_ball;
 use crate::neural::weights::Trained;
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Name of the model in tables.
@@ -216,7 +216,7 @@ fn start(library: &Trained, table: &MeasuredBrdf, settings: &OwnNetSettings) -> 
 fn evaluate(own: &Trained, columns: &CountedColumns, batch: &Batch) -> Found {
     let per_column = batch.cells.len() / batch.columns.len().max(1);
     let scale = 1.0 / (3 * batch.cells.len()) as f64;
-    let of_chunk = |(chunk, picked): (usize, &[usize])| -> Found {
+    let of_chunk = |chunk: usize, picked: &[usize]| -> Found {
         let cells = &batch.cells[chunk * CHUNK * per_column..][..picked.len() * per_column];
         let nest = Nest { azimuths: picked.len(), differences: 1, halves: per_column };
         let at = NestPoints {
@@ -244,7 +244,7 @@ fn evaluate(own: &Trained, columns: &CountedColumns, batch: &Batch) -> Found {
         pass.backward(&own.flow, nest, &at, &adjoint, &mut found.d_weights, &mut found.d_codes);
         found
     };
-    let parts: Vec<Found> = batch.columns.par_chunks(CHUNK).enumerate().map(of_chunk).collect();
+    let parts: Vec<Found> = parallel::map_chunks(&batch.columns, CHUNK, of_chunk);
     let add = |mut sum: Found, part: Found| {
         sum.squared_error += part.squared_error;
         sum.d_weights.iter_mut().zip(&part.d_weights).for_each(|(sum, own)| *sum += own);

@@ -1,9 +1,9 @@
 //! How fast a flow is, in evaluations and samples a second.
 
+use crate::math::parallel;
 use crate::math::random::SequentialRandom;
 use crate::neural::columns::{ColumnTape, Nest, NestPoints};
 use crate::neural::flow::{Flow, FlowTape};
-use rayon::prelude::*;
 use std::time::Instant;
 
 /// Figures of one flow on all threads of the pool.
@@ -54,19 +54,16 @@ pub fn measure(flow: &Flow, batch: usize, repeats: usize) -> Speed {
 /// Derivatives of the sum of log densities by weights and code. Each task has sums of its own, added in a fixed order.
 fn gradient(flow: &Flow, points: &[[f64; 3]], code: &[f32]) -> (Vec<f32>, Vec<f32>) {
     const TASKS: usize = 16;
-    let parts: Vec<(Vec<f32>, Vec<f32>)> = points
-        .par_chunks(points.len().div_ceil(TASKS))
-        .map(|points| {
-            let (mut d_weights, mut d_codes) = (vec![0.0; flow.weights.len()], vec![0.0; code.len()]);
-            let mut tape = FlowTape::default();
-            // In parts, so that what a pass leaves for the way back fits the cache.
-            for part in points.chunks(crate::neural::flow::CHUNK) {
-                flow.forward(&mut part.to_vec(), code, part.len(), &mut tape);
-                flow.backward(&mut tape, &vec![1.0; part.len()], &mut d_weights, &mut d_codes);
-            }
-            (d_weights, d_codes)
-        })
-        .collect();
+    let parts = parallel::map_chunks(points, points.len().div_ceil(TASKS), |_, points| {
+        let (mut d_weights, mut d_codes) = (vec![0.0; flow.weights.len()], vec![0.0; code.len()]);
+        let mut tape = FlowTape::default();
+        // In parts, so that what a pass leaves for the way back fits the cache.
+        for part in points.chunks(crate::neural::flow::CHUNK) {
+            flow.forward(&mut part.to_vec(), code, part.len(), &mut tape);
+            flow.backward(&mut tape, &vec![1.0; part.len()], &mut d_weights, &mut d_codes);
+        }
+        (d_weights, d_codes)
+    });
     let add = |sum: &mut [f32], part: &[f32]| sum.iter_mut().zip(part).for_each(|(sum, own)| *sum += own);
     parts.into_iter().fold((vec![0.0; flow.weights.len()], vec![0.0; code.len()]), |mut sum, part| {
         add(&mut sum.0, &part.0);

@@ -5,7 +5,7 @@
 //! both cosines as in a picture of a surface under even light.
 
 use super::Material;
-use rayon::prelude::*;
+use crate::math::parallel;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::LazyLock;
 
@@ -49,8 +49,10 @@ pub fn perceptual_roughness(roughness: f32) -> f32 {
 
 /// Turns the widths of texels of Blinn-Phong into those of the nearest GGX lobes.
 pub fn to_ggx(texels: &mut [Material<f32>]) {
-    texels.par_iter_mut().with_min_len(1 << 12).for_each(|texel| {
-        texel.log_width = ggx_of_blinn_phong(f64::from(texel.log_width).exp()).width.ln() as f32;
+    parallel::each_chunk(texels, 1 << 12, &|_, texels| {
+        for texel in texels {
+            texel.log_width = ggx_of_blinn_phong(f64::from(texel.log_width).exp()).width.ln() as f32;
+        }
     });
 }
 

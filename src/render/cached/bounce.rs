@@ -6,9 +6,9 @@
 
 use super::points::VisibilityGrid;
 use crate::math::frame::sample_cosine_hemisphere;
+use crate::math::parallel;
 use crate::math::random::{SampleStream, StreamKey};
 use crate::render::Surface;
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The sparse matrix: entries are all one over the number of rays.
@@ -30,28 +30,23 @@ impl BounceMatrix {
     /// Traces `rays` rays from each point; the next square number is taken. Of no use when `stop` was raised.
     pub fn trace(surface: &Surface, grid: &VisibilityGrid, rays: usize, seed: u64, stop: &AtomicBool) -> Self {
         let side = (rays.max(1) as f32).sqrt().ceil() as usize;
-        let rows: Vec<Vec<u32>> = grid
-            .points
-            .par_iter()
-            .enumerate()
-            .map(|(index, point)| {
-                if stop.load(Ordering::Relaxed) {
-                    return Vec::new();
-                }
-                let frame = point.frame();
-                let mut stream = SampleStream::new(StreamKey::new(seed, u32::MAX - 1, 0, index as u32), 0);
-                let mut targets = Vec::new();
-                for stratum in 0..side * side {
-                    let [u, v] = stream.next_pair();
-                    let place =
-                        [(stratum / side) as f32 + u, (stratum % side) as f32 + v].map(|value| value / side as f32);
-                    let direction = frame.outer_from_local(sample_cosine_hemisphere(place));
-                    targets.extend(point_hit(surface, grid, point.position, point.geometric_normal, direction));
-                }
-                targets.sort_unstable();
-                targets
-            })
-            .collect();
+        let rows = parallel::map(grid.points.len(), |index| {
+            if stop.load(Ordering::Relaxed) {
+                return Vec::new();
+            }
+            let point = &grid.points[index];
+            let frame = point.frame();
+            let mut stream = SampleStream::new(StreamKey::new(seed, u32::MAX - 1, 0, index as u32), 0);
+            let mut targets = Vec::new();
+            for stratum in 0..side * side {
+                let [u, v] = stream.next_pair();
+                let place = [(stratum / side) as f32 + u, (stratum % side) as f32 + v].map(|value| value / side as f32);
+                let direction = frame.outer_from_local(sample_cosine_hemisphere(place));
+                targets.extend(point_hit(surface, grid, point.position, point.geometric_normal, direction));
+            }
+            targets.sort_unstable();
+            targets
+        });
         BounceMatrix::new(rows, grid.points.len(), 1.0 / (side * side) as f32)
     }
 
@@ -119,19 +114,18 @@ pub(super) fn point_hit(
 }
 
 fn gather(offsets: &[u32], indices: &[u32], share: f32, values: &[[f32; 3]]) -> Vec<[f32; 3]> {
-    (0..offsets.len() - 1)
-        .into_par_iter()
-        .with_min_len(1024)
-        .map(|row| {
-            let mut sum = [0.0f32; 3];
+    let mut sums = vec![[0.0f32; 3]; offsets.len() - 1];
+    parallel::each_chunk(&mut sums, 1024, &|chunk, sums| {
+        for (sum, row) in sums.iter_mut().zip(1024 * chunk..) {
             for &index in &indices[offsets[row] as usize..offsets[row + 1] as usize] {
                 for channel in 0..3 {
                     sum[channel] += values[index as usize][channel];
                 }
             }
-            sum.map(|value| value * share)
-        })
-        .collect()
+            *sum = sum.map(|value| value * share);
+        }
+    });
+    sums
 }
 
 #[cfg(test)]

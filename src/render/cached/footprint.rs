@@ -14,11 +14,11 @@ mod pieces;
 
 use self::pieces::{Piece, corners_of_pixels, pieces_of_pixel, uv_at_middle};
 use super::points::{NO_POINT, VisibilityGrid};
+use crate::math::parallel;
 use crate::math::random::mix;
 use crate::render::Surface;
 use crate::scene::Camera;
 use glam::{Vec2, Vec3};
-use rayon::prelude::*;
 #[cfg(test)]
 use std::ops::Range;
 
@@ -133,33 +133,29 @@ impl ViewFootprints {
     ) -> Self {
         // Corners tell where more places are to be looked at.
         let corners = (settings.fine_side > settings.coarse_side).then(|| corners_of_pixels(surface, camera));
-        let rows: Vec<ViewFootprints> = (0..camera.height)
-            .into_par_iter()
-            .map(|row| {
-                let mut made = ViewFootprints::empty(camera.width, 1);
-                let mut pieces = Vec::new();
-                for column in 0..camera.width {
-                    let pixel = row * camera.width + column;
-                    let is_left_out = is_wanted.is_some_and(|is_wanted| {
-                        uv_at_middle(surface, camera, row, column).is_some_and(|uv| !is_wanted(pixel as u32, uv))
-                    });
-                    if is_left_out {
-                        made.escaped.push(f32::NAN);
-                        continue;
-                    }
-                    let first = row * (camera.width + 1) + column;
-                    let around = corners
-                        .as_ref()
-                        .map(|corners| [0, 1, camera.width + 1, camera.width + 2].map(|step| &corners[first + step]));
-                    let escaped = pieces_of_pixel(surface, camera, row, column, settings, around, &mut pieces);
-                    made.escaped.push(escaped);
-                    for piece in &pieces {
-                        made.add(grid, piece, pixel as u32);
-                    }
+        let rows = parallel::map(camera.height, |row| {
+            let mut made = ViewFootprints::empty(camera.width, 1);
+            let mut pieces = Vec::new();
+            for column in 0..camera.width {
+                let pixel = row * camera.width + column;
+                let is_left_out = is_wanted.is_some_and(|is_wanted| {
+                    uv_at_middle(surface, camera, row, column).is_some_and(|uv| !is_wanted(pixel as u32, uv))
+                });
+                if is_left_out {
+                    made.escaped.push(f32::NAN);
+                    continue;
                 }
-                made
-            })
-            .collect();
+                let around = corners.as_ref().map(|corners| {
+                    [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(down, right)| &corners[row + down][column + right])
+                });
+                let escaped = pieces_of_pixel(surface, camera, row, column, settings, around, &mut pieces);
+                made.escaped.push(escaped);
+                for piece in &pieces {
+                    made.add(grid, piece, pixel as u32);
+                }
+            }
+            made
+        });
         let mut all = ViewFootprints::empty(camera.width, camera.height);
         for row in rows {
             let (shift, shift_lit) = (all.texels.len() as u32, all.lit.len() as u32);

@@ -9,10 +9,10 @@ use super::bounce::point_hit;
 use super::light_basis::LightBasis;
 use super::points::VisibilityGrid;
 use super::visibility::Visibility;
+use crate::math::parallel;
 use crate::math::sphere::direction_of_texel;
 use crate::render::Surface;
 use glam::Vec3;
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A cell of the light that a point does not see wholly, and the point of the grid that hides it.
@@ -72,19 +72,17 @@ impl Surroundings {
         stop: &AtomicBool,
     ) -> Self {
         let cells = Cells { side: side.max(1), width: basis.width, height: basis.height };
-        let lists: Vec<Vec<Hiding>> = (0..grid.points.len())
-            .into_par_iter()
-            .map_init(Vec::new, |hats, index| {
-                if stop.load(Ordering::Relaxed) {
-                    return Vec::new();
-                }
-                let found = |cell: usize| {
-                    let point = cells.hidden_by(cell, (surface, grid, index), basis, visibility.of(index), hats)?;
-                    Some(Hiding { cell: cell as u32, point })
-                };
-                (0..cells.count()).filter_map(found).collect()
-            })
-            .collect();
+        let lists: Vec<Vec<Hiding>> = parallel::map(grid.points.len(), |index| {
+            if stop.load(Ordering::Relaxed) {
+                return Vec::new();
+            }
+            let mut hats = Vec::new();
+            let found = |cell: usize| {
+                let point = cells.hidden_by(cell, (surface, grid, index), basis, visibility.of(index), &mut hats)?;
+                Some(Hiding { cell: cell as u32, point })
+            };
+            (0..cells.count()).filter_map(found).collect()
+        });
         let (mut offsets, mut hidings) = (vec![0], Vec::with_capacity(lists.iter().map(Vec::len).sum()));
         for list in lists {
             hidings.extend(list);

@@ -7,14 +7,14 @@ use super::irradiance::{irradiance, irradiance_backward, vector_irradiance};
 use super::light_basis::{LightBasis, LightPlanes};
 use super::lobe_place::{LobePlace, LobeSums, wide_from, width_through};
 use super::lobe_sum::{lobe_alone, lobe_with_derivative};
-use super::points::VisibilityGrid;
+use super::points::{VisibilityGrid, VisibilityPoint};
 use super::seen_light::{SeenLight, SeenRows};
 use super::surroundings::Surroundings;
 use super::visibility::Visibility;
 use crate::material::Material;
+use crate::math::parallel;
 use crate::render::Surface;
 use glam::Vec3;
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -133,23 +133,23 @@ impl CachedTransport {
 
     /// Direct light at all points: irradiance over pi.
     pub fn direct(&self, light: &LightPlanes) -> Vec<[f32; 3]> {
-        let point_of = |index: usize| &self.grid.points[index];
-        (0..self.grid.points.len())
-            .into_par_iter()
-            .with_min_len(64)
-            .map(|index| {
-                irradiance(&self.basis, point_of(index).shading_normal, self.visibility.of(index), &light.channels)
-            })
-            .collect()
+        self.of_points(|index, point| {
+            irradiance(&self.basis, point.shading_normal, self.visibility.of(index), &light.channels)
+        })
     }
 
     /// Light itself at all points: vector irradiance over pi, per channel.
     pub fn vectors(&self, light: &LightPlanes) -> Vec<[Vec3; 3]> {
-        let points = self.grid.points.par_iter().enumerate().with_min_len(64);
-        let vectors = points.map(|(index, point)| {
+        self.of_points(|index, point| {
             vector_irradiance(&self.basis, point.shading_normal, self.visibility.of(index), &light.channels)
-        });
-        vectors.collect()
+        })
+    }
+
+    fn of_points<T: Clone + Send>(&self, of: impl Fn(usize, &VisibilityPoint) -> T + Sync) -> Vec<T> {
+        let of_chunk = |chunk: usize, points: &[VisibilityPoint]| -> Vec<T> {
+            points.iter().zip(64 * chunk..).map(|(point, index)| of(index, point)).collect()
+        };
+        parallel::map_chunks(&self.grid.points, 64, of_chunk).concat()
     }
 
     /// What arrives at a shading point as [`PointLight::arriving`], but that direct light, of which the grid has these
@@ -176,21 +176,17 @@ impl CachedTransport {
     pub fn direct_backward(&self, d_direct: &[[f32; 3]]) -> [Vec<f32>; 3] {
         // A fixed number of parts, added up in order: the same bits whatever the thread count.
         let part = d_direct.len().div_ceil(64).max(1);
-        let sums: Vec<[Vec<f32>; 3]> = d_direct
-            .par_chunks(part)
-            .enumerate()
-            .map(|(which, d_direct)| {
-                let mut sum = [(); 3].map(|()| vec![0.0; self.basis.padded()]);
-                for (offset, &d) in d_direct.iter().enumerate() {
-                    if d != [0.0; 3] {
-                        let index = which * part + offset;
-                        let normal = self.grid.points[index].shading_normal;
-                        irradiance_backward(&self.basis, normal, self.visibility.of(index), d, &mut sum);
-                    }
+        let sums = parallel::map_chunks(d_direct, part, |which, d_direct| {
+            let mut sum = [(); 3].map(|()| vec![0.0; self.basis.padded()]);
+            for (offset, &d) in d_direct.iter().enumerate() {
+                if d != [0.0; 3] {
+                    let index = which * part + offset;
+                    let normal = self.grid.points[index].shading_normal;
+                    irradiance_backward(&self.basis, normal, self.visibility.of(index), d, &mut sum);
                 }
-                sum
-            })
-            .collect();
+            }
+            sum
+        });
         let mut total = [(); 3].map(|()| vec![0.0f32; self.basis.padded()]);
         for sum in sums {
             for (total, part) in total.iter_mut().zip(sum) {
@@ -204,20 +200,16 @@ impl CachedTransport {
 
     /// What points send back of light from everywhere: diffuse reflectance, and the lobe's as if it were diffuse too.
     pub fn reflectance_of_points(&self, texels: &[Material<f32>], map_size: usize) -> Vec<[f32; 3]> {
-        self.grid
-            .points
-            .par_iter()
-            .map(|point| {
-                let tap = crate::material::TextureTap::at(point.uv, 0, map_size, map_size);
-                let mut mean = Material::default();
-                for k in 0..4 {
-                    mean.add_scaled(&texels[tap.index[k] as usize], tap.weight[k]);
-                }
-                let [base, grazing] = self.lobe_albedo_at(mean.log_width);
-                let strength = self.settings.lobe_strength;
-                [0, 1, 2].map(|c| mean.diffuse[c] + strength * (mean.specular[c] * base + grazing))
-            })
-            .collect()
+        self.of_points(|_, point| {
+            let tap = crate::material::TextureTap::at(point.uv, 0, map_size, map_size);
+            let mut mean = Material::default();
+            for k in 0..4 {
+                mean.add_scaled(&texels[tap.index[k] as usize], tap.weight[k]);
+            }
+            let [base, grazing] = self.lobe_albedo_at(mean.log_width);
+            let strength = self.settings.lobe_strength;
+            [0, 1, 2].map(|c| mean.diffuse[c] + strength * (mean.specular[c] * base + grazing))
+        })
     }
 
     /// Light at all points, with as many bounces as paths have.
@@ -375,17 +367,16 @@ impl CachedTransport {
         light: &LightPlanes,
         at: &PointLight,
     ) -> Vec<[f32; 3]> {
-        let shaded: Vec<[f32; 3]> = footprints
-            .points
-            .par_iter()
-            .with_min_len(256)
-            .map_init(SeenRows::default, |seen, point| {
+        let shaded = parallel::map_chunks(&footprints.points, 256, |_, points| -> Vec<[f32; 3]> {
+            let mut seen = SeenRows::default();
+            let shade = |point: &ShadingPoint| {
                 let material = Self::material_of(footprints, point, texels);
-                self.shade(light, at, footprints, point, &material, seen)
-            })
-            .collect();
+                self.shade(light, at, footprints, point, &material, &mut seen)
+            };
+            points.iter().map(shade).collect()
+        });
         let mut picture = vec![[0.0f32; 3]; footprints.width * footprints.height];
-        for (point, radiance) in footprints.points.iter().zip(shaded) {
+        for (point, radiance) in footprints.points.iter().zip(shaded.into_iter().flatten()) {
             for channel in 0..3 {
                 picture[point.pixel as usize][channel] += point.share * radiance[channel];
             }

@@ -12,11 +12,11 @@ mod alike;
 use self::alike::AlikeAround;
 use super::light_basis::LightBasis;
 use super::points::{NO_POINT, VisibilityGrid};
+use crate::math::parallel;
 use crate::math::sphere::direction_of_texel;
 use crate::render::Surface;
 use crate::trace::Ray;
 use glam::Vec3;
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Weights of a hat over four cells along an axis, when none is clamped.
@@ -66,19 +66,16 @@ impl Visibility {
                 if stop.load(Ordering::Relaxed) {
                     return None;
                 }
-                let rows: Vec<(Vec<u8>, u64)> = group
-                    .par_iter()
-                    .map_init(Scratch::default, |scratch, &index| {
-                        // Dropped as a whole above.
-                        if stop.load(Ordering::Relaxed) {
-                            return (vec![0; stride], 0);
-                        }
-                        let parents = parents(grid, index, step, &done);
-                        let rows: Vec<&[u8]> =
-                            parents.iter().map(|&parent| &shares[parent * stride..(parent + 1) * stride]).collect();
-                        cells.shares(surface, grid, index, &rows, scratch)
-                    })
-                    .collect();
+                let rows = parallel::map_items(group, |&index| {
+                    // Dropped as a whole above.
+                    if stop.load(Ordering::Relaxed) {
+                        return (vec![0; stride], 0);
+                    }
+                    let parents = parents(grid, index, step, &done);
+                    let rows: Vec<&[u8]> =
+                        parents.iter().map(|&parent| &shares[parent * stride..(parent + 1) * stride]).collect();
+                    cells.shares(surface, grid, index, &rows, &mut Scratch::default())
+                });
                 for (&index, (row, traced)) in group.iter().zip(rows) {
                     shares[index * stride..(index + 1) * stride].copy_from_slice(&row);
                     rays += traced;

@@ -7,6 +7,7 @@
 //! view that shows about as many points of the grid as shading points. What a light sends is not asked, so that the plan
 //! serves all of them.
 
+use crate::math::parallel;
 use crate::render::cached::lobe_place::{LobePlace, LobeSums};
 use crate::render::cached::lobe_sum::lobe_sums;
 use crate::render::cached::{CachedTransport, LightPlanes, PointLight, SeenRows, ShadingPoint, ViewFootprints};
@@ -77,8 +78,10 @@ impl LobePlan {
             let is_spoken_for = |(point, &width): (&ShadingPoint, &f32)| {
                 is_spoken_for(footprints, transport, eye, point, width, factor)
             };
-            let each = points.par_iter().zip(&widths).with_min_len(1024);
-            is_alone = each.map(|own| !is_spoken_for(own)).collect();
+            let of_chunk = |chunk: usize, points: &[ShadingPoint]| -> Vec<bool> {
+                points.iter().zip(&widths[chunk * 1024..]).map(|own| !is_spoken_for(own)).collect()
+            };
+            is_alone = parallel::map_chunks(points, 1024, of_chunk).concat();
             if is_alone.iter().filter(|&&is_alone| is_alone).count() <= MOST_ALONE {
                 break;
             }
@@ -143,19 +146,25 @@ impl LobePlan {
             }
             sums.into_iter().take(count)
         };
-        let places = self.places.par_iter().with_min_len(16);
-        let sums: Vec<LobeSums> = places.map_init(Default::default, of_place).flatten_iter().collect();
+        let of_places = |_: usize, places: &[Place]| -> Vec<LobeSums> {
+            let mut seen = SeenRows::default();
+            places.iter().flat_map(|own| of_place(&mut seen, own)).collect()
+        };
+        let sums = parallel::map_chunks(&self.places, 16, of_places).concat();
         let own = |seen: &mut SeenRows, &index: &u32| {
             let point = ShadingPoint { normal_variance: 0.0, ..footprints.points[index as usize] };
             transport.lobe_at(&point, (light, at), seen, self.widths[index as usize], false)
         };
-        let of_alone: Vec<LobeSums> = self.alone.par_iter().with_min_len(64).map_init(SeenRows::default, own).collect();
+        let of_alone = parallel::map_chunks(&self.alone, 64, |_, alone| -> Vec<LobeSums> {
+            let mut seen = SeenRows::default();
+            alone.iter().map(|index| own(&mut seen, index)).collect()
+        });
         let between = |index: usize| match self.is_alone[index] {
             true => LobeSums::default(),
             false => self.between(footprints.lit_of(&footprints.points[index]), self.widths[index], &sums),
         };
         let mut made: Vec<LobeSums> = (0..self.widths.len()).into_par_iter().with_min_len(1024).map(between).collect();
-        self.alone.iter().zip(of_alone).for_each(|(&index, own)| made[index as usize] = own);
+        self.alone.iter().zip(of_alone.into_iter().flatten()).for_each(|(&index, own)| made[index as usize] = own);
         made
     }
 

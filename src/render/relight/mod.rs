@@ -18,6 +18,7 @@ use crate::image::{Image, RgbImage};
 use crate::light::Environment;
 use crate::material::Material;
 use crate::material::texels::{PyramidWeights, TexelPyramid};
+use crate::math::parallel;
 use crate::scene::Camera;
 use glam::{Vec2, Vec3};
 use lobe_plan::LobePlan;
@@ -118,7 +119,7 @@ impl RelitView {
         let (width, height) = (self.camera.width, self.camera.height);
         let strength = transport.settings.lobe_strength;
         let mut pixels = vec![Vec3::ZERO; width * height];
-        pixels.par_chunks_mut(width).enumerate().for_each(|(row, pixels)| {
+        parallel::each_chunk(&mut pixels, width, &|row, pixels| {
             for index in self.row_starts[row]..self.row_starts[row + 1] {
                 let (point, material) = (&footprints.points[index], &self.materials[index]);
                 let arriving = transport.arriving_at((&at, &vectors), footprints, point);

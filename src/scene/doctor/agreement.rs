@@ -11,10 +11,9 @@
 use super::probe::Probe;
 use super::{Report, names_of, neighbours};
 use crate::error::{Finding, Place, Severity};
-use crate::math::{luminance, statistics::quantile};
+use crate::math::{luminance, parallel, statistics::quantile};
 use crate::scene::{PixelState, Scene, View};
 use crate::trace::Bvh;
-use rayon::prelude::*;
 
 /// Points of each view that are looked up in its neighbours.
 const POINTS_PER_VIEW: usize = 600;
@@ -244,11 +243,9 @@ struct Trial<'a> {
 impl Trial<'_> {
     /// How each view agrees with its neighbours: the median correlation, with a photo for each camera.
     fn of_views(&self, photos: &[usize]) -> Vec<Option<f64>> {
-        let found: Vec<Option<f64>> = self
-            .pairs
-            .par_iter()
-            .map(|pair| self.pictures.correlation(pair, pair.cameras.map(|camera| photos[camera]), [Lie::AsItIs; 2]))
-            .collect();
+        let found: Vec<Option<f64>> = parallel::map_items(self.pairs, |pair| {
+            self.pictures.correlation(pair, pair.cameras.map(|camera| photos[camera]), [Lie::AsItIs; 2])
+        });
         let mut of_views = vec![Vec::new(); self.count];
         for (pair, correlation) in self.pairs.iter().zip(found) {
             for camera in pair.cameras {

@@ -7,10 +7,10 @@
 use super::Report;
 use super::probe::{Probe, area_in_pixel, surface_at};
 use crate::error::{Finding, Place, Severity};
+use crate::math::parallel;
 use crate::scene::{Scene, View};
 use crate::trace::{Bvh, Ray};
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// Share of what is seen beyond which thin walls are told: sound meshes have less, thin shells a multiple.
 const TOLD_THIN: f64 = 0.02;
@@ -37,12 +37,10 @@ impl Counts {
 
 /// Measures how much of what training photos show is thin or touches something, and tells it.
 pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Report) {
-    let of_views: Vec<Counts> = scene
-        .views
-        .par_iter()
-        .zip(probes)
-        .map(|(view, probes)| if view.held_out { Counts::default() } else { count(scene, bvh, view, probes) })
-        .collect();
+    let of_views: Vec<Counts> = parallel::map(scene.views.len(), |index| {
+        let view = &scene.views[index];
+        if view.held_out { Counts::default() } else { count(scene, bvh, view, &probes[index]) }
+    });
     let all = of_views.iter().copied().fold(Counts::default(), Counts::plus);
     let share = |count: usize| count as f64 / all.asked.max(1) as f64;
     (report.surface.thin_share, report.surface.touching_share) = (share(all.thin), share(all.touching));

@@ -8,11 +8,10 @@
 use super::Report;
 use super::probe::{Probe, centre_of, hit_at, surface_at};
 use crate::error::{Finding, Place, Severity};
-use crate::math::luminance;
 use crate::math::statistics::quantile;
+use crate::math::{luminance, parallel};
 use crate::scene::{Mesh, Scene, View};
 use crate::trace::Bvh;
-use rayon::prelude::*;
 use std::collections::BTreeSet;
 
 /// Width and height of what is judged at once, in pixels.
@@ -30,12 +29,10 @@ const TOLD_SHARE: f64 = 0.1;
 
 /// Measures which share of what training photos show has its contrast in single pixels, and tells it.
 pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Report) {
-    let of_views: Vec<[usize; 2]> = scene
-        .views
-        .par_iter()
-        .zip(probes)
-        .map(|(view, probes)| if view.held_out { [0; 2] } else { count(&scene.mesh, view, bvh, probes) })
-        .collect();
+    let of_views: Vec<[usize; 2]> = parallel::map(scene.views.len(), |index| {
+        let view = &scene.views[index];
+        if view.held_out { [0; 2] } else { count(&scene.mesh, view, bvh, &probes[index]) }
+    });
     let [judged, fine] = of_views.iter().fold([0; 2], |sum, own| [sum[0] + own[0], sum[1] + own[1]]);
     let share = fine as f64 / judged.max(1) as f64;
     report.surface.fine_share = share;

@@ -17,11 +17,10 @@ use super::Report;
 use super::probe::{Probe, surface_at};
 use super::shading::{Shares, Sight, Sighted, explain};
 use crate::error::{Finding, Place, Severity};
-use crate::math::luminance;
+use crate::math::{luminance, parallel};
 use crate::scene::{PixelState, Scene, View};
 use crate::trace::Bvh;
 use glam::{DMat3, Vec3};
-use rayon::prelude::*;
 
 /// At most so many views are looked at, spread evenly.
 const MOST_VIEWS: usize = 48;
@@ -158,23 +157,21 @@ fn sighted(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], views: &[usize]) -> 
             hits.into_iter().step_by(step).filter_map(|hit| surface_at(&scene.mesh, hit)).collect::<Vec<_>>()
         })
         .collect();
-    places
-        .into_par_iter()
-        .filter_map(|(point, normal, shading)| {
-            let normal_in_world = shading.as_dvec3();
-            let sights: Vec<Sight> = views
-                .iter()
-                .zip(&rotations)
-                .enumerate()
-                .filter_map(|(place, (&view, rotation))| {
-                    let log = log_seen(scene, bvh, view, point, normal)?;
-                    let to_eye = (scene.views[view].camera.position_in_world() - point).as_dvec3().normalize_or_zero();
-                    Some(Sight::new(place, log, normal_in_world, to_eye, rotation))
-                })
-                .collect();
-            (sights.len() >= FEWEST_SIGHTS).then_some(Sighted { normal: normal_in_world, sights })
-        })
-        .collect()
+    let sighted = parallel::map_items(&places, |&(point, normal, shading)| {
+        let normal_in_world = shading.as_dvec3();
+        let sights: Vec<Sight> = views
+            .iter()
+            .zip(&rotations)
+            .enumerate()
+            .filter_map(|(place, (&view, rotation))| {
+                let log = log_seen(scene, bvh, view, point, normal)?;
+                let to_eye = (scene.views[view].camera.position_in_world() - point).as_dvec3().normalize_or_zero();
+                Some(Sight::new(place, log, normal_in_world, to_eye, rotation))
+            })
+            .collect();
+        (sights.len() >= FEWEST_SIGHTS).then_some(Sighted { normal: normal_in_world, sights })
+    });
+    sighted.into_iter().flatten().collect()
 }
 
 /// Logarithm of what a view sees at a point; `None` where it does not see it well.

@@ -45,9 +45,9 @@ pub use overlay::overlay;
 pub use pixel_centre::CentreMeasurement;
 
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
-use crate::scene::{Scene, View};
+use crate::math::parallel;
+use crate::scene::Scene;
 use crate::trace::Bvh;
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What the check found.
@@ -163,11 +163,11 @@ fn check_with_until(scene: &Scene, bvh: &Bvh, stop: &AtomicBool) -> Result<Repor
     let stopped = || Error::new(ErrorKind::Stopped, "stopped while the scene was checked");
     let mut report = Report { findings: scene.findings.clone(), ..Default::default() };
     let usable = cameras::check(scene, &mut report);
-    let probe = |(view, usable): (&View, &bool)| {
-        let is_wanted = *usable && !stop.load(Ordering::Relaxed);
-        if is_wanted { probe::probe_view(view, bvh) } else { Vec::new() }
+    let probe = |view: usize| {
+        let is_wanted = usable[view] && !stop.load(Ordering::Relaxed);
+        if is_wanted { probe::probe_view(&scene.views[view], bvh) } else { Vec::new() }
     };
-    let probes: Vec<Vec<probe::Probe>> = scene.views.par_iter().zip(&usable).map(probe).collect();
+    let probes: Vec<Vec<probe::Probe>> = parallel::map(scene.views.len(), probe);
     report.views = scene
         .views
         .iter()

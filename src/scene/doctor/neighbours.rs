@@ -1,14 +1,13 @@
 //! Which views are held against each other, and the points at which: what checks of agreement and of exposure have in common.
 
 use super::probe::{Probe, surface_at};
+use crate::math::parallel;
 use crate::scene::{Scene, View};
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// What is found for each view, in the order of the views.
 pub fn over_views<T: Send>(scene: &Scene, of_view: impl Fn(usize) -> Vec<T> + Send + Sync) -> Vec<T> {
-    let found: Vec<Vec<T>> = (0..scene.views.len()).into_par_iter().map(of_view).collect();
-    found.into_iter().flatten().collect()
+    parallel::map(scene.views.len(), of_view).into_iter().flatten().collect()
 }
 
 /// The `most` views with probes that look from the most similar side as view `own`, the nearest first.

@@ -3,10 +3,10 @@
 use super::probe::{centre_of, hit_at, surface_at};
 use crate::image::transfer::srgb8_from_linear_value;
 use crate::image::{Image, RgbImage};
+use crate::math::parallel;
 use crate::scene::{Mesh, Photo, Scene, View};
 use crate::trace::Bvh;
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// The mesh against the background.
 pub const SILHOUETTE_COLOUR: [u8; 3] = [255, 0, 200];
@@ -42,16 +42,13 @@ pub fn overlay(scene: &Scene, bvh: &Bvh, view: usize) -> Image<[u8; 3]> {
 /// [`overlay`] of a view that need not be one of a scene.
 pub fn overlay_of(mesh: &Mesh, bvh: &Bvh, view: &View) -> Image<[u8; 3]> {
     let (width, height) = (view.camera.width, view.camera.height);
-    let sights: Vec<Option<Sight>> = (0..height)
-        .into_par_iter()
-        .flat_map_iter(|row| {
-            (0..width).map(move |column| {
-                let hit = hit_at(&view.camera, bvh, centre_of(row, column))?;
-                let (point, normal, _) = surface_at(mesh, &hit)?;
-                Some(Sight { depth: hit.t, point, normal })
-            })
-        })
-        .collect();
+    let sight_of = |row: usize, column: usize| {
+        let hit = hit_at(&view.camera, bvh, centre_of(row, column))?;
+        let (point, normal, _) = surface_at(mesh, &hit)?;
+        Some(Sight { depth: hit.t, point, normal })
+    };
+    let row = |row: usize| (0..width).map(|column| sight_of(row, column)).collect::<Vec<_>>();
+    let sights: Vec<Option<Sight>> = parallel::map(height, row).concat();
     let sight = |row: usize, column: usize| sights[row * width + column];
     let mut picture = backdrop(view);
     for row in 0..height {

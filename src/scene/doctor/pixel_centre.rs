@@ -10,13 +10,12 @@ use super::Report;
 use super::edge_profile::Profiles;
 use super::probe::{centre_of, hit_at};
 use crate::error::{Finding, Severity};
-use crate::math::evenly_spread;
 use crate::math::statistics::Moments;
+use crate::math::{evenly_spread, parallel};
 use crate::scene::settings::PixelCentre;
 use crate::scene::{PixelState, Scene, View};
 use crate::trace::Bvh;
 use glam::{DVec2, Vec2};
-use rayon::prelude::*;
 
 /// Views that are measured, spread over the scene.
 const MEASURED_VIEWS: usize = 10;
@@ -117,7 +116,8 @@ fn summary(places: impl Iterator<Item = DVec2> + Clone) -> ([f64; 2], [f64; 2]) 
 
 /// The measurement from masks alone.
 pub fn measure_by_masks(views: &[&View], bvh: &Bvh) -> Option<CentreMeasurement> {
-    let of_views: Vec<MaskEdges> = views.par_iter().filter_map(|view| MaskEdges::measure(view, bvh)).collect();
+    let of_views = parallel::map_items(views, |view| MaskEdges::measure(view, bvh));
+    let of_views: Vec<MaskEdges> = of_views.into_iter().flatten().collect();
     let edge_count: usize = of_views.iter().map(|edges| edges.count).sum();
     if edge_count < 50 {
         return None;
@@ -218,7 +218,7 @@ fn mask_edge_pixels(view: &View) -> Vec<(usize, usize, bool)> {
 /// The measurement from the photos' edges alone. The profiles of all views are added up; the error is by leaving out
 /// one view at a time (jackknife).
 pub fn measure_by_photo_edges(views: &[&View], bvh: &Bvh) -> Option<CentreMeasurement> {
-    let of_views: Vec<Profiles> = views.par_iter().map(|view| Profiles::of_view(view, bvh)).collect();
+    let of_views: Vec<Profiles> = parallel::map_items(views, |view| Profiles::of_view(view, bvh));
     let sum_without = |left_out: usize| {
         let mut sum = Profiles::EMPTY;
         of_views.iter().enumerate().filter(|(index, _)| *index != left_out).for_each(|(_, profiles)| sum.add(profiles));

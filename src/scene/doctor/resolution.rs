@@ -6,8 +6,8 @@
 
 use super::Report;
 use super::probe::{Probe, area_in_pixel, surface_at};
+use crate::math::parallel;
 use crate::scene::{Mesh, Scene};
-use rayon::prelude::*;
 
 /// Share of the surface, each piece counted as often as it is seen, that is covered by larger pixels than the one that
 /// counts: grazing and distant looks at a place go unheeded, and so do a few very close ones.
@@ -17,17 +17,17 @@ const COARSER_THAN_SHARPEST: f64 = 0.95;
 
 /// Sets [`Report::texels_resolved`] and [`Report::texels_resolved_sharpest`] from what the probes of the training views meet.
 pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
-    let training = scene.views.par_iter().zip(probes).filter(|(view, _)| !view.held_out);
-    let mut pieces: Vec<f64> = training
-        .flat_map_iter(|(view, probes)| {
-            let seen = probes.iter().filter(|probe| view.states[(probe.row, probe.column)].is_surface());
-            seen.filter_map(|probe| {
-                let (place, normal, _) = surface_at(&scene.mesh, probe.hit.as_ref()?)?;
-                let area = f64::from(area_in_pixel(&view.camera, place, normal));
-                (area.is_finite() && area > 0.0).then_some(area)
-            })
-        })
-        .collect();
+    let training: Vec<_> = scene.views.iter().zip(probes).filter(|(view, _)| !view.held_out).collect();
+    let of_views = parallel::map_items(&training, |(view, probes)| {
+        let seen = probes.iter().filter(|probe| view.states[(probe.row, probe.column)].is_surface());
+        let pieces = seen.filter_map(|probe| {
+            let (place, normal, _) = surface_at(&scene.mesh, probe.hit.as_ref()?)?;
+            let area = f64::from(area_in_pixel(&view.camera, place, normal));
+            (area.is_finite() && area > 0.0).then_some(area)
+        });
+        pieces.collect::<Vec<_>>()
+    });
+    let mut pieces: Vec<f64> = of_views.concat();
     pieces.sort_unstable_by(|one, other| other.total_cmp(one));
     let whole = surface_area(&scene.mesh);
     let resolved = |coarser_share: f64| {

@@ -3,7 +3,7 @@
 use super::source::SourceView;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::file;
-use rayon::prelude::*;
+use crate::math::parallel;
 
 /// The sides of a photo may be rounded by so many pixels when it is made smaller.
 const ROUNDING_PIXELS: f64 = 1.0;
@@ -13,8 +13,7 @@ const ROUNDING_PIXELS: f64 = 1.0;
 /// # Errors
 /// The first photo, in the order of `views`, that cannot be read.
 pub fn of_files(views: &[SourceView]) -> Result<Vec<(usize, usize)>> {
-    let sizes: Vec<_> = views.par_iter().map(|view| file::read_size(&view.photo)).collect();
-    sizes.into_iter().collect()
+    parallel::map_items(views, |view| file::read_size(&view.photo)).into_iter().collect()
 }
 
 /// Scales the intrinsics of views to the true `sizes` of their photos, by each side's own ratio. The first pixel's centre is at

@@ -6,12 +6,12 @@ use super::zip::Archive;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::file::{self, Encoding, PhotoFile, PhotoOptions, PhotoPixels};
 use crate::image::{GreyImage, Image, RgbImage, resize};
+use crate::math::parallel;
 use crate::scene::lens::{Undistorted, undistort};
 use crate::scene::settings::{ColourEncoding, MaskUse, ReadSettings};
 use crate::scene::{Photo, PixelState};
 use glam::Vec3;
 use half::f16;
-use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -68,8 +68,7 @@ pub fn load_all(
     let shrink = settings.shrink;
     let as_half = pixels / (shrink * shrink) * std::mem::size_of::<Vec3>() > MOST_FLOAT_BYTES;
     let packed = if settings.masks == MaskUse::Use { archives_of_masks(views)? } else { BTreeMap::new() };
-    let loaded: Vec<Result<LoadedPhoto>> =
-        views.par_iter().map(|view| load(view, encoding, settings, as_half, &packed)).collect();
+    let loaded = parallel::map_items(views, |view| load(view, encoding, settings, as_half, &packed));
     let mut loaded = loaded.into_iter().collect::<Result<Vec<_>>>()?;
     let mut gathered = gather(views, &loaded);
     gathered.extend(centre_exposures(&mut loaded));

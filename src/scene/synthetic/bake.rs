@@ -2,9 +2,9 @@
 
 use crate::image::Image;
 use crate::material::MaterialMaps;
+use crate::math::parallel;
 use crate::scene::mesh::Mesh;
 use glam::{DVec2, Vec3};
-use rayon::prelude::*;
 
 /// A place on the surface that a texel shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,31 +54,29 @@ pub fn bake(
 ) -> Baked {
     let owners = owners_of_samples(mesh, width, height);
     // Average the reflectance over the covered samples of each texel.
-    let texels: Vec<Option<Reflectance>> = (0..width * height)
-        .into_par_iter()
-        .map(|texel| {
-            let (row, column) = (texel / width, texel % width);
-            let mut sum = Reflectance::default();
-            let mut count = 0.0;
-            for sample in 0..SAMPLES * SAMPLES {
-                let place = (row * SAMPLES + sample / SAMPLES, column * SAMPLES + sample % SAMPLES);
-                let triangle = owners[place];
-                if triangle != NOBODY {
-                    let point = point_of(mesh, triangle as usize, place, width, height, part_of(triangle as usize));
-                    let value = reflectance(&point);
-                    sum.diffuse += value.diffuse;
-                    sum.specular += value.specular;
-                    sum.roughness += value.roughness;
-                    count += 1.0;
-                }
+    let texel = |row: usize, column: usize| {
+        let mut sum = Reflectance::default();
+        let mut count = 0.0;
+        for sample in 0..SAMPLES * SAMPLES {
+            let place = (row * SAMPLES + sample / SAMPLES, column * SAMPLES + sample % SAMPLES);
+            let triangle = owners[place];
+            if triangle != NOBODY {
+                let point = point_of(mesh, triangle as usize, place, width, height, part_of(triangle as usize));
+                let value = reflectance(&point);
+                sum.diffuse += value.diffuse;
+                sum.specular += value.specular;
+                sum.roughness += value.roughness;
+                count += 1.0;
             }
-            (count > 0.0).then(|| Reflectance {
-                diffuse: sum.diffuse / count,
-                specular: sum.specular / count,
-                roughness: sum.roughness / count,
-            })
+        }
+        (count > 0.0).then(|| Reflectance {
+            diffuse: sum.diffuse / count,
+            specular: sum.specular / count,
+            roughness: sum.roughness / count,
         })
-        .collect();
+    };
+    let row = |row: usize| (0..width).map(|column| texel(row, column)).collect::<Vec<_>>();
+    let texels: Vec<Option<Reflectance>> = parallel::map(height, row).concat();
     let covered = Image::from_pixels(width, height, texels.iter().map(Option::is_some).collect());
     let nearest = nearest_covered(&covered);
     let fallback = Reflectance { roughness: 1.0, ..Reflectance::default() };

@@ -15,12 +15,12 @@ use crate::job::demo;
 use crate::job::materials::OpenedMaterial;
 use crate::job::open::{self, OpenStage, OpenedRun, OpenedScene, PathKind};
 use crate::job::prepare::{Prepared, RunSettings, prepare_with};
+use crate::math::parallel;
 use crate::object::result_read;
 use crate::render::Surface;
 use crate::scene::demo::DemoSettings;
 use crate::scene::{Mesh, ReadSettings, Scene};
 use crate::studio::stage::eye::OrbitEye;
-use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -396,7 +396,7 @@ fn small_pictures(scene: &Scene) -> Vec<Arc<RgbImage>> {
         let (photo, size) = (&view.photo, (view.photo.width(), view.photo.height()));
         Arc::new(crate::image::area::thumbnail_of(size, |row, column| photo.radiance(row, column), THUMBNAIL_SIDE))
     };
-    scene.views.par_iter().map(small).collect()
+    parallel::map_items(&scene.views, small)
 }
 
 /// The share of clipped pixels among those whose rays meet the surface, of each photo: without a mask only rays tell the
@@ -418,7 +418,7 @@ fn clipped_shares(scene: &Scene, surface: &Surface) -> Vec<f32> {
         }
         clipped as f32 / met.max(1) as f32
     };
-    scene.views.par_iter().map(of_view).collect()
+    parallel::map_items(&scene.views, of_view)
 }
 
 /// Root mean square errors of a report, in the order of a scene's views.

@@ -11,10 +11,9 @@ use super::source::{Source, Value};
 use super::view::{Frame, PixelRect};
 use crate::image::Image;
 use crate::image::display::{DisplaySettings, PreparedDisplay, bytes_of_colour};
-use crate::math::luminance;
+use crate::math::{luminance, parallel};
 use eframe::egui::{Color32, ColorImage};
 use glam::Vec3;
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Colours of the hatch over texels without a value, and of masks.
@@ -75,7 +74,7 @@ impl Painting<'_> {
         }
         let shade = Shade { display: display.prepared(), inks: self.inks, visible };
         let mask = self.mask.filter(|mask| !mask.pixels().is_empty()).map(|mask| Mask::new(mask, &self.frame));
-        image.pixels.par_chunks_mut(visible.width).enumerate().for_each(|(y, pixels)| {
+        parallel::each_chunk(&mut image.pixels, visible.width, &|y, pixels| {
             let first = first.row(y);
             let second = second.as_ref().map(|second| second.row(y));
             for (x, pixel) in pixels.iter_mut().enumerate() {

@@ -9,9 +9,8 @@ use crate::image::{Image, RgbImage};
 use crate::light::Environment;
 use crate::material::lobe::{LobeGeometry, LobeModel, Material};
 use crate::math::frame::Frame;
-use crate::math::sphere;
+use crate::math::{parallel, sphere};
 use glam::Vec3;
-use rayon::prelude::*;
 use std::sync::LazyLock;
 
 /// Width of the blurred maps in texels.
@@ -96,7 +95,7 @@ impl Source {
             }
             sum / weights.max(1e-30)
         };
-        Image::from_pixels(WIDTH, HEIGHT, (0..WIDTH * HEIGHT).into_par_iter().map(pixel).collect())
+        Image::from_pixels(WIDTH, HEIGHT, parallel::map(WIDTH * HEIGHT, pixel))
     }
 }
 
@@ -110,8 +109,7 @@ pub(super) fn reflectance_table() -> &'static RgbImage {
             let at = |place: usize| (place as f32 + 0.5) / TABLE_SIZE as f32;
             reflectance(at(index % TABLE_SIZE), at(index / TABLE_SIZE))
         };
-        let cells = (0..TABLE_SIZE * TABLE_SIZE).into_par_iter().map(cell).collect();
-        Image::from_pixels(TABLE_SIZE, TABLE_SIZE, cells)
+        Image::from_pixels(TABLE_SIZE, TABLE_SIZE, parallel::map(TABLE_SIZE * TABLE_SIZE, cell))
     });
     &TABLE
 }

@@ -7,6 +7,7 @@ use crate::error::{Finding, Severity};
 use crate::image::display::NOT_FINITE;
 use crate::image::{GreyImage, Image, RgbImage, resize};
 use crate::material::MaterialMaps;
+use crate::math::parallel;
 use eframe::wgpu;
 use half::f16;
 use rayon::prelude::*;
@@ -41,7 +42,7 @@ impl Level {
     fn coarser(&self) -> Level {
         let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
         let mut texels = vec![([0.0; 4], 0.0); width * height];
-        texels.par_chunks_mut(width).with_min_len(ROWS_PER_TASK).enumerate().for_each(|(row, pixels)| {
+        each_row(&mut texels, width, &|row, pixels| {
             let rows = [2 * row, (2 * row + 1).min(self.height - 1)];
             for (column, (sum, weights)) in pixels.iter_mut().enumerate() {
                 let columns = [2 * column, (2 * column + 1).min(self.width - 1)];
@@ -62,8 +63,7 @@ impl Level {
 
     /// Gives texels without meaning the value of the coarser level, so that filters at the border of a chart stay in it.
     fn fill_from(&mut self, coarser: &Level) {
-        let width = self.width;
-        self.texels.par_chunks_mut(width).with_min_len(ROWS_PER_TASK).enumerate().for_each(|(row, pixels)| {
+        each_row(&mut self.texels, self.width, &|row, pixels| {
             let above = (row / 2).min(coarser.height - 1) * coarser.width;
             for (column, (value, weight)) in pixels.iter_mut().enumerate() {
                 if *weight <= 0.0 {
@@ -77,6 +77,12 @@ impl Level {
         let half = |value: f32| f16::from_f32(value.clamp(-LARGEST, LARGEST));
         self.texels.par_iter().with_min_len(4096).map(|(value, _)| value.map(half)).collect()
     }
+}
+
+fn each_row(texels: &mut [Weighted], width: usize, body: &(dyn Fn(usize, &mut [Weighted]) + Sync)) {
+    parallel::each_chunk(texels, width * ROWS_PER_TASK, &|task, texels| {
+        (task * ROWS_PER_TASK..).zip(texels.chunks_mut(width)).for_each(|(row, texels)| body(row, texels));
+    });
 }
 
 /// What textures are made with.
@@ -140,7 +146,10 @@ impl Maker {
         has_holes: bool,
         texel: impl Fn(usize) -> Weighted + Send + Sync,
     ) -> GpuTexture {
-        let texels = (0..width * height).into_par_iter().with_min_len(4096).map(texel).collect();
+        let mut texels = vec![([0.0; 4], 0.0); width * height];
+        parallel::each_chunk(&mut texels, 4096, &|chunk, texels| {
+            (4096 * chunk..).zip(texels).for_each(|(index, own)| *own = texel(index));
+        });
         let mut levels = vec![Level { width, height, texels }];
         while let Some(last) = levels.last().filter(|last| last.width.max(last.height) > 1) {
             let next = last.coarser();

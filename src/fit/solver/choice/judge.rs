@@ -7,10 +7,10 @@ use super::alternatives::{Lobe, TileAlternatives};
 use super::clustered::ClusteredMean;
 use super::student::StudentNoise;
 use super::{ALTERNATIVES, Alternative, LOBE_ALTERNATIVES};
+use crate::math::parallel;
 use crate::render::cached::lobe_place::LobeSums;
 use crate::render::cached::lobe_sum::lobe_sums;
 use crate::render::cached::{CachedTransport, LightPlanes, PointLight, SeenLight, ViewFootprints};
-use rayon::prelude::*;
 use std::borrow::Cow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -142,15 +142,13 @@ impl SolverScene {
             }
             let unclipped: Vec<&Observation> = pixels.iter().filter(|pixel| !pixel.clipped).collect();
             let step = unclipped.len().div_ceil(MOST_PIXELS_OF_VIEW).max(1);
-            let judged: Vec<Judged> = unclipped
-                .par_iter()
-                .step_by(step)
-                .with_min_len(64)
-                .map_init(Default::default, |around, pixel| {
-                    self.judged(surface, footprints, pixel, [light, coarse], around)
-                })
-                .flatten_iter()
-                .collect();
+            let of_chunk = |_: usize, pixels: &[&Observation]| -> Vec<Judged> {
+                let mut around = Default::default();
+                let pixels = pixels.iter().step_by(step);
+                pixels.filter_map(|own| self.judged(surface, footprints, own, [light, coarse], &mut around)).collect()
+            };
+            let judged: Vec<Judged> =
+                parallel::map_chunks(&unclipped, 64 * step, of_chunk).into_iter().flatten().collect();
             made.add_view(surface, &judged, self.observations.mean, self.settings.exposure);
         }
         Some(made)

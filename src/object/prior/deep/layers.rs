@@ -3,6 +3,7 @@
 //! Products are taken over fixed numbers of rows and summed in order: the bits do not depend on the number of threads.
 
 use super::planes::Planes;
+use crate::math::parallel;
 use crate::neural::product::{Rows, multiply};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -86,22 +87,19 @@ impl Convolution {
         let (height, width) = self.size(source);
         let (matrix, offsets) = weights.split_at(self.outputs * self.columns());
         let tasks = self.tasks(height, width);
-        let parts: Vec<Vec<f32>> = tasks
-            .par_iter()
-            .map(|task| {
-                let mut part = Vec::with_capacity(self.outputs * task.len() * width);
-                let (mut columns, mut product) = (Vec::new(), Vec::new());
-                for rows in blocks(task, width) {
-                    let pixels = rows.len() * width;
-                    self.unroll(source, rows.start, rows.len(), width, &mut columns);
-                    product.resize(self.outputs * pixels, 0.0);
-                    let left = Rows::new(matrix, self.outputs, self.columns());
-                    multiply(left, Rows::new(&columns, self.columns(), pixels), &mut product, false);
-                    part.extend_from_slice(&product);
-                }
-                part
-            })
-            .collect();
+        let parts: Vec<Vec<f32>> = parallel::map_items(&tasks, |task| {
+            let mut part = Vec::with_capacity(self.outputs * task.len() * width);
+            let (mut columns, mut product) = (Vec::new(), Vec::new());
+            for rows in blocks(task, width) {
+                let pixels = rows.len() * width;
+                self.unroll(source, rows.start, rows.len(), width, &mut columns);
+                product.resize(self.outputs * pixels, 0.0);
+                let left = Rows::new(matrix, self.outputs, self.columns());
+                multiply(left, Rows::new(&columns, self.columns(), pixels), &mut product, false);
+                part.extend_from_slice(&product);
+            }
+            part
+        });
         let mut result = Planes::zeros(self.outputs, height, width);
         for (task, part) in tasks.iter().zip(&parts) {
             let mut at = 0;
@@ -125,29 +123,26 @@ impl Convolution {
         let matrix = &weights[..self.outputs * self.columns()];
         let turned = Rows::new(matrix, self.outputs, self.columns()).transpose();
         let tasks = self.tasks(height, width);
-        let parts: Vec<(Vec<f32>, Planes)> = tasks
-            .par_iter()
-            .map(|task| {
-                let (mut d_part, mut columns) = (Vec::new(), Vec::new());
-                let mut d_matrix = vec![0.0; matrix.len()];
-                let strip_height = (task.len() - 1) * self.stride + self.side;
-                let mut strip = Planes::zeros(self.inputs, strip_height, source.width);
-                for rows in blocks(task, width) {
-                    let pixels = rows.len() * width;
-                    d_part.clear();
-                    for output in 0..self.outputs {
-                        d_part.extend_from_slice(&d_result.channel(output)[rows.start * width..][..pixels]);
-                    }
-                    self.unroll(source, rows.start, rows.len(), width, &mut columns);
-                    let d_rows = Rows::new(&d_part, self.outputs, pixels);
-                    multiply(d_rows, Rows::new(&columns, self.columns(), pixels).transpose(), &mut d_matrix, true);
-                    // The taps are read: their place takes their derivatives.
-                    multiply(turned, d_rows, &mut columns, false);
-                    self.roll(&columns, rows.start - task.start, rows.len(), width, &mut strip);
+        let parts: Vec<(Vec<f32>, Planes)> = parallel::map_items(&tasks, |task| {
+            let (mut d_part, mut columns) = (Vec::new(), Vec::new());
+            let mut d_matrix = vec![0.0; matrix.len()];
+            let strip_height = (task.len() - 1) * self.stride + self.side;
+            let mut strip = Planes::zeros(self.inputs, strip_height, source.width);
+            for rows in blocks(task, width) {
+                let pixels = rows.len() * width;
+                d_part.clear();
+                for output in 0..self.outputs {
+                    d_part.extend_from_slice(&d_result.channel(output)[rows.start * width..][..pixels]);
                 }
-                (d_matrix, strip)
-            })
-            .collect();
+                self.unroll(source, rows.start, rows.len(), width, &mut columns);
+                let d_rows = Rows::new(&d_part, self.outputs, pixels);
+                multiply(d_rows, Rows::new(&columns, self.columns(), pixels).transpose(), &mut d_matrix, true);
+                // The taps are read: their place takes their derivatives.
+                multiply(turned, d_rows, &mut columns, false);
+                self.roll(&columns, rows.start - task.start, rows.len(), width, &mut strip);
+            }
+            (d_matrix, strip)
+        });
         let mut d_source = Planes::zeros(self.inputs, source.height, source.width);
         let (d_matrix, d_offsets) = d_weights.split_at_mut(matrix.len());
         for (task, (d_part, strip)) in tasks.iter().zip(&parts) {
@@ -222,7 +217,7 @@ pub fn norm_forward(weights: &[f32], planes: Planes) -> (Planes, NormTape) {
         })
         .collect();
     let mut result = normalised.clone();
-    result.values.par_chunks_mut(area).enumerate().for_each(|(channel, values)| {
+    parallel::each_chunk(&mut result.values, area, &|channel, values| {
         for value in values {
             let moved = *value * scales[channel] + offsets[channel];
             *value = if moved > 0.0 { moved } else { LEAK * moved };
@@ -262,20 +257,16 @@ pub fn norm_backward(
         d_offsets[channel] += by_offset;
     }
     // By group: mean and variance move with every value.
-    d_result
-        .values
-        .par_chunks_mut(GROUP * area)
-        .zip(tape.normalised.values.par_chunks(GROUP * area))
-        .enumerate()
-        .for_each(|(group, (values, normalised))| {
-            let count = values.len() as f64;
-            let mean = sum(values, normalised, |value, _| value) / count;
-            let along = sum(values, normalised, |value, own| value * own) / count;
-            let inverse = tape.inverse_deviation[group];
-            for (value, own) in values.iter_mut().zip(normalised) {
-                *value = inverse * (*value - mean as f32 - own * along as f32);
-            }
-        });
+    parallel::each_chunk(&mut d_result.values, GROUP * area, &|group, values| {
+        let normalised = &tape.normalised.values[group * GROUP * area..][..values.len()];
+        let count = values.len() as f64;
+        let mean = sum(values, normalised, |value, _| value) / count;
+        let along = sum(values, normalised, |value, own| value * own) / count;
+        let inverse = tape.inverse_deviation[group];
+        for (value, own) in values.iter_mut().zip(normalised) {
+            *value = inverse * (*value - mean as f32 - own * along as f32);
+        }
+    });
     d_result
 }
 

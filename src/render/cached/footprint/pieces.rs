@@ -2,11 +2,11 @@
 
 use super::FootprintSettings;
 use crate::material::TextureTap;
+use crate::math::parallel;
 use crate::render::Surface;
 use crate::render::surface::SurfacePoint;
 use crate::scene::Camera;
 use glam::{Mat2, Vec2, Vec3};
-use rayon::prelude::*;
 
 /// Samples whose normals have at least this cosine are one piece of surface.
 const ONE_PIECE: f32 = 0.97;
@@ -67,13 +67,10 @@ fn look(surface: &Surface, camera: &Camera, place: Vec2) -> (Seen, Vec3) {
 
 /// What lies at the corners of the pixels, row after row of `width + 1`. An edge that cuts off a corner passes by all
 /// places of a pixel's first samples; a ray at each corner, shared by four pixels, finds it.
-pub(super) fn corners_of_pixels(surface: &Surface, camera: &Camera) -> Vec<Seen> {
-    let across = camera.width + 1;
-    (0..across * (camera.height + 1))
-        .into_par_iter()
-        .with_min_len(across)
-        .map(|corner| look(surface, camera, Vec2::new((corner % across) as f32, (corner / across) as f32)).0)
-        .collect()
+pub(super) fn corners_of_pixels(surface: &Surface, camera: &Camera) -> Vec<Vec<Seen>> {
+    parallel::map(camera.height + 1, |row| {
+        (0..=camera.width).map(|column| look(surface, camera, Vec2::new(column as f32, row as f32)).0).collect()
+    })
 }
 
 /// Texture coordinate of the front of a surface that the middle of a pixel shows.
