@@ -200,11 +200,14 @@ impl Descent<'_> {
         trace: &mut Trace,
     ) -> Option<Place> {
         self.most_diffuse = 1.0;
-        if scale.factor != [1.0; 3] {
-            self.light = scale.of_light(&self.light, &self.scene.told_by_background());
-        }
         let texels: Vec<Material<f32>> = place.texels.par_iter().map(|texel| scale.under(texel)).collect();
-        let sight = self.sight(&texels, Slopes::OfReflectances)?;
+        let sight = match scale.factor == [1.0; 3] && texels == place.texels {
+            true => place.sight,
+            false => {
+                self.light = scale.of_light(&self.light, &self.scene.told_by_background());
+                self.sight(&texels, Slopes::OfReflectances)?
+            }
+        };
         let mut begun = Place { learned: place.learned, ..self.place(&texels, sight, (shown, freedom)) };
         begun.beliefs.know_dielectrics();
         self.down(begun, &FIRST_STEPS, trace)
@@ -240,7 +243,7 @@ impl Descent<'_> {
     pub(super) fn down(&mut self, from: Place, steps: &[Step], trace: &mut Trace) -> Option<Place> {
         let Place { mut texels, mut sight, mut learned, beliefs, mut is_exact } = from;
         for (number, step) in steps.iter().enumerate() {
-            let moves_widths = step.slopes == Slopes::OfWidths;
+            let moves_widths = self.lit == Lit::Yes && step.slopes == Slopes::OfWidths;
             if moves_widths && !is_exact {
                 sight = self.sight(&texels, step.slopes)?;
             }

@@ -14,6 +14,7 @@ use super::freedom::Freedom;
 use super::objective::Learned;
 use super::sight::{Sight, Slopes};
 use crate::material::Material;
+use std::sync::Arc;
 
 impl Descent<'_> {
     /// Where to go on from: `found`, which began at `start`, or with the dielectric where that is better. What it chose is
@@ -32,7 +33,7 @@ impl Descent<'_> {
             (0..one.len()).map(|texel| if is_plain[texel] { other[texel] } else { one[texel] }).collect()
         };
         let texels = choose(&found.texels, &plain.texels);
-        let sight = self.sight(&texels, Slopes::OfReflectances)?;
+        let sight = self.sight_of_both([&found, &plain], &texels, &is_plain);
         let begun = self.place(&choose(start, &plain_start), sight, (shown, freedom));
         // Where squares meet neighbours differ at once; a step makes that good before it is judged.
         let begun = Place { texels, learned: found.learned.clone(), ..begun };
@@ -76,6 +77,18 @@ impl Descent<'_> {
         }
         let sight = sight.moved(&mut self.system, &difference(&before, &made));
         Some((made, sight))
+    }
+
+    /// What pixels see of `texels`, some of which are those of the one place and some of the other: of each pixel by the
+    /// light that arrives and the lobe that was integrated where most of it lies. No integral is needed; where squares meet,
+    /// and in what surface sends surface, it is not exact until widths move.
+    fn sight_of_both(&mut self, places: [&Place; 2], texels: &[Material<f32>], is_second: &[bool]) -> Sight {
+        let [first, second] =
+            places.map(|place| place.sight.moved(&mut self.system, &difference(&place.texels, texels)));
+        let own = |pixel: usize| if is_second[self.pixels.texel(pixel) as usize] { &second } else { &first };
+        let pixels = 0..self.pixels.count();
+        let pieces = pixels.clone().flat_map(|pixel| &own(pixel).pieces[self.pixels.pieces(pixel)]).copied().collect();
+        Sight { pieces: Arc::new(pieces), radiance: pixels.map(|pixel| own(pixel).radiance[pixel]).collect() }
     }
 
     /// The texels of squares that go on from the dielectric: all but those of which views agree that their pixels are better
