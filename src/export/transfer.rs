@@ -53,13 +53,12 @@ pub fn transfer(result: &RunResult, onto: Mesh, size: usize) -> Result<Transferr
         return Err(Error::new(ErrorKind::InvalidScene, "no texture coordinate of the mesh lies in [0, 1]")
             .remedy("move its charts into the unit square: tiles beyond it are not written"));
     }
-    let tap = |place: &Option<(Vec3, Vec3)>| {
-        let (position, normal) = (*place)?;
+    let tap = |index: usize| {
+        let (position, normal) = places.pixels()[index]?;
         let uv = nearest_along(&bvh, &result.mesh, position, normal, reach)?;
         Some(TextureTap::at(uv, 0, result.maps.diffuse.width(), result.maps.diffuse.height()))
     };
-    let row = |_, places: &[Option<(Vec3, Vec3)>]| places.iter().map(tap).collect::<Vec<_>>();
-    let taps: Vec<Option<TextureTap>> = parallel::map_chunks(places.pixels(), size, row).concat();
+    let taps = parallel::map_small(places.pixels().len(), tap);
     let met = taps.iter().filter(|tap| tap.is_some()).count();
     let coverage = met as f64 / wanted as f64;
     let message = format!("{:.1} % of the texels of the other mesh met the fitted surface", 100.0 * coverage);

@@ -52,21 +52,16 @@ impl Fitter {
             let tracer = self.tracer(stage, &work.parameters, &sampler, target);
             let rays = CameraRays::fresh(&self.surface, &target.camera, self.settings.pixel_filter, 4);
             let key = PassKey::halves(self.settings.seed ^ 0xe7a1, 0, target.view as u32);
-            let width = target.camera.width;
-            let errors = parallel::map(target.camera.height, |row| {
-                let mut arena = PathArena::default();
-                let error_of = |pixel: usize| {
-                    let (photo, state) = target.at(&self.scene, pixel);
-                    if stop.load(Ordering::Relaxed) || !state.is_surface() || state.is_clipped() {
-                        return None;
-                    }
-                    let estimate = estimate_pixel(&tracer, &rays, pixel, key, &work.parameters, &mut arena);
-                    let error = (0..3)
-                        .map(|c| f64::from((estimate.first[c] - photo[c]) * (estimate.second[c] - photo[c])))
-                        .sum::<f64>();
-                    (estimate.escaped == 0.0 && error.is_finite()).then_some(error / 3.0)
-                };
-                (row * width..(row + 1) * width).filter_map(error_of).collect::<Vec<f64>>()
+            let errors = parallel::map_with(target.pixel_count(), PathArena::default, |arena, pixel| {
+                let (photo, state) = target.at(&self.scene, pixel);
+                if stop.load(Ordering::Relaxed) || !state.is_surface() || state.is_clipped() {
+                    return None;
+                }
+                let estimate = estimate_pixel(&tracer, &rays, pixel, key, &work.parameters, arena);
+                let error = (0..3)
+                    .map(|c| f64::from((estimate.first[c] - photo[c]) * (estimate.second[c] - photo[c])))
+                    .sum::<f64>();
+                (estimate.escaped == 0.0 && error.is_finite()).then_some(error / 3.0)
             });
             let (sum_before, count_before) = (sum, count);
             for error in errors.into_iter().flatten() {

@@ -39,8 +39,8 @@ pub fn reprojected(scene: &Scene, surface: &Surface, camera: &Camera, views: &[u
             (!surface.bvh().is_hidden_from(point.position, point.geometric_normal, eye)).then_some(colour)
         })
     };
-    let row = |row: usize| (0..camera.width).map(|column| pixel(row, column)).collect::<Vec<_>>();
-    let pixels: Vec<Option<Vec3>> = parallel::map(camera.height, row).concat();
+    let (width, count) = (camera.width, camera.width * camera.height);
+    let pixels = parallel::map_small(count, |index| pixel(index / width, index % width));
     let image = |pixels: Vec<Vec3>| Image::from_pixels(camera.width, camera.height, pixels);
     Reprojected {
         known: Image::from_pixels(camera.width, camera.height, pixels.iter().map(Option::is_some).collect()),

@@ -85,20 +85,19 @@ impl ProjectedPhotos {
             Some(&normal) => self.colour(mesh.positions[vertex], normal),
             None => [0.0; 4],
         };
-        let part = |chunk: usize, points: &[Vec3]| (1024 * chunk..).take(points.len()).map(colour).collect::<Vec<_>>();
-        parallel::map_chunks(&mesh.positions, 1024, part).concat()
+        parallel::map_small(mesh.positions.len(), colour)
     }
 
     /// The colours of the texels of an atlas as a diffuse map of about this width, and which texels some photo sees.
     pub fn of_texels(&self, surface: &Surface, map_size: usize) -> (MaterialMaps, Image<bool>) {
         let side = map_size.clamp(TEXEL_SIDES.0, TEXEL_SIDES.1);
         let grid = VisibilityGrid::new(surface, side);
-        let colours = parallel::map_chunks(&grid.points, 1024, |_, points| {
-            points.iter().map(|point| self.colour(point.position, point.shading_normal)).collect::<Vec<_>>()
+        let colours = parallel::map_small(grid.points.len(), |index| {
+            self.colour(grid.points[index].position, grid.points[index].shading_normal)
         });
         let mut diffuse = Image::filled(side, side, Vec3::ZERO);
         let mut seen = Image::filled(side, side, false);
-        for (point, [red, green, blue, weight]) in grid.points.iter().zip(colours.into_iter().flatten()) {
+        for (point, [red, green, blue, weight]) in grid.points.iter().zip(colours) {
             let place = (point.texel as usize / side, point.texel as usize % side);
             diffuse[place] = Vec3::new(red, green, blue);
             seen[place] = weight > 0.0;

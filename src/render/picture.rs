@@ -54,7 +54,7 @@ pub fn render(
 }
 
 /// A picture whose pixels are means over independent groups of samples; 0 groups count as one. `of_group` has what
-/// `scratch` makes for each thread, the row-major index of the pixel and the number of the group, and returns the group's
+/// `scratch` makes for some pixels in turn, the row-major index of the pixel and the number of the group, and returns the group's
 /// mean radiance and the share of its camera rays that met nothing. A pixel that is not finite becomes black and is
 /// counted. Pixels that are begun after `stop` is set are black.
 pub(super) fn picture_of_groups<Scratch>(
@@ -81,12 +81,7 @@ pub(super) fn picture_of_groups<Scratch>(
         let coverage = 1.0 - escaped / groups as f32;
         if mean.is_finite() { (mean, variance, coverage, true) } else { (Vec3::ZERO, Vec3::ZERO, coverage, false) }
     };
-    let count = camera.width * camera.height;
-    let of_chunk = |chunk: usize| -> Vec<(Vec3, Vec3, f32, bool)> {
-        let mut scratch = scratch();
-        (64 * chunk..count.min(64 * (chunk + 1))).map(|pixel| of_pixel(&mut scratch, pixel)).collect()
-    };
-    let pixels = parallel::map(count.div_ceil(64), of_chunk).concat();
+    let pixels = parallel::map_with(camera.width * camera.height, scratch, of_pixel);
     let (width, height) = (camera.width, camera.height);
     let image = |pixel: fn(&(Vec3, Vec3, f32, bool)) -> Vec3| {
         Image::from_pixels(width, height, pixels.iter().map(pixel).collect())
@@ -126,7 +121,7 @@ pub fn layers(surface: &Surface, camera: &Camera, parameters: &Parameters<f32>, 
     }
     let samples = samples.max(1);
     let rays = CameraRays::fresh(surface, camera, PixelFilter::Box, samples);
-    let pixels = parallel::map(camera.width * camera.height, |pixel| {
+    let pixels = parallel::map_small(camera.width * camera.height, |pixel| {
         let mut sum = Pixel::default();
         for sample in 0..samples {
             let mut stream = SampleStream::new(StreamKey::new(0, 0, 0, pixel as u32), sample as u32);

@@ -6,13 +6,10 @@
 
 use super::descent::Step;
 use super::neighbours::Parabola;
-use super::pixel_system::{Lanes, PixelSystem, Rows};
+use super::pixel_system::{CHUNK, Lanes, PixelSystem, Rows};
 use super::sight::Slopes;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Texels that one sum of a dot product goes over: sums are the same whatever the number of threads.
-const CHUNK: usize = 1 << 14;
 
 /// Sums of a dot product, lane by lane.
 #[derive(Clone, Copy, Default)]

@@ -35,11 +35,8 @@ impl SolverScene {
         let Some(mean) = estimate.mean_of_solved() else { return };
         let planes = self.transport.basis.planes(&estimate.light);
         let at_points = self.point_light(&estimate.texels, &planes);
-        let of_row = |row: usize, texels: &[Material<f32>]| -> Vec<Division> {
-            let first = row * self.settings.map_size;
-            (first..first + texels.len()).map(|own| self.division(own, &at_points, &estimate.log_gains)).collect()
-        };
-        let divisions = parallel::map_chunks(&estimate.texels, self.settings.map_size, of_row).concat();
+        let division = |texel: usize| self.division(texel, &at_points, &estimate.log_gains);
+        let divisions = parallel::map_small(estimate.texels.len(), division);
         // The factor by least squares over solved texels as well, so that what is hardly lit counts little.
         let (mut product, mut power) = ([0.0f64; 3], [0.0f64; 3]);
         for ((texel, known), division) in estimate.texels.iter().zip(&estimate.variances).zip(&divisions) {

@@ -9,15 +9,13 @@
 use super::estimate::PLAIN_SPECULAR;
 use super::freedom::Freedom;
 use super::light_scale::{OF_DIELECTRICS, is_dielectric};
-use super::pixel_system::Lanes;
+use super::pixel_system::{CHUNK, Lanes};
 use crate::material::Material;
 use crate::math::parallel;
 use rayon::prelude::*;
 
 /// Scale of the differences of neighbours' F0, by their logarithms, and of the logarithms of their widths.
 const OF_LOBES: f32 = 0.1;
-/// Texels that one partial sum goes over: sums are the same whatever the number of threads.
-const CHUNK: usize = 1 << 14;
 /// Lanes that differ together: diffuse reflectance, F0, logarithm of the width.
 const GROUPS: [std::ops::Range<usize>; 3] = [0..3, 3..6, 6..7];
 

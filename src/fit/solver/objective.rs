@@ -5,7 +5,7 @@
 
 use super::photo_gains::{GainSums, gains};
 use super::pixel_noise::{PixelNoise, Residual};
-use super::pixel_system::PixelRow;
+use super::pixel_system::{CHUNK, PixelRow};
 use super::pixels::Pixels;
 use super::sight::Sight;
 use crate::math::parallel;
@@ -15,8 +15,6 @@ use serde::{Deserialize, Serialize};
 /// Reflectances follow gains and gains reflectances, so that each pass leaves a share of what is wrong with the gains: the
 /// larger, the fewer photos share a texel. Going further by this factor is successive over-relaxation of their logarithms.
 const OVER_RELAXATION: f32 = 1.5;
-/// Pixels that one partial sum goes over.
-const CHUNK: usize = 1 << 14;
 
 /// The objective, term by term, in nats.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -16,8 +16,9 @@ const PARTS: usize = 64;
 /// Rows of the maps above and below its own texels that a part holds as well.
 const MARGIN: usize = 4;
 
-/// Texels that are added up together.
-const CHUNK: usize = 1 << 14;
+/// Texels or pixels that are added up together, here and where sums go over all of them: sums are the same whatever the
+/// number of threads.
+pub(super) const CHUNK: usize = 1 << 14;
 
 /// The seven numbers of a texel in the order of [`Material::to_array`](crate::material::Material::to_array), and a gap:
 /// they fill one wide register.

@@ -74,13 +74,13 @@ impl SolverScene {
             let whole: Vec<usize> = (0..picture.len()).filter(|&pixel| footprints.escaped[pixel] == 0.0).collect();
             let chosen: Vec<usize> =
                 whole.iter().step_by(whole.len().div_ceil(PIXELS_OF_VIEW).max(1)).copied().collect();
-            let of_pixels = parallel::map_items(&chosen, |&pixel| {
+            let of_pixels = parallel::map_with(chosen.len(), PathArena::default, |arena, place| {
                 if stop.load(Ordering::Relaxed) {
                     return [0.0; 4];
                 }
-                let mut arena = PathArena::default();
+                let pixel = chosen[place];
                 let [first, second] =
-                    [0, 1].map(|pass| tracer.pixel(camera, view as u32, pixel, SAMPLES, pass, &mut arena).0.as_dvec3());
+                    [0, 1].map(|pass| tracer.pixel(camera, view as u32, pixel, SAMPLES, pass, arena).0.as_dvec3());
                 let own = glam::Vec3::from_array(picture[pixel]).as_dvec3();
                 let mean = 0.5 * (first + second);
                 [(own - first).dot(own - second), first.dot(second), (own - mean).element_sum(), mean.element_sum()]

@@ -154,8 +154,7 @@ fn compared(
         let place = Vec2::new(column as f32 + 0.5, row as f32 + 0.5);
         surface.closest(&camera.ray_through(place)).map_or(NO_SURFACE, |hit| hit.t)
     };
-    let row = |row: usize| (0..width).map(|column| distance(row, column)).collect::<Vec<_>>();
-    let centres: Vec<f32> = parallel::map(height, row).concat();
+    let centres = parallel::map_small(width * height, |pixel| distance(pixel / width, pixel % width));
     Compared {
         view: target.view,
         photo_pixels: own.camera.width as f64 / width as f64,

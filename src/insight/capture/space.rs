@@ -52,8 +52,7 @@ pub fn missing_part(comparison: &Comparison, points: &[Point], unlike: &[Image<b
         low + (index + 0.5) * cell_length
     };
     let is_missing = |cell: usize| is_unlike_from_everywhere(comparison, unlike, place(cell), cell_length);
-    let row = |row: usize| (nx * row..nx * (row + 1)).map(is_missing).collect::<Vec<_>>();
-    let is_missing: Vec<bool> = parallel::map(ny * nz, row).concat();
+    let is_missing = parallel::map_small(nx * ny * nz, is_missing);
     // Of clusters of one size the first.
     let cells = clusters(&is_missing, [nx, ny, nz]).into_iter().rev().max_by_key(Vec::len)?;
     if cells.len() < FEWEST_CELLS {

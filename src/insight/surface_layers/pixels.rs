@@ -87,11 +87,7 @@ pub(super) fn pixels_of_view(
         }
         says
     };
-    let row = |row: usize| {
-        let mut arena = PathArena::default();
-        (row * camera.width..(row + 1) * camera.width).map(|pixel| says_of(&mut arena, pixel)).collect::<Vec<_>>()
-    };
-    parallel::map(camera.height, row).concat()
+    parallel::map_with(camera.width * camera.height, PathArena::default, says_of)
 }
 
 /// Where the middle of a pixel meets the front of the surface, and the level of maps of `map_size` it reads.

@@ -145,11 +145,8 @@ impl CachedTransport {
         })
     }
 
-    fn of_points<T: Clone + Send>(&self, of: impl Fn(usize, &VisibilityPoint) -> T + Sync) -> Vec<T> {
-        let of_chunk = |chunk: usize, points: &[VisibilityPoint]| -> Vec<T> {
-            points.iter().zip(64 * chunk..).map(|(point, index)| of(index, point)).collect()
-        };
-        parallel::map_chunks(&self.grid.points, 64, of_chunk).concat()
+    fn of_points<T: Send>(&self, of: impl Fn(usize, &VisibilityPoint) -> T + Sync) -> Vec<T> {
+        parallel::map_small(self.grid.points.len(), |index| of(index, &self.grid.points[index]))
     }
 
     /// What arrives at a shading point as [`PointLight::arriving`], but that direct light, of which the grid has these
@@ -367,16 +364,13 @@ impl CachedTransport {
         light: &LightPlanes,
         at: &PointLight,
     ) -> Vec<[f32; 3]> {
-        let shaded = parallel::map_chunks(&footprints.points, 256, |_, points| -> Vec<[f32; 3]> {
-            let mut seen = SeenRows::default();
-            let shade = |point: &ShadingPoint| {
-                let material = Self::material_of(footprints, point, texels);
-                self.shade(light, at, footprints, point, &material, &mut seen)
-            };
-            points.iter().map(shade).collect()
+        let shaded = parallel::map_with(footprints.points.len(), SeenRows::default, |seen, index| {
+            let point = &footprints.points[index];
+            let material = Self::material_of(footprints, point, texels);
+            self.shade(light, at, footprints, point, &material, seen)
         });
         let mut picture = vec![[0.0f32; 3]; footprints.width * footprints.height];
-        for (point, radiance) in footprints.points.iter().zip(shaded.into_iter().flatten()) {
+        for (point, radiance) in footprints.points.iter().zip(shaded) {
             for channel in 0..3 {
                 picture[point.pixel as usize][channel] += point.share * radiance[channel];
             }

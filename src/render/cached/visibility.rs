@@ -66,7 +66,8 @@ impl Visibility {
                 if stop.load(Ordering::Relaxed) {
                     return None;
                 }
-                let rows = parallel::map_items(group, |&index| {
+                let rows = parallel::map_with(group.len(), Scratch::default, |scratch, place| {
+                    let index = group[place];
                     // Dropped as a whole above.
                     if stop.load(Ordering::Relaxed) {
                         return (vec![0; stride], 0);
@@ -74,7 +75,7 @@ impl Visibility {
                     let parents = parents(grid, index, step, &done);
                     let rows: Vec<&[u8]> =
                         parents.iter().map(|&parent| &shares[parent * stride..(parent + 1) * stride]).collect();
-                    cells.shares(surface, grid, index, &rows, &mut Scratch::default())
+                    cells.shares(surface, grid, index, &rows, scratch)
                 });
                 for (&index, (row, traced)) in group.iter().zip(rows) {
                     shares[index * stride..(index + 1) * stride].copy_from_slice(&row);

@@ -75,13 +75,9 @@ impl LobePlan {
         let mut is_alone = Vec::new();
         for doubling in 0..=MOST_DOUBLINGS {
             let factor = if doubling == MOST_DOUBLINGS { f32::INFINITY } else { (1 << doubling) as f32 };
-            let is_spoken_for = |(point, &width): (&ShadingPoint, &f32)| {
-                is_spoken_for(footprints, transport, eye, point, width, factor)
-            };
-            let of_chunk = |chunk: usize, points: &[ShadingPoint]| -> Vec<bool> {
-                points.iter().zip(&widths[chunk * 1024..]).map(|own| !is_spoken_for(own)).collect()
-            };
-            is_alone = parallel::map_chunks(points, 1024, of_chunk).concat();
+            is_alone = parallel::map_small(points.len(), |index| {
+                !is_spoken_for(footprints, transport, eye, &points[index], widths[index], factor)
+            });
             if is_alone.iter().filter(|&&is_alone| is_alone).count() <= MOST_ALONE {
                 break;
             }
@@ -151,20 +147,17 @@ impl LobePlan {
             places.iter().flat_map(|own| of_place(&mut seen, own)).collect()
         };
         let sums = parallel::map_chunks(&self.places, 16, of_places).concat();
-        let own = |seen: &mut SeenRows, &index: &u32| {
-            let point = ShadingPoint { normal_variance: 0.0, ..footprints.points[index as usize] };
-            transport.lobe_at(&point, (light, at), seen, self.widths[index as usize], false)
-        };
-        let of_alone = parallel::map_chunks(&self.alone, 64, |_, alone| -> Vec<LobeSums> {
-            let mut seen = SeenRows::default();
-            alone.iter().map(|index| own(&mut seen, index)).collect()
+        let of_alone = parallel::map_with(self.alone.len(), SeenRows::default, |seen, place| {
+            let index = self.alone[place] as usize;
+            let point = ShadingPoint { normal_variance: 0.0, ..footprints.points[index] };
+            transport.lobe_at(&point, (light, at), seen, self.widths[index], false)
         });
         let between = |index: usize| match self.is_alone[index] {
             true => LobeSums::default(),
             false => self.between(footprints.lit_of(&footprints.points[index]), self.widths[index], &sums),
         };
         let mut made: Vec<LobeSums> = (0..self.widths.len()).into_par_iter().with_min_len(1024).map(between).collect();
-        self.alone.iter().zip(of_alone.into_iter().flatten()).for_each(|(&index, own)| made[index as usize] = own);
+        self.alone.iter().zip(of_alone).for_each(|(&index, own)| made[index as usize] = own);
         made
     }
 

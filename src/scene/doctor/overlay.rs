@@ -47,8 +47,7 @@ pub fn overlay_of(mesh: &Mesh, bvh: &Bvh, view: &View) -> Image<[u8; 3]> {
         let (point, normal, _) = surface_at(mesh, &hit)?;
         Some(Sight { depth: hit.t, point, normal })
     };
-    let row = |row: usize| (0..width).map(|column| sight_of(row, column)).collect::<Vec<_>>();
-    let sights: Vec<Option<Sight>> = parallel::map(height, row).concat();
+    let sights = parallel::map_small(width * height, |pixel| sight_of(pixel / width, pixel % width));
     let sight = |row: usize, column: usize| sights[row * width + column];
     let mut picture = backdrop(view);
     for row in 0..height {

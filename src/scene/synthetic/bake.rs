@@ -75,8 +75,7 @@ pub fn bake(
             roughness: sum.roughness / count,
         })
     };
-    let row = |row: usize| (0..width).map(|column| texel(row, column)).collect::<Vec<_>>();
-    let texels: Vec<Option<Reflectance>> = parallel::map(height, row).concat();
+    let texels = parallel::map_small(width * height, |index| texel(index / width, index % width));
     let covered = Image::from_pixels(width, height, texels.iter().map(Option::is_some).collect());
     let nearest = nearest_covered(&covered);
     let fallback = Reflectance { roughness: 1.0, ..Reflectance::default() };
