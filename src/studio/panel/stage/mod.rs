@@ -300,7 +300,10 @@ fn decorate(ui: &mut Ui, model: &Model, frame: &StageFrame, rect: Rect, traced: 
         (_, true) if shown == Layer::Photos && model.fit.status.is_live() => {
             "The mean of the photos · materials are on their way"
         }
-        (_, true) if lit || shown == Layer::Photos => "No materials yet. Press Start.",
+        (_, true) if lit || shown == Layer::Photos => match model.can_resume() {
+            true => "No materials yet. Press Resume.",
+            false => "No materials yet. Press Start.",
+        },
         // Also while a fit runs.
         _ if lit && !traced.is_empty() => traced,
         (true, _) if matches!(model.fit.status, FitStatus::Running | FitStatus::Pausing) => {
