@@ -51,7 +51,7 @@
 //! # fn main() -> patina::Result<()> {
 //! # let beside = tempfile::tempdir().unwrap();
 //! # let (capture, output) = (&beside.path().join("capture"), &beside.path().join("run"));
-//! # patina::write_demo_folder(&patina::DemoSettings { views: 6, held_out: 1, width: 32, height: 24, map_size: 64, seed: 1 }, capture)?;
+//! # patina::write_demo_folder(&patina::DemoSettings { views: 6, held_out: 1, width: 32, height: 24, map_size: 64, seed: 1, ..Default::default() }, capture)?;
 //! # let fit = patina::FitSettings { map_size: 64, solver_rounds: 2, ..Default::default() };
 //! # let (capture, output): (&Path, &Path) = (capture, output);
 //! let stop = AtomicBool::new(false);

@@ -31,8 +31,8 @@ pub fn demo(options: &DemoOptions, json: bool) -> Result<()> {
         (settings.fit, chosen) = settings.fit.changed_by_file(path)?;
     }
     settings.fit.method = options.method.unwrap_or(settings.fit.method);
-    // By the seed of the fit the scene is made anew when the run is taken up or relit.
-    let demo_settings = DemoSettings { seed: settings.fit.seed, ..DemoSettings::default() };
+    // By the seed and the lobe of the fit the scene is made anew when the run is taken up or relit.
+    let demo_settings = DemoSettings { seed: settings.fit.seed, lobe: settings.fit.lobe, ..DemoSettings::default() };
     let (prepared, fitter, settings) = with_bar(json, |tell| {
         let opened = open::open_demo(&demo_settings, &stop, tell)?;
         opened.resolve(&mut settings.fit, &chosen);

@@ -15,6 +15,7 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::files::write_bytes;
 use crate::image::Image;
 use crate::image::file::{write_exr_grey, write_exr_rgb};
+use crate::material::LobeModel;
 use crate::scene::{Background, Camera, Scene, Truth};
 use serde::Serialize;
 use std::borrow::Cow;
@@ -62,6 +63,7 @@ struct SceneFacts<'a> {
     max_depth: usize,
     background: &'static str,
     rough_pow: f32,
+    lobe: &'static str,
     g_mode: &'static str,
     lobe_strength: f32,
     vertices: usize,
@@ -107,6 +109,10 @@ pub fn write(scene: &Scene, truth: &Truth, options: &ExchangeOptions<'_>, folder
             write_exr_rgb(&folder.join(file_of_view(index)), &view.photo.to_linear())?;
         }
     }
+    let (lobe, g_mode) = match truth.lobe {
+        LobeModel::BlinnPhong => ("modct", "half_alpha"),
+        LobeModel::Ggx => ("ggx", "smith_ggx"),
+    };
     let facts = SceneFacts {
         name: &scene.name,
         max_depth: truth.max_bounces + 1,
@@ -115,7 +121,8 @@ pub fn write(scene: &Scene, truth: &Truth, options: &ExchangeOptions<'_>, folder
             Background::Black => "black",
         },
         rough_pow: 1.0,
-        g_mode: "half_alpha",
+        lobe,
+        g_mode,
         lobe_strength: options.lobe_strength,
         vertices: scene.mesh.positions.len(),
         triangles: scene.mesh.triangles.len(),

@@ -4,8 +4,6 @@ use super::fitter::Fitter;
 use super::schedule::StageKind;
 use super::settings::Method;
 use super::underway::Reached;
-use crate::material::LobeModel;
-use crate::material::lobe::nearest;
 
 impl Fitter {
     /// The stages that are not done, by their names, with the steps that are left of each.
@@ -53,9 +51,6 @@ impl Fitter {
             }
         }
         self.grow_maps(self.settings.map_size);
-        if self.lobe() != self.settings.lobe && self.settings.lobe == LobeModel::Ggx {
-            nearest::to_ggx(&mut self.state.texels);
-        }
         if !knows_deviations {
             // Those of a round on the light are none of the maps.
             self.state.variances.clear();

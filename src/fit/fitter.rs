@@ -23,7 +23,6 @@ use super::underway::WatchUnderway;
 use super::views::{ViewUse, training_views, unknown_names, uses_of};
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::light::Environment;
-use crate::material::lobe::nearest;
 use crate::material::texels::{PyramidWeights, TexelPyramid, maps_from_texels};
 use crate::material::{LobeModel, MaterialMaps};
 use crate::render::{Parameters, Surface};
@@ -258,14 +257,6 @@ impl Fitter {
         self.state.plan.get(self.state.stage)
     }
 
-    /// The lobe that reflectance and width mean now: the solver's are of Blinn-Phong until refinement takes them over.
-    pub fn lobe(&self) -> LobeModel {
-        match self.stage() {
-            Some(stage) if stage.kind.is_of_solver() => LobeModel::BlinnPhong,
-            _ => self.settings.lobe,
-        }
-    }
-
     /// What fixes the scale between reflectance and light.
     pub fn gauge(&self) -> GaugeRule {
         if self.settings.fixed_maps {
@@ -292,7 +283,7 @@ impl Fitter {
     /// Maps and light, for rendering.
     pub fn parameters(&self) -> Parameters<f32> {
         let weights = PyramidWeights::flat(self.state.map_size, self.state.map_size);
-        let texels = TexelPyramid::from_base(self.state.texels.clone(), &weights).with_model(self.lobe());
+        let texels = TexelPyramid::from_base(self.state.texels.clone(), &weights).with_model(self.settings.lobe);
         Parameters::new(texels, &self.environment())
     }
 
@@ -367,13 +358,9 @@ impl Fitter {
             return Ok(StepOutcome::Interrupted);
         }
         while self.stage().is_some_and(|stage| self.state.step_in_stage >= stage.steps) {
-            let lobe = self.lobe();
             self.state.stage += 1;
             self.state.step_in_stage = 0;
             self.work = None;
-            if (lobe, self.lobe()) == (LobeModel::BlinnPhong, LobeModel::Ggx) {
-                nearest::to_ggx(&mut self.state.texels);
-            }
         }
         let Some(&stage) = self.stage() else { return Ok(StepOutcome::Finished) };
         if stage.kind.is_of_solver() {

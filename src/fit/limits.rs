@@ -3,7 +3,6 @@
 use super::settings::{Consistency, FitSettings, Method};
 use super::solver::light_shape::LightShape;
 use crate::error::{Error, ErrorKind, Place, Result};
-use crate::material::LobeModel;
 use crate::render::path::MAX_BOUNCES;
 
 /// The solver's equations of the light are square and dense, some fifteen of them at once: with so many unknowns they take
@@ -35,14 +34,6 @@ impl FitSettings {
             self.validate_with_fixed_maps()?;
         }
         if self.method == Method::Solver {
-            if self.lobe == LobeModel::Ggx && self.solver_polish == 0 {
-                return Err(Error::new(
-                    ErrorKind::InvalidSetting,
-                    "the solver leaves GGX to refinement steps after it",
-                )
-                .at(Place::Setting("solver-polish".into()))
-                .remedy("give some steps, or fit by Adam: --method adam"));
-            }
             self.validate_sizes_of_solver()?;
         }
         if self.samples == 0 || self.samples > 4096 {
@@ -108,13 +99,6 @@ impl FitSettings {
                 "leave out --method, and settings that are Adam's alone, such as --samples",
             );
         }
-        if self.lobe == LobeModel::Ggx {
-            return wrong(
-                "lobe",
-                "maps of GGX lobes cannot be kept: the solver's model has lobes of Blinn-Phong",
-                "keep the maps of a run with --lobe blinn-phong, and leave out --lobe here",
-            );
-        }
         if self.solver_polish > 0 {
             return wrong(
                 "solver-polish",
@@ -176,7 +160,6 @@ mod tests {
         for (name, wrong) in [
             ("fixed-light", FitSettings { fixed_light: true, ..base() }),
             ("method", FitSettings { method: Method::Adam, ..base() }),
-            ("lobe", FitSettings { lobe: LobeModel::Ggx, solver_polish: 5, ..base() }),
             ("solver-polish", FitSettings { solver_polish: 5, ..base() }),
         ] {
             let error = wrong.validate().unwrap_err();
@@ -199,11 +182,5 @@ mod tests {
         assert!(of(1024, 256, true, solver).unwrap_err().contains("GiB"));
         assert!(of(64, 4096, false, solver).unwrap_err().contains("--solver-grid"));
         assert!(of(1024, 4096, false, Method::Adam).is_ok());
-        let ggx = |method, solver_polish| {
-            FitSettings { lobe: LobeModel::Ggx, method, solver_polish, ..Default::default() }.validate()
-        };
-        assert!(ggx(Method::Adam, 0).is_ok() && ggx(solver, 40).is_ok());
-        let error = ggx(solver, 0).unwrap_err();
-        assert!(error.place() == &Place::Setting("solver-polish".into()), "{error}");
     }
 }

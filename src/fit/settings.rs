@@ -121,7 +121,7 @@ pub struct FitSettings {
     #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
     pub pixel_filter: PixelFilter,
     /// The microfacets of the specular lobe. GGX is what other renderers shade with, so that maps lose nothing on the way to
-    /// them; after the solver, whose lobes are of Blinn-Phong, refinement steps turn them into it.
+    /// them.
     #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
     pub lobe: LobeModel,
     /// Multi-view gradient consistency, in the last of Adam's steps.
@@ -187,7 +187,7 @@ pub struct FitSettings {
     pub solver_choices: Choosing,
     /// Refinement steps of Adam after the solver, on all maps and the environment along gradients of the path tracer.
     ///
-    /// They make GGX lobes of the solver's. Where its model holds, they make maps worse.
+    /// Where its model holds, they make maps worse.
     #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().solver_polish))]
     pub solver_polish: usize,
     /// Whole-pixel refinement after the solver: descents over all texels from all pixels of full size, edges included, with a

@@ -18,7 +18,7 @@ use super::targets::targets;
 use super::underway::{Underway, WatchUnderway};
 use crate::error::Result;
 use crate::image::{GreyImage, Image, RgbImage};
-use crate::material::{LobeModel, MaterialMaps};
+use crate::material::MaterialMaps;
 use glam::Vec3;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -116,11 +116,10 @@ impl Fitter {
             })
     }
 
-    /// How far the solver's model is from the path tracer's with what was found. `None` under Adam, with GGX, before the first step
-    /// of a session, or when `stop` was raised.
+    /// How far the solver's model is from the path tracer's with what was found. `None` under Adam, before the first step of a
+    /// session, or when `stop` was raised.
     pub fn transport_error(&self, stop: &AtomicBool) -> Option<TransportError> {
-        // The solver's model has no other lobe.
-        let solver = self.solver.as_ref().filter(|_| self.lobe() == LobeModel::BlinnPhong)?;
+        let solver = self.solver.as_ref()?;
         let (mut texels, mut size) = (self.state.texels.clone(), self.state.map_size);
         // Maps that were polished may be finer than those the solver has footprints for.
         while size > solver.settings.map_size {

@@ -3,7 +3,6 @@
 use super::method::Method;
 use super::settings::FitSettings;
 use crate::error::Finding;
-use crate::material::LobeModel;
 use crate::scene::doctor::{self, Report, exposure};
 use crate::scene::{Scene, View};
 
@@ -25,8 +24,6 @@ pub struct Suited {
     pub sharpest_map_size: Option<usize>,
 }
 
-/// Steps of polishing that let lobes of another kind than the solver's settle.
-const POLISH_OF_LOBES: usize = 60;
 /// From so many pixels of all photos on the solver leaves maps of full size to the descent: with tiles of them fits of real
 /// places take three times as long.
 const MANY_PIXELS: usize = 4_000_000;
@@ -79,11 +76,6 @@ impl Suited {
         let is_free = |name: &str| !chosen.iter().any(|own| own == name);
         if settings.method == Method::Automatic {
             settings.method = if Method::means_adam(chosen) { Method::Adam } else { self.method };
-        }
-        // The solver's lobes are of Blinn-Phong: others are made of them by refinement.
-        if is_free("solver-polish") && settings.lobe == LobeModel::Ggx {
-            settings.solver_polish =
-                POLISH_OF_LOBES.saturating_mul(settings.steps_all) / FitSettings::default().steps_all;
         }
         if self.is_large && is_free("solver-levels") {
             settings.solver_levels = FitSettings::default().solver_levels + 1;
@@ -174,7 +166,8 @@ mod tests {
 
     /// Two views of 8 x 6 pixels.
     fn linear_scene() -> Scene {
-        let small = DemoSettings { views: 2, held_out: 0, width: 8, height: 6, map_size: 64, seed: 1 };
+        let small =
+            DemoSettings { views: 2, held_out: 0, width: 8, height: 6, map_size: 64, seed: 1, ..Default::default() };
         let mut scene = build(&small).unwrap().scene;
         for view in 0..2 {
             scene.set_photo(view, Image::filled(8, 6, glam::Vec3::ONE)).unwrap();
@@ -203,10 +196,6 @@ mod tests {
         let own = FitSettings { method: Method::Adam, ..FitSettings::default() };
         let kept = applied(&Suited::to(&scene, &Report::default()), own.clone(), &["bounces"]);
         assert_eq!(kept, own, "a method that was chosen stays, and Adam is not given what is the solver's");
-        let ggx = FitSettings { lobe: LobeModel::Ggx, ..FitSettings::default() };
-        let resolved = applied(&Suited::to(&scene, &Report::default()), ggx, &["lobe"]);
-        assert_eq!((resolved.method, resolved.solver_polish), (Method::Solver, POLISH_OF_LOBES));
-        resolved.validate().unwrap();
         scene.views[1].photo = Photo::Srgb8(Image::filled(8, 6, [200; 3]));
         assert_eq!(suits(&scene, &[]), Method::Solver);
         assert_eq!(suits(&scene, &["samples"]), Method::Adam);

@@ -21,7 +21,7 @@ impl Fitter {
         let covered = covered_texels(self.surface.mesh(), stage.map_size, stage.map_size);
         // Levels of the chain beyond the footprints of shrunken photographs serve bounced rays.
         let weights = PyramidWeights::new(&covered, 6);
-        let texels = TexelPyramid::from_base(self.state.texels.clone(), &weights).with_model(self.lobe());
+        let texels = TexelPyramid::from_base(self.state.texels.clone(), &weights).with_model(self.settings.lobe);
         let parameters = Parameters::new(texels, &self.environment());
         let gradient = ParameterGradient::zeros(&weights, self.state.light.len());
         let targets = targets(&self.scene, &self.training, stage.photo_level);

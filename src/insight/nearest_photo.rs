@@ -80,7 +80,8 @@ mod tests {
 
     #[test]
     fn a_photo_seen_from_its_own_place_is_itself_and_a_hidden_point_is_none() {
-        let settings = DemoSettings { views: 3, held_out: 0, width: 24, height: 18, map_size: 64, seed: 1 };
+        let settings =
+            DemoSettings { views: 3, held_out: 0, width: 24, height: 18, map_size: 64, seed: 1, ..Default::default() };
         let mut scene = build(&settings).unwrap().scene;
         for view in 0..3 {
             let photo = Image::from_fn(24, 18, |row, column| Vec3::new(row as f32, column as f32, view as f32 + 1.0));

@@ -192,7 +192,8 @@ mod tests {
     use crate::scene::demo::{DemoSettings, build};
 
     fn small() -> Arc<Scene> {
-        let settings = DemoSettings { views: 8, held_out: 0, width: 96, height: 72, map_size: 128, seed: 1 };
+        let settings =
+            DemoSettings { views: 8, held_out: 0, width: 96, height: 72, map_size: 128, seed: 1, ..Default::default() };
         let mut scene = build(&settings).unwrap().scene;
         let surface = Surface::new(scene.mesh.clone()).unwrap();
         let truth = scene.truth.clone().unwrap();

@@ -13,7 +13,7 @@ use crate::scene::{Background, Scene};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::pictures::parameters;
+use super::pictures::parameters_with;
 
 /// Paths a pixel in the photographs of the demo.
 const PHOTO_SAMPLES: usize = 16;
@@ -77,7 +77,7 @@ pub fn photograph(
         return Err(Error::new(ErrorKind::Internal, "a scene without ground truth cannot be photographed"));
     };
     let surface = Surface::new(scene.mesh.clone())?;
-    let lit = parameters(&truth.maps, &truth.environment);
+    let lit = parameters_with(&truth.maps, &truth.environment, truth.lobe);
     let settings = PictureSettings {
         samples,
         max_bounces: truth.max_bounces,
@@ -97,7 +97,7 @@ pub fn photograph(
         progress((view + 1) as f32 / (count + 4) as f32);
     }
     if let Some(relight) = scene.truth.as_mut().and_then(|truth| truth.relight.as_mut()) {
-        let lit = parameters(&truth.maps, &relight.environment);
+        let lit = parameters_with(&truth.maps, &relight.environment, truth.lobe);
         let settings = PictureSettings { samples: 2 * samples, ..settings };
         relight.pictures.clear();
         let judged: Vec<usize> = (0..count).filter(|&view| scene.views[view].held_out).take(4).collect();

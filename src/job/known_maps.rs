@@ -12,33 +12,40 @@ use crate::export::{RunFolder, RunResult};
 use crate::fit::KnownMaps;
 use crate::fit::known_maps::none_given;
 use crate::insight::report::data::StageTime;
-use crate::material::LobeModel;
 use crate::render::Surface;
 use crate::scene::{Mesh, Scene};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Settles what a run with maps to keep decides, before a scene is read for it: that maps are kept, and their size, which
-/// then counts as `chosen`. Does nothing where no run is named.
+/// Settles what a run with maps to keep decides, before a scene is read for it: that maps are kept, their size and their lobe,
+/// which then count as `chosen`. Does nothing where no run is named.
 ///
 /// # Errors
-/// As of [`read`]; `InvalidSetting` for another size that was chosen.
+/// As of [`read`]; `InvalidSetting` for another size or lobe that was chosen.
 pub fn settle(settings: &mut RunSettings, chosen: &mut Vec<String>) -> Result<()> {
     if settings.known_maps.as_os_str().is_empty() {
         return Ok(());
     }
-    let size = read(&settings.known_maps)?.maps.diffuse.width();
-    let is_chosen = chosen.iter().any(|name| name == "map-size");
-    if is_chosen && settings.fit.map_size != size {
+    let run = read(&settings.known_maps)?;
+    let size = run.maps.diffuse.width();
+    let is_chosen = |own: &str| chosen.iter().any(|name| name == own);
+    if is_chosen("lobe") && settings.fit.lobe != run.lobe {
+        let message = format!("the maps that are kept are of {} lobes", run.lobe.label());
+        return Err(Error::new(ErrorKind::InvalidSetting, message)
+            .at(Place::Setting("lobe".into()))
+            .remedy("leave out --lobe: the maps keep theirs"));
+    }
+    if is_chosen("map-size") && settings.fit.map_size != size {
         let message = format!("the maps that are kept are {size} x {size}, not {0} x {0}", settings.fit.map_size);
         return Err(Error::new(ErrorKind::InvalidSetting, message)
             .at(Place::Setting("map-size".into()))
             .remedy("leave out --map-size: the maps keep their size"));
     }
     settings.fit.map_size = size;
+    settings.fit.lobe = run.lobe;
     settings.fit.fixed_maps = true;
-    chosen.push("map-size".into());
+    chosen.extend(["map-size".into(), "lobe".into()]);
     Ok(())
 }
 
@@ -51,10 +58,6 @@ pub fn read(run: &Path) -> Result<RunResult> {
     let unsupported = |message: String, remedy: &str| {
         Err(Error::new(ErrorKind::Unsupported, message).at(Place::File(run.into())).remedy(remedy))
     };
-    if result.lobe == LobeModel::Ggx {
-        let message = "the maps of this run are of GGX lobes, which the solver's model does not have".into();
-        return unsupported(message, "fit that run anew with --lobe blinn-phong, and keep those maps");
-    }
     let (width, height) = (result.maps.diffuse.width(), result.maps.diffuse.height());
     if width != height || !width.is_power_of_two() || width < 16 {
         let message = format!("its maps are {width} x {height}; kept are squares of a power of two from 16 on");

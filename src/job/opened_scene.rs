@@ -92,7 +92,8 @@ pub fn open_demo(settings: &DemoSettings, stop: &AtomicBool, tell: Tell) -> Resu
 /// As of [`open_scene`] and [`open_demo`].
 pub fn open_scene_of(settings: &RunSettings, stop: &AtomicBool, tell: Tell) -> Result<OpenedScene> {
     if settings.scene.as_os_str().is_empty() {
-        open_demo(&DemoSettings { seed: settings.fit.seed, ..DemoSettings::default() }, stop, tell)
+        let FitSettings { seed, lobe, .. } = settings.fit;
+        open_demo(&DemoSettings { seed, lobe, ..DemoSettings::default() }, stop, tell)
     } else {
         open_scene(&settings.scene, &settings.read, stop, tell)
     }

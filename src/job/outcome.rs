@@ -55,7 +55,7 @@ pub fn write(
         None => (fill_outside(&fitter.maps(), &times_seen, &covered), times_seen),
     };
     let environment = fitter.environment();
-    let (mesh, lobe) = (surface.mesh().clone(), fitter.lobe());
+    let (mesh, lobe) = (surface.mesh().clone(), fitter.settings().lobe);
     let result = RunResult { maps, environment, mesh, times_seen, lobe };
     timed(&mut timings, "write maps", || folder.write_result(&result))?;
     let told = SolverTold::of(fitter);

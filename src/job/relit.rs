@@ -9,9 +9,8 @@ use super::{Slot, Wake, background};
 use crate::error::{Error, ErrorKind, Result, text_of_panic};
 use crate::image::RgbImage;
 use crate::light::Environment;
-use crate::material::Material;
-use crate::material::MaterialMaps;
 use crate::material::texels::texels_from_maps;
+use crate::material::{LobeModel, Material, MaterialMaps};
 use crate::render::Surface;
 use crate::render::cached::{CachedSettings, CachedTransport, FootprintSettings};
 use crate::render::relight::RelitView;
@@ -28,18 +27,15 @@ const LIGHT_SIZE: (usize, usize) = (64, 32);
 const GRID: usize = 192;
 
 /// Traces the cache by which a window relights a surface; `None` when `stop` was raised.
-pub fn transport_of(
-    surface: &Surface,
-    max_bounces: usize,
-    lobe_strength: f32,
-    stop: &AtomicBool,
-) -> Option<CachedTransport> {
-    CachedTransport::build(surface, settings_of(max_bounces, lobe_strength), LIGHT_SIZE, stop)
+pub fn transport_of(surface: &Surface, settings: CachedSettings, stop: &AtomicBool) -> Option<CachedTransport> {
+    CachedTransport::build(surface, settings, LIGHT_SIZE, stop)
 }
 
-/// How fine that cache is.
-pub fn settings_of(max_bounces: usize, lobe_strength: f32) -> CachedSettings {
-    CachedSettings { grid: GRID, max_bounces, lobe_strength, ..CachedSettings::default() }
+/// How fine that cache is, for surface with a lobe of these microfacets or without one.
+pub fn settings_of(max_bounces: usize, lobe: Option<LobeModel>) -> CachedSettings {
+    let lobe_strength = if lobe.is_some() { 1.0 } else { 0.0 };
+    let lobe = lobe.unwrap_or_default();
+    CachedSettings { grid: GRID, max_bounces, lobe_strength, lobe, ..CachedSettings::default() }
 }
 
 /// A light of a request.
@@ -282,11 +278,13 @@ mod tests {
 
     #[test]
     fn a_light_that_turns_costs_no_ray_and_a_view_ends_smooth() {
-        let settings = DemoSettings { views: 1, held_out: 0, width: 96, height: 72, map_size: 64, seed: 1 };
+        let settings =
+            DemoSettings { views: 1, held_out: 0, width: 96, height: 72, map_size: 64, seed: 1, ..Default::default() };
         let scene = build(&settings).unwrap().scene;
         let surface = Arc::new(Surface::new(scene.mesh.clone()).unwrap());
         let truth = scene.truth.as_ref().unwrap();
-        let cached = CachedSettings { grid: 32, bounce_rays: 8, max_bounces: 2, ..settings_of(2, 1.0) };
+        let cached =
+            CachedSettings { grid: 32, bounce_rays: 8, max_bounces: 2, ..settings_of(2, Some(LobeModel::BlinnPhong)) };
         let transport = CachedTransport::build(&surface, cached, (16, 8), &AtomicBool::new(false)).unwrap();
         let environment = Arc::new(truth.environment.clone());
         let light =

@@ -15,6 +15,7 @@ use crate::error::{Error, ErrorKind, Place, Result};
 use crate::image::Image;
 use crate::light::Environment;
 use crate::light::sky::{SkySettings, sun_and_sky};
+use crate::material::LobeModel;
 use glam::{DVec2, Quat, Vec3};
 
 /// What the demo is made with.
@@ -32,11 +33,21 @@ pub struct DemoSettings {
     pub map_size: usize,
     /// Where the cameras stand.
     pub seed: u64,
+    /// The microfacets of what is photographed.
+    pub lobe: LobeModel,
 }
 
 impl Default for DemoSettings {
     fn default() -> Self {
-        DemoSettings { views: 48, held_out: 6, width: 160, height: 120, map_size: 512, seed: 1 }
+        DemoSettings {
+            views: 48,
+            held_out: 6,
+            width: 160,
+            height: 120,
+            map_size: 512,
+            seed: 1,
+            lobe: LobeModel::BlinnPhong,
+        }
     }
 }
 
@@ -205,6 +216,7 @@ pub fn build(settings: &DemoSettings) -> Result<DemoScene> {
             environment: morning(),
             relight: Some(TruthRelight { environment: evening(), pictures: Vec::new() }),
             max_bounces: MAX_BOUNCES,
+            lobe: settings.lobe,
         }),
         findings: Vec::new(),
     };

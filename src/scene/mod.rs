@@ -24,7 +24,7 @@ pub use settings::ReadSettings;
 use crate::error::{Error, ErrorKind, Finding, Place, Result};
 use crate::image::{Image, RgbImage};
 use crate::light::Environment;
-use crate::material::MaterialMaps;
+use crate::material::{LobeModel, MaterialMaps};
 use glam::{DMat3, DVec3};
 use std::path::PathBuf;
 
@@ -135,6 +135,8 @@ pub struct Truth {
     pub relight: Option<TruthRelight>,
     /// Number of surface hits on the longest path of the pictures: 1 is direct light only.
     pub max_bounces: usize,
+    /// The microfacets of what was photographed.
+    pub lobe: LobeModel,
 }
 
 /// Pictures under a light that was not in the photographs.

@@ -146,7 +146,8 @@ fn a_saved_picture_is_what_the_screen_shows_or_radiance() {
 }
 
 fn demo() -> Scene {
-    let small = DemoSettings { views: 3, held_out: 2, width: 32, height: 24, map_size: 64, seed: 1 };
+    let small =
+        DemoSettings { views: 3, held_out: 2, width: 32, height: 24, map_size: 64, seed: 1, ..Default::default() };
     patina::job::demo::scene(&small, &mut Vec::new(), &GO, &|_| {}).unwrap()
 }
 

@@ -17,7 +17,8 @@ use patina::scene::demo::{DemoSettings, build};
 use patina::scene::{Mesh, PixelState, Scene};
 
 fn demo() -> (Scene, Surface) {
-    let settings = DemoSettings { views: 6, held_out: 2, width: 80, height: 60, map_size: 128, seed: 1 };
+    let settings =
+        DemoSettings { views: 6, held_out: 2, width: 80, height: 60, map_size: 128, seed: 1, ..Default::default() };
     let scene = build(&settings).unwrap().scene;
     let surface = Surface::new(scene.mesh.clone()).unwrap();
     (scene, surface)

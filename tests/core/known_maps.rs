@@ -192,7 +192,7 @@ fn the_new_run_has_the_maps_and_the_atlas_of_the_old_one_and_another_light() {
     settle(&mut settings, &mut chosen).unwrap();
     assert_eq!(
         (settings.fit.map_size, settings.fit.fixed_maps, chosen.as_slice()),
-        (SIZE, true, &["map-size".into()][..])
+        (SIZE, true, &["map-size".into(), "lobe".into()][..])
     );
     let (prepared, fitter, settings) = started(&scene().0, settings).unwrap();
     let run = RunFolder::create(&new).unwrap();
@@ -253,8 +253,11 @@ fn maps_of_another_surface_or_lobe_are_refused_with_place_and_remedy() {
     let error = patina::job::open::begin(prepared, settings, &GO, &|_, _| {}).err().unwrap();
     assert!(error.kind() == ErrorKind::InvalidScene && error.message().contains("atlas"), "{error}");
     let mut ggx = run_folder(&folder.path().join("ggx"), LobeModel::Ggx);
-    let error = settle(&mut ggx, &mut Vec::new()).unwrap_err();
-    assert!(error.kind() == ErrorKind::Unsupported && error.remedy_text().contains("--lobe"), "{error}");
+    settle(&mut ggx, &mut Vec::new()).unwrap();
+    assert_eq!(ggx.fit.lobe, LobeModel::Ggx);
+    let mut other = RunSettings { fit: FitSettings { lobe: LobeModel::BlinnPhong, ..ggx.fit.clone() }, ..ggx };
+    let error = settle(&mut other, &mut vec!["lobe".into()]).unwrap_err();
+    assert!(error.place() == &Place::Setting("lobe".into()) && error.remedy_text().contains("--lobe"), "{error}");
     let none = RunSettings { fit: FitSettings { fixed_maps: true, ..free() }, ..Default::default() };
     let error = started(&own, none).err().unwrap();
     assert!(error.place() == &Place::Setting("fixed-maps".into()) && error.remedy_text().contains("--maps"), "{error}");

@@ -7,8 +7,6 @@ use patina::export::RunFolder;
 use patina::fit::settings::{BackgroundEvidence, Start};
 use patina::fit::{FitSettings, Fitter, Method, StepOutcome, checkpoint};
 use patina::job::{Event, JobOptions, RunSettings};
-use patina::material::LobeModel;
-use patina::material::lobe::nearest::ggx_of_blinn_phong;
 use patina::render::Surface;
 use patina::scene::{Background, Scene};
 use std::sync::atomic::AtomicBool;
@@ -97,26 +95,6 @@ fn a_fit_that_is_taken_up_goes_on_bit_for_bit_whatever_the_threads() {
             assert!(without_seconds(resumed.state()) == whole, "after step {step}");
         }
     }
-}
-
-#[test]
-fn refinement_takes_the_lobes_over_as_ggx() {
-    let settings = FitSettings { solver_polish: 3, lobe: LobeModel::Ggx, ..base() };
-    let widths = |fitter: &Fitter| fitter.state().texels.iter().map(|texel| texel.log_width).collect::<Vec<f32>>();
-    let mut fitter = new_fitter(&settings);
-    (0..STAGES.len()).for_each(|_| drop(fitter.step(&GO).unwrap()));
-    assert_eq!((fitter.lobe(), fitter.parameters().texels.model), (LobeModel::BlinnPhong, LobeModel::BlinnPhong));
-    let before = widths(&fitter);
-    fitter.step(&GO).unwrap();
-    assert_eq!((fitter.lobe(), fitter.parameters().texels.model), (LobeModel::Ggx, LobeModel::Ggx));
-    for (before, after) in before.iter().zip(widths(&fitter)) {
-        let nearest = ggx_of_blinn_phong(f64::from(*before).exp()).width.ln() as f32;
-        // A step of Adam is at most about its rate.
-        assert!((after - nearest).abs() < 2.0 * settings.rate_roughness, "{before} {nearest} {after}");
-    }
-    let mut whole = new_fitter(&settings);
-    run(&mut whole).unwrap();
-    assert_taken_up_alike(&settings, &[6, 7, 8], &whole);
 }
 
 #[test]

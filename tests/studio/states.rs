@@ -93,7 +93,8 @@ fn an_error_goes_by_escape_and_when_the_same_task_works() {
 }
 
 fn tiny_scene() -> patina::scene::Scene {
-    let tiny = DemoSettings { views: 2, held_out: 0, width: 16, height: 12, map_size: 64, seed: 1 };
+    let tiny =
+        DemoSettings { views: 2, held_out: 0, width: 16, height: 12, map_size: 64, seed: 1, ..Default::default() };
     patina::job::demo::scene(&tiny, &mut Vec::new(), &AtomicBool::new(false), &|_| {}).unwrap()
 }
 

@@ -37,7 +37,8 @@ fn lasting_folder() -> TempDir {
 
 /// Writes a small exchange folder with photos and a truth.
 pub fn write_small_scene(folder: &Path) {
-    let small = DemoSettings { views: 6, held_out: 2, width: 48, height: 36, map_size: 64, seed: 1 };
+    let small =
+        DemoSettings { views: 6, held_out: 2, width: 48, height: 36, map_size: 64, seed: 1, ..Default::default() };
     let stop = AtomicBool::new(false);
     let scene = patina::job::demo::scene(&small, &mut Vec::new(), &stop, &|_| {}).unwrap();
     let truth = scene.truth.clone().unwrap();

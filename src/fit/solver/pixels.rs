@@ -274,8 +274,17 @@ mod tests {
 
     #[test]
     fn edges_count_where_all_that_they_show_is_known() {
-        let mut scene =
-            build(&DemoSettings { views: 1, held_out: 0, width: 16, height: 12, map_size: 64, seed: 1 }).unwrap().scene;
+        let mut scene = build(&DemoSettings {
+            views: 1,
+            held_out: 0,
+            width: 16,
+            height: 12,
+            map_size: 64,
+            seed: 1,
+            ..Default::default()
+        })
+        .unwrap()
+        .scene;
         let width = scene.views[0].camera.width;
         let footprints = view(width);
         let kinds = |scene: &Scene| -> Vec<u32> {

@@ -101,6 +101,7 @@ impl SolverScene {
             max_bounces: settings.max_bounces,
             fine_shadows: true,
             lobe_strength: 1.0,
+            lobe: settings.lobe,
             seed: settings.seed,
         };
         let build = || CachedTransport::build(surface, cached, settings.light_size, stop);

@@ -1,6 +1,7 @@
 //! What can be chosen in the solver.
 
 use crate::fit::settings::{BackgroundEvidence, Choosing, FitSettings};
+use crate::material::LobeModel;
 
 /// Settings of the solver.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,6 +46,8 @@ pub struct SolverSettings {
     /// Let views that took no part judge what lobes, light between surfaces and the light's resolution bought, when maps
     /// are made.
     pub check_choices: bool,
+    /// The microfacets of the lobe.
+    pub lobe: LobeModel,
     /// Seed of all random choices.
     pub seed: u64,
 }
@@ -65,6 +68,7 @@ impl SolverSettings {
             fixed_light: settings.fixed_light,
             fixed_maps: settings.fixed_maps,
             check_choices: settings.solver_choices != Choosing::Off,
+            lobe: settings.lobe,
             seed: settings.seed,
             ..any
         }
@@ -92,6 +96,7 @@ impl Default for SolverSettings {
             fixed_light: false,
             fixed_maps: false,
             check_choices: false,
+            lobe: LobeModel::BlinnPhong,
             seed: 1,
         }
     }

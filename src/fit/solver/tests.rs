@@ -19,7 +19,15 @@ fn photographed() -> &'static (Scene, Surface) {
 }
 
 fn photograph() -> (Scene, Surface) {
-    let settings = demo::DemoSettings { views: 12, held_out: 0, width: 80, height: 60, map_size: SIZE, seed: 1 };
+    let settings = demo::DemoSettings {
+        views: 12,
+        held_out: 0,
+        width: 80,
+        height: 60,
+        map_size: SIZE,
+        seed: 1,
+        ..Default::default()
+    };
     let mut scene = demo::build(&settings).unwrap().scene;
     let surface = Surface::new(scene.mesh.clone()).unwrap();
     let truth = scene.truth.clone().unwrap();

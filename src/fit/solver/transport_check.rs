@@ -49,7 +49,7 @@ impl SolverScene {
         let size = self.settings.map_size;
         let texels = texels_from_maps(&estimate.maps(size));
         let parameters = Parameters::new(
-            TexelPyramid::from_base(texels, &PyramidWeights::flat(size, size)),
+            TexelPyramid::from_base(texels, &PyramidWeights::flat(size, size)).with_model(self.settings.lobe),
             &estimate.environment(self.settings.light_size),
         );
         let settings = PictureSettings {

@@ -45,6 +45,7 @@ pub fn built_in(settings: &AuditSettings) -> Result<BuiltIn> {
         height: PICTURE_SIZE.1,
         map_size: MAP_SIZE,
         seed: settings.seed,
+        ..Default::default()
     };
     let mut scene = demo::build(&demo_settings)?.scene;
     let surface = Surface::new(scene.mesh.clone())?;

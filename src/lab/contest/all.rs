@@ -116,6 +116,7 @@ fn one(
     let judge =
         Judge::new(crate::scene::read(&entrant.judged_by, &options.read)?, options.samples, options.most_views)?;
     let base = base_settings(judge.scene(), options.settings.as_deref(), SEED)?;
+    let judge = judge.of_lobe(base.lobe);
     let place = options.output.join(&entrant.name);
     let start = write_start(judge.scene(), &base, &place)?;
     let place = place.join(method.name());

@@ -11,9 +11,9 @@ use crate::insight::intervals::{IntervalCoverage, interval_coverage};
 use crate::insight::scores::AlignmentSums;
 use crate::insight::truth::{ErrorPair, environment_errors, map_errors};
 use crate::job::against_truth::resampled;
-use crate::job::pictures::parameters;
+use crate::job::pictures::parameters_with;
 use crate::light::Environment;
-use crate::material::MaterialMaps;
+use crate::material::{LobeModel, MaterialMaps};
 use crate::math::evenly_spread;
 use crate::render::picture::{PictureSettings, render};
 use crate::render::{Parameters, Surface};
@@ -62,6 +62,7 @@ pub struct Judge {
     held_out: Vec<usize>,
     relit: Vec<usize>,
     samples: usize,
+    lobe: LobeModel,
 }
 
 impl Judge {
@@ -83,13 +84,26 @@ impl Judge {
         let pictures = truth.relight.as_ref().map_or(0, |relight| relight.pictures.len());
         let relit = some((0..pictures).collect());
         let surface = Surface::new(scene.mesh.clone())?;
-        Ok(Judge { scene, surface, training, held_out, relit, samples: samples.max(GROUPS) })
+        Ok(Judge {
+            scene,
+            surface,
+            training,
+            held_out,
+            relit,
+            samples: samples.max(GROUPS),
+            lobe: LobeModel::default(),
+        })
     }
 
     /// A judge of maps on another mesh with the same charts, such as the truth's with a part missing. Pictures are traced
     /// with it, and compared with those of the true one.
     pub fn with_surface(self, surface: Surface) -> Self {
         Judge { surface, ..self }
+    }
+
+    /// A judge of maps of these microfacets.
+    pub fn of_lobe(self, lobe: LobeModel) -> Self {
+        Judge { lobe, ..self }
     }
 
     /// The scene.
@@ -116,7 +130,7 @@ impl Judge {
     ) -> Result<Vec<f64>> {
         let Some(truth) = &self.scene.truth else { return Ok(Vec::new()) };
         let mut broken = non_finite;
-        let own = parameters(maps, light);
+        let own = parameters_with(maps, light, self.lobe);
         let photo = |view: &usize| {
             let photo = &self.scene.views[*view].photo;
             (*view, Image::from_fn(photo.width(), photo.height(), |row, column| photo.radiance(row, column)))
@@ -130,11 +144,13 @@ impl Judge {
         let mut relit = [f64::NAN; 2];
         if let Some(relight) = &truth.relight {
             let pictures = || self.relit.iter().map(|&index| relight.pictures[index].clone());
-            relit[0] = self.sums(&parameters(maps, &relight.environment), pictures(), &mut broken, stop).rmse();
+            relit[0] = self
+                .sums(&parameters_with(maps, &relight.environment, self.lobe), pictures(), &mut broken, stop)
+                .rmse();
             let scale = Vec3::from_array(errors.diffuse.scale.map(|factor| factor as f32));
             let scaled = |diffuse: &Vec3| (*diffuse * scale).clamp(Vec3::ZERO, Vec3::ONE);
             let aligned = MaterialMaps { diffuse: maps.diffuse.map(scaled), ..maps.clone() };
-            let lit = parameters(&aligned, &relight.environment);
+            let lit = parameters_with(&aligned, &relight.environment, self.lobe);
             relit[1] = self.sums(&lit, pictures(), &mut broken, stop).rmse();
         }
         if stop.load(Ordering::Relaxed) {
@@ -157,7 +173,7 @@ impl Judge {
             let photo = &self.scene.views[view].photo;
             (view, Image::from_fn(photo.width(), photo.height(), |row, column| photo.radiance(row, column)))
         });
-        self.sums(&parameters(maps, light), photos, &mut 0, stop).rmse()
+        self.sums(&parameters_with(maps, light, self.lobe), photos, &mut 0, stop).rmse()
     }
 
     /// Relative L2 error of the light after its factor, both lights blurred by so many degrees at the size of `light`: what is

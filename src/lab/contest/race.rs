@@ -103,7 +103,7 @@ pub fn run(options: &ContestOptions, stop: &AtomicBool, tell: &dyn Fn(&str)) -> 
         tell(&format!("reading {}", path.display()));
         let scene = crate::scene::read(&path, &options.read)?;
         let base = base_settings(&scene, options.settings.as_deref(), 1)?;
-        let judge = Judge::new(scene, options.samples, options.most_views)?;
+        let judge = Judge::new(scene, options.samples, options.most_views)?.of_lobe(base.lobe);
         let name = contest.unused_name(&judge.scene().name);
         let folder = options.output.join(&name);
         let start = write_start(judge.scene(), &base, &folder)?;
@@ -184,7 +184,7 @@ fn mitsuba_trouble(options: &ContestOptions) -> Option<String> {
 /// The demo as an exchange folder.
 fn built_in(options: &ContestOptions, stop: &AtomicBool) -> Result<PathBuf> {
     let settings = if options.quick {
-        DemoSettings { views: 6, held_out: 2, width: 32, height: 24, map_size: 64, seed: 1 }
+        DemoSettings { views: 6, held_out: 2, width: 32, height: 24, map_size: 64, seed: 1, ..Default::default() }
     } else {
         DemoSettings::default()
     };

@@ -4,6 +4,7 @@
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::image::Image;
+use crate::material::LobeModel;
 use crate::scene::demo::{evening, morning, views_of};
 use crate::scene::synthetic::bake::{Reflectance, SurfacePoint, bake};
 use crate::scene::synthetic::layout::{PartChart, lay_out};
@@ -168,6 +169,7 @@ pub fn build(kind: StudyKind, mut mesh: Mesh, settings: &StudySettings) -> Resul
             environment: morning(),
             relight: Some(TruthRelight { environment: evening(), pictures: Vec::new() }),
             max_bounces: MAX_BOUNCES,
+            lobe: LobeModel::BlinnPhong,
         }),
         findings: Vec::new(),
     })

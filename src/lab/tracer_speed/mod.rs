@@ -24,7 +24,7 @@ use crate::image::Image;
 use crate::job::pictures::parameters;
 use crate::lab::study_table::StudyTable;
 use crate::light::Environment;
-use crate::material::MaterialMaps;
+use crate::material::{LobeModel, MaterialMaps};
 use crate::render::Surface;
 use crate::scene::{Scene, Truth};
 use glam::{Vec2, Vec3};
@@ -206,6 +206,7 @@ fn grey_sphere(triangles: usize, views: usize) -> Scene {
         environment,
         relight: None,
         max_bounces: FitSettings::default().bounces,
+        lobe: LobeModel::BlinnPhong,
     });
     scene
 }

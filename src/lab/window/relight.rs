@@ -7,11 +7,11 @@
 use crate::error::{Error, ErrorKind, Result};
 use crate::export::RunFolder;
 use crate::image::RgbImage;
-use crate::job::pictures::{light_of, matched, parameters};
+use crate::job::pictures::{light_of, matched, parameters_with};
 use crate::job::relit;
 use crate::light::Environment;
-use crate::material::MaterialMaps;
 use crate::material::texels::texels_from_maps;
+use crate::material::{LobeModel, MaterialMaps};
 use crate::render::Surface;
 use crate::render::cached::{CachedTransport, FootprintSettings};
 use crate::render::picture::{PictureSettings, render};
@@ -74,6 +74,7 @@ struct Subject {
     surface: Surface,
     maps: MaterialMaps,
     environment: Environment,
+    lobe: LobeModel,
     eye: OrbitEye,
 }
 
@@ -84,7 +85,8 @@ impl Subject {
         let truth = truth.ok_or_else(|| Error::new(ErrorKind::Internal, "the demo has no truth"))?;
         let surface = Surface::new(scene.mesh.clone())?;
         let eye = OrbitEye::around(subject(surface.mesh(), Some(&scene)));
-        Ok(Subject { name: "demo".into(), surface, maps: truth.maps, environment: truth.environment, eye })
+        let (maps, environment, lobe) = (truth.maps, truth.environment, LobeModel::BlinnPhong);
+        Ok(Subject { name: "demo".into(), surface, maps, environment, lobe, eye })
     }
 
     /// A run folder, or an exchange folder with its truth.
@@ -95,7 +97,8 @@ impl Subject {
             let result = folder.read_result()?;
             let surface = Surface::new(result.mesh)?;
             let eye = OrbitEye::around(subject(surface.mesh(), None));
-            return Ok(Subject { name, surface, maps: result.maps, environment: result.environment, eye });
+            let (maps, environment, lobe) = (result.maps, result.environment, result.lobe);
+            return Ok(Subject { name, surface, maps, environment, lobe, eye });
         }
         let scene = crate::scene::read(path, &ReadSettings { hold_out_every: 0, ..ReadSettings::default() })?;
         let Some(truth) = scene.truth.clone() else {
@@ -104,7 +107,8 @@ impl Subject {
         };
         let surface = Surface::new(scene.mesh.clone())?;
         let eye = OrbitEye::around(subject(surface.mesh(), Some(&scene)));
-        Ok(Subject { name, surface, maps: truth.maps, environment: truth.environment, eye })
+        let (maps, environment, lobe) = (truth.maps, truth.environment, LobeModel::BlinnPhong);
+        Ok(Subject { name, surface, maps, environment, lobe, eye })
     }
 }
 
@@ -118,7 +122,8 @@ pub fn measure(path: Option<&Path>, is_quick: bool, tell: &dyn Fn(&str)) -> Resu
     let stopped = || Error::new(ErrorKind::Stopped, "the bench was stopped");
     tell(&format!("caching light transport: {}", own.name));
     let began = Instant::now();
-    let transport = relit::transport_of(&own.surface, BOUNCES, 1.0, &stop).ok_or_else(stopped)?;
+    let transport =
+        relit::transport_of(&own.surface, relit::settings_of(BOUNCES, Some(own.lobe)), &stop).ok_or_else(stopped)?;
     let cache_seconds = began.elapsed().as_secs_f64();
     let map_size = own.maps.diffuse.width();
     let texels = texels_from_maps(&own.maps);
@@ -181,7 +186,7 @@ fn errors(
     is_quick: bool,
     view: &RelitView,
 ) -> (f64, f64) {
-    let lit = parameters(&own.maps, environment);
+    let lit = parameters_with(&own.maps, environment, own.lobe);
     let references = [7, 8].map(|seed| {
         let settings = PictureSettings {
             samples: if is_quick { 8 } else { 32 },

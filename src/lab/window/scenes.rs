@@ -103,7 +103,8 @@ pub fn settings_of(case: ScaleCase) -> RunSettings {
 /// # Errors
 /// `Unwritable` for the folder.
 pub fn write_small_scene(folder: &Path) -> Result<()> {
-    let settings = DemoSettings { views: 10, held_out: 2, width: 120, height: 90, map_size: 256, seed: 1 };
+    let settings =
+        DemoSettings { views: 10, held_out: 2, width: 120, height: 90, map_size: 256, seed: 1, ..Default::default() };
     let scene = demo::scene(&settings, &mut Vec::new(), &AtomicBool::new(false), &|_| {})?;
     let truth = scene.truth.clone();
     let truth = truth.ok_or_else(|| Error::new(ErrorKind::Internal, "the demo has no truth"))?;

@@ -4,8 +4,6 @@
 //! is written is the one whose lobe has the least squared difference over all pairs of directions, each pair weighed by
 //! both cosines as in a picture of a surface under even light.
 
-use super::Material;
-use crate::math::parallel;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::LazyLock;
 
@@ -45,15 +43,6 @@ pub fn ggx_of_blinn_phong(width: f64) -> GgxLobe {
 /// Roughness of glTF, Disney and Blender, `sqrt(alpha)`, for the roughness `r = a^2` of a map.
 pub fn perceptual_roughness(roughness: f32) -> f32 {
     ggx_of_blinn_phong(f64::from(roughness.max(0.0)).sqrt()).width.sqrt() as f32
-}
-
-/// Turns the widths of texels of Blinn-Phong into those of the nearest GGX lobes.
-pub fn to_ggx(texels: &mut [Material<f32>]) {
-    parallel::each_chunk(texels, 1 << 12, &|_, texels| {
-        for texel in texels {
-            texel.log_width = ggx_of_blinn_phong(f64::from(texel.log_width).exp()).width.ln() as f32;
-        }
-    });
 }
 
 /// Searches the width by golden section on the logarithm of its ratio to the Blinn-Phong width.

@@ -5,7 +5,8 @@
 
 use super::half_vector_places::{Places, place_count, places};
 use super::light_basis::LightBasis;
-use super::lobe_place::{LobePlace, LobeSums};
+use super::lobe_place::{LobePlace, LobeSums, MIDDLE_TANGENT};
+use crate::material::LobeModel;
 use crate::math::frame::Frame;
 use crate::math::vector::elementary::exp_minus_one;
 use crate::math::vector::{Vector, WIDEST, dot};
@@ -18,13 +19,26 @@ struct Lobe<V> {
     to_viewer: [V; 3],
     tangent: [V; 3],
     bitangent: [V; 3],
-    /// `a^2 / 2`.
-    exponent: V,
-    /// `k` of the shadowing term, and `1 - k`.
-    k: V,
-    rest_of_k: V,
     /// What all weights are multiplied by.
     scale: V,
+    microfacets: Microfacets<V>,
+}
+
+/// Terms of a lobe's microfacets.
+enum Microfacets<V> {
+    /// Half of `a^2`; `k` of the shadowing term, and `1 - k`.
+    BlinnPhong { exponent: V, k: V, rest_of_k: V },
+    /// `a^2`, `1 - a^2`, `n.o`, `R(n.o)`, and one over the square of [`MIDDLE_TANGENT`], or 0 where tails are wanted too.
+    Ggx { width_squared: V, rest: V, cos_out: V, root_out: V, middle: V },
+}
+
+/// Which part of a lobe is wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Without the tails of GGX, which are summed over hats.
+    Middle,
+    /// All of it.
+    Whole,
 }
 
 /// What the next places weigh, and where they read the light.
@@ -38,24 +52,40 @@ struct Next {
 
 impl<V: Vector> Lobe<V> {
     #[inline(always)]
-    fn new(place: &LobePlace, width: f32, count: usize) -> Self {
+    fn new(place: &LobePlace, width: f32, count: usize, part: Part) -> Self {
         let LobePlace { normal, to_viewer, .. } = *place;
         let cos_out = normal.dot(to_viewer);
         let fallback = Frame::around(normal);
         let tangent = (to_viewer - normal * cos_out).try_normalize().unwrap_or(fallback.tangent);
         let bitangent = normal.cross(tangent);
         let splat = |v: glam::Vec3| [V::splat(v.x), V::splat(v.y), V::splat(v.z)];
-        let k = 0.5 * width;
-        let q_out = cos_out * (1.0 - k) + k;
+        let width_squared = width * width;
+        let (divisor, microfacets) = match place.model {
+            LobeModel::BlinnPhong => {
+                let k = 0.5 * width;
+                let terms = [0.5 * width_squared, k, 1.0 - k];
+                let [exponent, k_of_all, rest_of_k] = terms.map(V::splat);
+                let q_out = cos_out * (1.0 - k) + k;
+                (q_out, Microfacets::BlinnPhong { exponent, k: k_of_all, rest_of_k })
+            }
+            LobeModel::Ggx => {
+                let root_out = (width_squared + (1.0 - width_squared) * cos_out * cos_out).sqrt();
+                let middle = match part {
+                    Part::Middle => MIDDLE_TANGENT.powi(-2),
+                    Part::Whole => 0.0,
+                };
+                let terms = [width_squared, 1.0 - width_squared, cos_out, root_out, middle];
+                let [width_squared, rest, cos_out, root_out, middle] = terms.map(V::splat);
+                (0.5, Microfacets::Ggx { width_squared, rest, cos_out, root_out, middle })
+            }
+        };
         Lobe {
             normal: splat(normal),
             to_viewer: splat(to_viewer),
             tangent: splat(tangent),
             bitangent: splat(bitangent),
-            exponent: V::splat(0.5 * width * width),
-            k: V::splat(k),
-            rest_of_k: V::splat(1.0 - k),
-            scale: V::splat(1.0 / (q_out * count as f32)),
+            scale: V::splat(1.0 / (divisor * count as f32)),
+            microfacets,
         }
     }
 
@@ -63,10 +93,23 @@ impl<V: Vector> Lobe<V> {
     #[inline(always)]
     fn find(&self, basis: &LightBasis, places: &Places, at: usize, next: &mut Next) -> bool {
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
-        // cos - 1, exact near 1.
-        let below_one = exp_minus_one(self.exponent.mul(V::load(&places.log_rest[at..])));
-        let cos = one.add(below_one);
-        let sin = zero.sub(below_one).mul(below_one.add(V::splat(2.0))).max(zero).sqrt();
+        let (sin, cos, share) = match &self.microfacets {
+            Microfacets::BlinnPhong { exponent, .. } => {
+                // cos - 1, exact near 1.
+                let below_one = exp_minus_one(exponent.mul(V::load(&places.log_rest[at..])));
+                let sin = zero.sub(below_one).mul(below_one.add(V::splat(2.0))).max(zero).sqrt();
+                (sin, one.add(below_one), one)
+            }
+            Microfacets::Ggx { width_squared, middle, .. } => {
+                // tan^2 = a^2 u / (1 - u).
+                let rest = V::load(&places.rest[at..]);
+                let tangent_squared = width_squared.mul(one.sub(rest)).div(rest);
+                let cos_squared = one.div(one.add(tangent_squared));
+                let relative = tangent_squared.mul(*middle);
+                let share = one.div(relative.mul_add(relative, one));
+                (tangent_squared.mul(cos_squared).sqrt(), cos_squared.sqrt(), share)
+            }
+        };
         let along = sin.mul(V::load(&places.cos_phi[at..]));
         let across = sin.mul(V::load(&places.sin_phi[at..]));
         let mut half = [zero; 3];
@@ -85,8 +128,17 @@ impl<V: Vector> Lobe<V> {
             return false;
         }
         let cos_in = cos_in.max(zero);
-        let q_in = cos_in.mul_add(self.rest_of_k, self.k);
-        let value = cos_in.mul(half_dot_out).mul(self.scale).div(q_in.mul(cos));
+        let value = match &self.microfacets {
+            Microfacets::BlinnPhong { k, rest_of_k, .. } => {
+                let q_in = cos_in.mul_add(*rest_of_k, *k);
+                cos_in.mul(half_dot_out).mul(self.scale).div(q_in.mul(cos))
+            }
+            Microfacets::Ggx { width_squared, rest, cos_out, root_out, .. } => {
+                let root_in = cos_in.mul(cos_in).mul_add(*rest, *width_squared).sqrt();
+                let shadowing = cos_in.mul_add(*root_out, cos_out.mul(root_in)).max(V::splat(1e-12));
+                cos_in.mul(half_dot_out).mul(self.scale).mul(share).div(shadowing.mul(cos))
+            }
+        };
         let value = above.where_positive(value, zero);
         let rest = one.sub(half_dot_out).max(zero);
         let squared = rest.mul(rest);
@@ -100,10 +152,16 @@ impl<V: Vector> Lobe<V> {
 
 /// [`lobe_sums`](super::half_vector::lobe_sums) with vectors of any kind.
 #[inline(always)]
-pub(super) fn sums_in<V: Vector>(basis: &LightBasis, place: &LobePlace, width: f32, count: usize) -> LobeSums {
+pub(super) fn sums_in<V: Vector>(
+    basis: &LightBasis,
+    place: &LobePlace,
+    width: f32,
+    count: usize,
+    part: Part,
+) -> LobeSums {
     let places = places(count);
     let count = places.log_rest.len();
-    let lobe = Lobe::<V>::new(place, width, count);
+    let lobe = Lobe::<V>::new(place, width, count, part);
     let mut next = Next::default();
     let seen = &place.seen.texels[..basis.count()];
     let (mut base, mut grazing) = (Vec4::ZERO, Vec4::ZERO);
@@ -129,7 +187,7 @@ pub(super) fn sums_in<V: Vector>(basis: &LightBasis, place: &LobePlace, width: f
 pub(super) fn row_in<V: Vector>(basis: &LightBasis, place: &LobePlace, width: f32, scales: [f32; 2], row: &mut [f32]) {
     let places = places(place_count(basis, width));
     let count = places.log_rest.len();
-    let lobe = Lobe::<V>::new(place, width, count);
+    let lobe = Lobe::<V>::new(place, width, count, Part::Middle);
     let mut next = Next::default();
     let shares = &place.shares[..row.len()];
     for at in (0..count).step_by(V::LANES) {

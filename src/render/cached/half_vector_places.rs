@@ -20,6 +20,8 @@ pub fn place_count(basis: &LightBasis, width: f32) -> usize {
 
 /// The places of a quadrature: they are the same for all lobes. A whole number of vectors.
 pub(super) struct Places {
+    /// `1 - u`.
+    pub rest: Vec<f32>,
     /// `ln(1 - u)`.
     pub log_rest: Vec<f32>,
     /// Cosine of the azimuth.
@@ -37,8 +39,10 @@ pub(super) fn places(count: usize) -> &'static Places {
         let count = 1usize << which;
         let golden = 0.618_034_f32;
         let angle = |index: usize| TAU * (index as f32 * golden).fract();
+        let rest = |index: usize| 1.0 - (index as f32 + 0.5) / count as f32;
         Places {
-            log_rest: (0..count).map(|index| (1.0 - (index as f32 + 0.5) / count as f32).ln()).collect(),
+            rest: (0..count).map(rest).collect(),
+            log_rest: (0..count).map(|index| rest(index).ln()).collect(),
             cos_phi: (0..count).map(|index| angle(index).cos()).collect(),
             sin_phi: (0..count).map(|index| angle(index).sin()).collect(),
         }

@@ -2,6 +2,7 @@
 
 use super::light_basis::LightBasis;
 use super::seen_light::SeenLight;
+use crate::material::LobeModel;
 use glam::Vec3;
 
 /// Lobes of at least this microfacet width, for a light of 32 rows, are summed over hats. The standard deviation of
@@ -26,30 +27,48 @@ pub struct LobePlace<'a> {
     pub seen: &'a SeenLight,
     /// Variance of the normal over the footprint, of both axes together, in squared radians.
     pub normal_variance: f32,
+    /// The microfacets.
+    pub model: LobeModel,
 }
 
 /// The width of a lobe of this microfacet width over normals of this variance.
 ///
 /// Slopes of the normalised Blinn-Phong distribution have a variance of `a^2 / (1 - a^2)` over both axes (with the exponent
 /// `2/a^2 - 2`, one over it along each); that of the normals is added. Widths up to 1 stay below it. After Toksvig 2005
-/// ("Mipmapping normal maps"), with the variance taken from the geometry in place of a map.
+/// ("Mipmapping normal maps"), with the variance taken from the geometry in place of a map. Slopes of GGX have no variance;
+/// over normals that lie evenly in a disc of radius `R` its peak is that of the width `sqrt(a^2 + R^2)`, and `R^2` is twice
+/// their variance.
 #[inline(always)]
-pub fn width_through(width: f32, normal_variance: f32) -> f32 {
-    let added = normal_variance * (1.0 - width * width).max(0.0);
+pub fn width_through(model: LobeModel, width: f32, normal_variance: f32) -> f32 {
+    let added = variance_added(model, width, normal_variance);
     ((width * width + added) / (1.0 + added)).sqrt()
 }
+
+#[inline(always)]
+fn variance_added(model: LobeModel, width: f32, normal_variance: f32) -> f32 {
+    let times = match model {
+        LobeModel::BlinnPhong => 1.0,
+        LobeModel::Ggx => 2.0,
+    };
+    times * normal_variance * (1.0 - width * width).max(0.0)
+}
+
+/// Half vectors of GGX at a tangent of this to the normal are summed over half vectors and over hats in equal parts, nearer
+/// ones mostly over half vectors, others over hats, where the lobe is narrow: its tails are smooth beside a hat, and places
+/// of equal probability are few in them.
+pub(super) const MIDDLE_TANGENT: f32 = 0.2;
 
 impl LobePlace<'_> {
     /// The width of the lobe as the footprint sees it, for one of this microfacet width: [`width_through`].
     #[inline(always)]
     pub fn width_seen(&self, width: f32) -> f32 {
-        width_through(width, self.normal_variance)
+        width_through(self.model, width, self.normal_variance)
     }
 
     /// Derivative of the logarithm of [`LobePlace::width_seen`] by that of the width.
     #[inline(always)]
     pub(super) fn slope_of_width_seen(&self, width: f32) -> f32 {
-        let added = self.normal_variance * (1.0 - width * width).max(0.0);
+        let added = variance_added(self.model, width, self.normal_variance);
         width * width / ((width * width + added) * (1.0 + added))
     }
 }
@@ -68,6 +87,18 @@ pub struct LobeSums {
 }
 
 impl LobeSums {
+    /// The sum of two parts of a lobe.
+    #[inline]
+    pub(super) fn and(&self, other: &LobeSums) -> LobeSums {
+        let of = |own: [f32; 3], other: [f32; 3]| [0, 1, 2].map(|c| own[c] + other[c]);
+        LobeSums {
+            base: of(self.base, other.base),
+            grazing: of(self.grazing, other.grazing),
+            d_base: of(self.d_base, other.d_base),
+            d_grazing: of(self.d_grazing, other.d_grazing),
+        }
+    }
+
     /// What a lobe of this F0 sends, in radiance per channel.
     #[inline]
     pub fn radiance(&self, specular: [f32; 3]) -> [f32; 3] {

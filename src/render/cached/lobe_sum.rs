@@ -6,32 +6,42 @@
 //!
 //! Wide lobes are summed over the hats of the light, one value of the lobe a hat: no noise, and smooth in everything.
 //! A lobe narrower than a few texels is integrated over half vectors instead, at fixed places of equal probability in a
-//! frame that turns with the viewer ([`super::half_vector`]).
+//! frame that turns with the viewer ([`super::half_vector`]). Tails of GGX, in which such places are few and hats are many, are
+//! summed over hats beside it: both have a share of each half vector ([`super::lobe_place::MIDDLE_TANGENT`]).
 //!
 //! A pixel on a curved surface sees many normals. To it the distribution of half vectors is that of the microfacets,
 //! convolved with that of the normals: a lobe that is wider by their variance ([`LobePlace::width_seen`]).
 
 use super::half_vector;
+use super::half_vector_kernel::Part;
 use super::half_vector_places::place_count;
 use super::light_basis::LightBasis;
 use super::lobe_kernel::{MOST_AT_ONCE, row_in, sums_in};
 use super::lobe_place::{LobePlace, LobeSums, wide_from};
+use crate::material::LobeModel;
 use crate::math::vector::versions;
 
 /// The sums of a lobe at several widths, which rise, without derivatives. `sums` is as long as `widths`.
 pub fn lobe_sums(basis: &LightBasis, place: &LobePlace, widths: &[f32], sums: &mut [LobeSums]) {
     let narrow = widths.partition_point(|&width| place.width_seen(width) < wide_from(basis));
-    for (sum, &width) in sums.iter_mut().zip(&widths[..narrow]) {
-        let width = place.width_seen(width);
-        *sum = half_vector::lobe_sums(basis, place, width, place_count(basis, width));
-    }
-    for (sums, widths) in sums[narrow..].chunks_mut(MOST_AT_ONCE).zip(widths[narrow..].chunks(MOST_AT_ONCE)) {
+    let over_hats = if has_tails(place) { 0 } else { narrow };
+    for (sums, widths) in sums[over_hats..].chunks_mut(MOST_AT_ONCE).zip(widths[over_hats..].chunks(MOST_AT_ONCE)) {
         let mut seen = [0.0; MOST_AT_ONCE];
         for (seen, &width) in seen.iter_mut().zip(widths) {
             *seen = place.width_seen(width);
         }
         wide_sums(basis, place, &seen[..widths.len()], sums);
     }
+    for (sum, &width) in sums.iter_mut().zip(&widths[..narrow]) {
+        let width = place.width_seen(width);
+        let middle = half_vector::lobe_sums(basis, place, width, place_count(basis, width), Part::Middle);
+        *sum = if has_tails(place) { sum.and(&middle) } else { middle };
+    }
+}
+
+/// Whether narrow lobes have tails that are summed over hats beside them.
+fn has_tails(place: &LobePlace) -> bool {
+    place.model == LobeModel::Ggx
 }
 
 /// The sums of a lobe, without derivatives.
@@ -47,22 +57,23 @@ pub fn lobe_alone(basis: &LightBasis, place: &LobePlace, width: f32) -> LobeSums
 /// apart: the places move with the width, and between hats the sum bends.
 pub fn lobe_with_derivative(basis: &LightBasis, place: &LobePlace, width: f32) -> LobeSums {
     let (width, slope_of_width) = (place.width_seen(width), place.slope_of_width_seen(width));
-    let mut sum = if width >= wide_from(basis) {
-        let mut sums = [LobeSums::default()];
-        wide_sums_with_derivative(basis, place, &[width], &mut sums);
-        sums[0]
-    } else {
+    let is_wide = width >= wide_from(basis);
+    let mut sum = LobeSums::default();
+    if is_wide || has_tails(place) {
+        wide_sums_with_derivative(basis, place, &[width], std::slice::from_mut(&mut sum));
+    }
+    if !is_wide {
         const STEP: f32 = 0.01;
         let count = place_count(basis, width);
-        let at = |width: f32| half_vector::lobe_sums(basis, place, width, count);
-        let (sum, below, above) = (at(width), at(width * (-STEP).exp()), at(width * STEP.exp()));
+        let at = |width: f32| half_vector::lobe_sums(basis, place, width, count, Part::Middle);
+        let (middle, below, above) = (at(width), at(width * (-STEP).exp()), at(width * STEP.exp()));
         let slope = |above: f32, below: f32| (above - below) / (2.0 * STEP);
-        LobeSums {
+        sum = sum.and(&LobeSums {
             d_base: std::array::from_fn(|c| slope(above.base[c], below.base[c])),
             d_grazing: std::array::from_fn(|c| slope(above.grazing[c], below.grazing[c])),
-            ..sum
-        }
-    };
+            ..middle
+        });
+    }
     for slope in sum.d_base.iter_mut().chain(&mut sum.d_grazing) {
         *slope *= slope_of_width;
     }
@@ -72,11 +83,13 @@ pub fn lobe_with_derivative(basis: &LightBasis, place: &LobePlace, width: f32) -
 /// Adds the rows of `S0 - S5` and `S5`, times `scales`, to a row over the padded texels of the light.
 pub fn add_lobe_row(basis: &LightBasis, place: &LobePlace, width: f32, scales: [f32; 2], row: &mut [f32]) {
     let width = place.width_seen(width);
-    if width < wide_from(basis) {
+    let is_wide = width >= wide_from(basis);
+    if !is_wide {
         half_vector::add_lobe_row(basis, place, width, scales, row);
-        return;
     }
-    row_here(basis, place, width, scales, row);
+    if is_wide || has_tails(place) {
+        row_here(basis, place, width, scales, row);
+    }
 }
 
 versions! {
@@ -117,7 +130,12 @@ mod tests {
     }
 
     /// The integrals by brute force over the bilinear light: the lobe of the path tracer on a fine grid.
-    fn truth(light: &LightPlanes, normal: Vec3, viewer: Vec3, width: f32) -> ([f64; 3], [f64; 3]) {
+    fn truth(
+        light: &LightPlanes,
+        (normal, viewer): (Vec3, Vec3),
+        model: LobeModel,
+        width: f32,
+    ) -> ([f64; 3], [f64; 3]) {
         let (mut base, mut grazing) = ([0.0; 3], [0.0; 3]);
         let (fine_width, fine_height) = (64 * 10, 32 * 10);
         for row in 0..fine_height {
@@ -128,7 +146,7 @@ mod tests {
                 let lobe = |specular: f32| {
                     let (diffuse, log_width) = ([0.0; 3], width.ln());
                     let material = Material { diffuse, specular: [specular; 3], log_width };
-                    f64::from(material.reflect(&geometry, 1.0)[0])
+                    f64::from(material.reflect_by(model, &geometry, 1.0)[0])
                 };
                 let (grazing_lobe, whole) = (lobe(0.0), lobe(1.0));
                 let tap = crate::math::sphere::tap_of_direction(direction, 64, 32);
@@ -145,6 +163,10 @@ mod tests {
 
     #[test]
     fn sums_are_the_integrals_of_the_lobe_at_all_widths() {
+        LobeModel::ALL.into_iter().for_each(sums_are_integrals_of);
+    }
+
+    fn sums_are_integrals_of(model: LobeModel) {
         let basis = LightBasis::new(64, 32);
         let light = light_of(&basis, 2);
         let shares = vec![255u8; basis.padded()];
@@ -158,9 +180,10 @@ mod tests {
             [(Vec3::ZERO, "highlight", 0.025), (Vec3::new(0.2, 0.1, -0.3), "beside", 0.025)]
         {
             let mirrored = (normal * (2.0 * normal.dot(sun)) - sun + offset).normalize_or(Vec3::Y);
-            let place = LobePlace { normal, to_viewer: mirrored, shares: &shares, seen: &seen, normal_variance: 0.0 };
+            let (shares, seen, to_viewer) = (&shares[..], &seen, mirrored);
+            let place = LobePlace { normal, to_viewer, shares, seen, normal_variance: 0.0, model };
             for (index, width) in [0.01f32, 0.05, 0.1, 0.17, 0.24, 0.26, 0.4, 0.7, 1.0].into_iter().enumerate() {
-                let (base, grazing) = truth(&light, normal, mirrored, width);
+                let (base, grazing) = truth(&light, (normal, mirrored), model, width);
                 if offset == Vec3::ZERO {
                     highlights.push(base);
                 }
@@ -182,6 +205,10 @@ mod tests {
     /// bright.
     #[test]
     fn a_curved_footprint_sends_what_its_normals_send_on_average() {
+        LobeModel::ALL.into_iter().for_each(curved_footprint_of);
+    }
+
+    fn curved_footprint_of(model: LobeModel) {
         let basis = LightBasis::new(64, 32);
         let light = light_of(&basis, 2);
         let shares = vec![255u8; basis.padded()];
@@ -198,14 +225,15 @@ mod tests {
                 let tilted = normal + across * place(index % SIDE) + along * place(index / SIDE);
                 let tilted = tilted.normalize_or(Vec3::Y);
                 sum += tilted;
-                let place = LobePlace { normal: tilted, to_viewer, shares: &shares, seen: &seen, normal_variance: 0.0 };
+                let (shares, seen, normal) = (&shares[..], &seen, tilted);
+                let place = LobePlace { normal, to_viewer, shares, seen, normal_variance: 0.0, model };
                 let mut sums = [LobeSums::default()];
                 lobe_sums(&basis, &place, &[width], &mut sums);
                 mean += f64::from(sums[0].base[1]) / (SIDE * SIDE) as f64;
             }
             let normal_variance = 1.0 - (sum / (SIDE * SIDE) as f32).length_squared();
             let of = |normal_variance: f32| {
-                let place = LobePlace { normal, to_viewer, shares: &shares, seen: &seen, normal_variance };
+                let place = LobePlace { normal, to_viewer, shares: &shares, seen: &seen, normal_variance, model };
                 let mut sums = [LobeSums::default()];
                 lobe_sums(&basis, &place, &[width], &mut sums);
                 f64::from(sums[0].base[1]) / mean - 1.0
@@ -230,10 +258,13 @@ mod tests {
         let (light_alone, with_surface) =
             (SeenLight::of_light(&light, &all), SeenLight::with_surface(&light, &some, |_| 1.0));
         let to_viewer = Vec3::new(-0.5, 0.6, 0.4).normalize_or(Vec3::Y);
-        let open = LobePlace { normal: Vec3::Y, to_viewer, shares: &all, seen: &light_alone, normal_variance: 0.0 };
+        let (normal, shares, seen, model) = (Vec3::Y, &all[..], &light_alone, LobeModel::BlinnPhong);
+        let open = LobePlace { normal, to_viewer, shares, seen, normal_variance: 0.0, model };
         let closed = LobePlace { shares: &some, seen: &with_surface, ..open };
-        for width in [0.03f32, 0.2, 0.3, 0.55, 1.0] {
+        let widths = [0.03f32, 0.2, 0.3, 0.55, 1.0];
+        for (model, width) in LobeModel::ALL.into_iter().flat_map(|model| widths.map(|width| (model, width))) {
             let [open, closed] = [open, closed].map(|place| {
+                let place = LobePlace { model, ..place };
                 let mut sums = [LobeSums::default()];
                 lobe_sums(&basis, &place, &[width], &mut sums);
                 sums[0]
@@ -245,6 +276,10 @@ mod tests {
 
     #[test]
     fn versions_rows_and_derivatives_agree() {
+        LobeModel::ALL.into_iter().for_each(versions_agree);
+    }
+
+    fn versions_agree(model: LobeModel) {
         let basis = LightBasis::new(64, 32);
         let light = light_of(&basis, 5);
         let mut random = SequentialRandom::new(9);
@@ -253,17 +288,20 @@ mod tests {
         let light_alone = SeenLight::of_light(&light, &shares);
         let normal = Vec3::new(0.3, 0.9, -0.1).normalize_or(Vec3::Y);
         let to_viewer = Vec3::new(-0.5, 0.6, 0.4).normalize_or(Vec3::Y);
-        let place = LobePlace { normal, to_viewer, shares: &shares, seen: &seen, normal_variance: 0.004 };
+        let place = LobePlace { normal, to_viewer, shares: &shares, seen: &seen, normal_variance: 0.004, model };
         for width in [0.03f32, 0.2, 0.3, 0.55, 1.0] {
             let sums = lobe_with_derivative(&basis, &place, width);
             let mut plain = [LobeSums::default()];
             let width_seen = place.width_seen(width);
-            if width_seen >= wide_from(&basis) {
+            let is_wide = width_seen >= wide_from(&basis);
+            if is_wide || has_tails(&place) {
                 sums_in::<Plain, true>(&basis, &place, &[width_seen], &mut plain);
                 plain[0].d_base = plain[0].d_base.map(|slope| slope * place.slope_of_width_seen(width));
-            } else {
+            }
+            if !is_wide {
                 let count = place_count(&basis, width_seen);
-                plain[0] = half_vector_kernel::sums_in::<Plain>(&basis, &place, width_seen, count);
+                let middle = half_vector_kernel::sums_in::<Plain>(&basis, &place, width_seen, count, Part::Middle);
+                plain[0] = plain[0].and(&middle);
                 // Its derivative is a difference of sums.
                 plain[0].d_base = sums.d_base;
             }

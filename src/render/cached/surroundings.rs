@@ -155,7 +155,15 @@ pub(super) mod tests {
 
     /// The demo's surface, and a coarse grid over it with what hides cells of so many hats.
     pub fn traced(side: usize) -> (Surface, VisibilityGrid, LightBasis, Visibility, Surroundings) {
-        let settings = demo::DemoSettings { views: 1, held_out: 0, width: 8, height: 8, map_size: 128, seed: 1 };
+        let settings = demo::DemoSettings {
+            views: 1,
+            held_out: 0,
+            width: 8,
+            height: 8,
+            map_size: 128,
+            seed: 1,
+            ..Default::default()
+        };
         let surface = Surface::new(demo::build(&settings).unwrap().scene.mesh).unwrap();
         let (grid, basis, go) = (VisibilityGrid::new(&surface, 64), LightBasis::new(32, 16), AtomicBool::new(false));
         let visibility = Visibility::trace(&surface, &grid, &basis, true, &go).unwrap();

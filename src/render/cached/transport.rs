@@ -3,6 +3,7 @@
 use super::bounce::BounceMatrix;
 use super::footprint::{ShadingPoint, ViewFootprints};
 use super::half_vector;
+use super::half_vector_kernel::Part;
 use super::irradiance::{irradiance, irradiance_backward, vector_irradiance};
 use super::light_basis::{LightBasis, LightPlanes};
 use super::lobe_place::{LobePlace, LobeSums, wide_from, width_through};
@@ -11,7 +12,7 @@ use super::points::{VisibilityGrid, VisibilityPoint};
 use super::seen_light::{SeenLight, SeenRows};
 use super::surroundings::Surroundings;
 use super::visibility::Visibility;
-use crate::material::Material;
+use crate::material::{LobeModel, Material};
 use crate::math::parallel;
 use crate::render::Surface;
 use glam::Vec3;
@@ -33,6 +34,8 @@ pub struct CachedSettings {
     pub fine_shadows: bool,
     /// Strength of the specular lobe as a whole, in [0, 1].
     pub lobe_strength: f32,
+    /// The microfacets of the lobe.
+    pub lobe: LobeModel,
     /// Seed of the rays to other surface.
     pub seed: u64,
 }
@@ -46,6 +49,7 @@ impl Default for CachedSettings {
             max_bounces: 3,
             fine_shadows: true,
             lobe_strength: 1.0,
+            lobe: LobeModel::BlinnPhong,
             seed: 1,
         }
     }
@@ -104,7 +108,7 @@ impl CachedTransport {
         let surroundings = (settings.max_bounces > 1 && settings.lobe_strength > 0.0)
             .then(|| Surroundings::trace(surface, &grid, &basis, &visibility, side, stop));
         let bounce_seconds = began.elapsed().as_secs_f64();
-        let albedo = lobe_albedo();
+        let albedo = lobe_albedo(settings.lobe);
         let made = CachedTransport {
             settings,
             basis,
@@ -293,6 +297,7 @@ impl CachedTransport {
             shares,
             seen,
             normal_variance: point.normal_variance,
+            model: self.settings.lobe,
         }
     }
 
@@ -309,11 +314,11 @@ impl CachedTransport {
     ) -> LobeSums {
         let shares = self.seen_from(point.lobe_point, light, at, &mut seen.fine);
         let ShadingPoint { normal, to_viewer, normal_variance, .. } = *point;
-        let (basis, seen) = match width_through(width, normal_variance) >= self.joined_from() {
+        let (basis, seen) = match width_through(self.settings.lobe, width, normal_variance) >= self.joined_from() {
             true => (&self.joined_basis, seen.joined(&self.basis)),
             false => (&self.basis, &seen.fine),
         };
-        let place = LobePlace { normal, to_viewer, shares, seen, normal_variance };
+        let place = LobePlace { normal, to_viewer, shares, seen, normal_variance, model: self.settings.lobe };
         match has_slope {
             true => lobe_with_derivative(basis, &place, width),
             false => lobe_alone(basis, &place, width),
@@ -392,7 +397,7 @@ impl CachedTransport {
 const ALBEDO_SPAN: f32 = 5.0;
 
 /// Directional albedo of the lobe, averaged over the hemisphere with the cosine, at even steps of log width.
-fn lobe_albedo() -> Vec<[f32; 2]> {
+fn lobe_albedo(model: LobeModel) -> Vec<[f32; 2]> {
     let constant = LightBasis::new(1, 1);
     let light = constant.planes(&[[1.0; 3]]);
     let shares = vec![255u8; constant.padded()];
@@ -407,8 +412,8 @@ fn lobe_albedo() -> Vec<[f32; 2]> {
                 let cosine = ((angle as f32 + 0.5) / ANGLES as f32).sqrt();
                 let to_viewer = Vec3::new((1.0 - cosine * cosine).sqrt(), cosine, 0.0);
                 let place =
-                    LobePlace { normal: Vec3::Y, to_viewer, shares: &shares, seen: &seen, normal_variance: 0.0 };
-                let sums = half_vector::lobe_sums(&constant, &place, width, 256);
+                    LobePlace { normal: Vec3::Y, to_viewer, shares: &shares, seen: &seen, normal_variance: 0.0, model };
+                let sums = half_vector::lobe_sums(&constant, &place, width, 256, Part::Whole);
                 sum[0] += sums.base[0] / ANGLES as f32;
                 sum[1] += sums.grazing[0] / ANGLES as f32;
             }

@@ -133,11 +133,11 @@ impl LobePlan {
             let (mut sums, count) = ([LobeSums::default(); STEPS + 1], last - first + 1);
             // Lobes for which pairs of hats are narrow enough are summed over these.
             let fine = first_joined.clamp(first, last + 1) - first;
-            let (to_viewer, normal_variance) = (own.to_viewer, 0.0);
-            let place = LobePlace { normal, to_viewer, shares, seen: &seen.fine, normal_variance };
+            let (to_viewer, normal_variance, model) = (own.to_viewer, 0.0, transport.settings.lobe);
+            let place = LobePlace { normal, to_viewer, shares, seen: &seen.fine, normal_variance, model };
             lobe_sums(basis, &place, &widths[..fine], &mut sums[..fine]);
             if fine < count {
-                let place = LobePlace { normal, to_viewer, shares, seen: seen.joined(basis), normal_variance };
+                let place = LobePlace { normal, to_viewer, shares, seen: seen.joined(basis), normal_variance, model };
                 lobe_sums(joined_basis, &place, &widths[fine..count], &mut sums[fine..count]);
             }
             sums.into_iter().take(count)

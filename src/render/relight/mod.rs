@@ -77,7 +77,8 @@ impl RelitView {
         self.lobes = LobePlan::default();
         if transport.settings.lobe_strength > 0.0 {
             let points = self.footprints.points.iter().zip(&self.materials);
-            let widths = points.map(|(point, material)| width_through(material[6].exp(), point.normal_variance));
+            let lobe = transport.settings.lobe;
+            let widths = points.map(|(point, material)| width_through(lobe, material[6].exp(), point.normal_variance));
             let eye = self.camera.position_in_world();
             self.lobes = LobePlan::of(&self.footprints, widths.collect(), transport, eye);
         }
@@ -170,7 +171,15 @@ mod tests {
 
     #[test]
     fn a_view_relit_is_the_picture_of_the_cache_and_is_linear_in_the_light() {
-        let settings = DemoSettings { views: 2, held_out: 0, width: 160, height: 120, map_size: 128, seed: 1 };
+        let settings = DemoSettings {
+            views: 2,
+            held_out: 0,
+            width: 160,
+            height: 120,
+            map_size: 128,
+            seed: 1,
+            ..Default::default()
+        };
         let scene = build(&settings).unwrap().scene;
         let surface = Surface::new(scene.mesh.clone()).unwrap();
         let truth = scene.truth.as_ref().unwrap();
@@ -220,7 +229,15 @@ mod tests {
 
     #[test]
     fn maps_seen_from_afar_are_averaged_over_a_pixel() {
-        let settings = DemoSettings { views: 1, held_out: 0, width: 160, height: 120, map_size: 512, seed: 1 };
+        let settings = DemoSettings {
+            views: 1,
+            held_out: 0,
+            width: 160,
+            height: 120,
+            map_size: 512,
+            seed: 1,
+            ..Default::default()
+        };
         let scene = build(&settings).unwrap().scene;
         let surface = Surface::new(scene.mesh.clone()).unwrap();
         let grid = crate::render::cached::VisibilityGrid::new(&surface, 64);

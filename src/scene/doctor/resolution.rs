@@ -75,7 +75,8 @@ mod tests {
                 exposure_prior_stops: None,
             }
         };
-        let small = DemoSettings { views: 1, held_out: 0, width: 8, height: 6, map_size: 64, seed: 1 };
+        let small =
+            DemoSettings { views: 1, held_out: 0, width: 8, height: 6, map_size: 64, seed: 1, ..Default::default() };
         Scene { mesh, views: heights.iter().map(view).collect(), truth: None, ..build(&small).unwrap().scene }
     }
 

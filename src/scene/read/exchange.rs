@@ -15,7 +15,7 @@ use super::text;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::{Image, file};
 use crate::light::Environment;
-use crate::material::MaterialMaps;
+use crate::material::{LobeModel, MaterialMaps};
 use crate::scene::settings::{ColourEncoding, PixelCentre, Up};
 use crate::scene::{Background, Truth, TruthRelight, View};
 use std::path::Path;
@@ -32,6 +32,20 @@ struct SceneJson {
     background: Option<String>,
     rough_pow: Option<f64>,
     g_mode: Option<String>,
+    lobe: Option<String>,
+}
+
+impl SceneJson {
+    /// The microfacets of the pictures; `None` of others than those that can be fitted.
+    fn lobe(&self) -> Option<LobeModel> {
+        let is_usual = self.rough_pow.is_none_or(|power| power == 1.0);
+        match (self.lobe.as_deref(), self.g_mode.as_deref()) {
+            _ if !is_usual => None,
+            (None | Some("modct"), None | Some("half_alpha")) => Some(LobeModel::BlinnPhong),
+            (Some("ggx"), None | Some("smith_ggx")) => Some(LobeModel::Ggx),
+            _ => None,
+        }
+    }
 }
 
 fn read_scene_json(folder: &Path) -> Result<SceneJson> {
@@ -65,9 +79,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
                 .remedy("give black or environment"));
         }
     };
-    if json.rough_pow.is_some_and(|power| power != 1.0)
-        || json.g_mode.as_deref().is_some_and(|mode| mode != "half_alpha")
-    {
+    if json.lobe().is_none() {
         findings.push(
             Finding::new(
                 Severity::Warning,
@@ -75,7 +87,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
                 "the pictures were made with another variant of the reflection lobe",
             )
             .at(Place::File(folder.join("scene.json")))
-            .remedy("compare maps with care: rough_pow 1 and g_mode half_alpha are the ones used here"),
+            .remedy("compare maps with care: rough_pow 1 is used here, with lobe modct and g_mode half_alpha or with lobe ggx and g_mode smith_ggx"),
         );
     }
     let stem = |file: &Path| file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -159,13 +171,15 @@ pub fn read_truth(folder: &Path, views: &[View], shrink: usize, findings: &mut V
         }
         None => Image::filled(size.0, size.1, true),
     };
+    let json = read_scene_json(folder)?;
     Ok(Some(Truth {
         maps,
         texels_seen,
         environment: Environment { radiance: file::read_rgb(environment)? },
         relight: read_relight(folder, views, shrink)?,
         // `max_depth` counts as Mitsuba does: the camera, the hits, the light.
-        max_bounces: read_scene_json(folder)?.max_depth.unwrap_or(2).saturating_sub(1).max(1),
+        max_bounces: json.max_depth.unwrap_or(2).saturating_sub(1).max(1),
+        lobe: json.lobe().unwrap_or_default(),
     }))
 }
 

@@ -59,7 +59,8 @@ mod tests {
 
     #[test]
     fn ground_far_away_is_not_framed() {
-        let small = DemoSettings { views: 6, held_out: 0, width: 48, height: 36, map_size: 64, seed: 1 };
+        let small =
+            DemoSettings { views: 6, held_out: 0, width: 48, height: 36, map_size: 64, seed: 1, ..Default::default() };
         let scene = build(&small).unwrap().scene;
         let near = subject(&scene.mesh, Some(&scene));
         let mut mesh = scene.mesh.clone();

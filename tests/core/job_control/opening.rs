@@ -16,7 +16,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 fn a_scene_is_opened_fitted_stopped_viewed_resumed_and_viewed_again() {
     let parent = tempfile::tempdir().unwrap();
     let (scene_folder, run_folder) = (parent.path().join("scene"), parent.path().join("run"));
-    let small = DemoSettings { views: 5, held_out: 1, width: 48, height: 36, map_size: 64, seed: 1 };
+    let small =
+        DemoSettings { views: 5, held_out: 1, width: 48, height: 36, map_size: 64, seed: 1, ..Default::default() };
     let made = open::open_demo(&small, &GO, &|_, _| {}).unwrap();
     let options = patina::export::exchange::ExchangeOptions { with_photos: true, ..Default::default() };
     patina::export::exchange::write(&made.scene, made.scene.truth.as_ref().unwrap(), &options, &scene_folder).unwrap();

@@ -74,8 +74,16 @@ fn pictures_of_the_demo_scene() {
         println!("skipped: PATINA_STAGE_PICTURES not set");
         return;
     };
-    let demo =
-        build(&DemoSettings { views: 24, held_out: 4, width: 160, height: 120, map_size: 512, seed: 1 }).unwrap();
+    let demo = build(&DemoSettings {
+        views: 24,
+        held_out: 4,
+        width: 160,
+        height: 120,
+        map_size: 512,
+        seed: 1,
+        ..Default::default()
+    })
+    .unwrap();
     let truth = demo.scene.truth.clone().unwrap();
     let parameters = patina::job::pictures::parameters(&truth.maps, &truth.environment);
     let surface = Surface::new(demo.scene.mesh.clone()).unwrap();

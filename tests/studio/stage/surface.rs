@@ -208,6 +208,7 @@ fn the_rasteriser_and_the_rays_agree_on_what_is_seen() {
         height: 60,
         map_size: 64,
         seed: 1,
+        ..Default::default()
     })
     .unwrap();
     let bvh = patina::trace::Bvh::build(&demo.scene.mesh.positions, &demo.scene.mesh.triangles).unwrap();

@@ -42,7 +42,8 @@ fn solver(made: &Photographed, settings: SolverSettings) -> Solver {
 /// to the mean radiance.
 fn photograph(held_out: usize, noise: f32, lobe_of: impl Fn(usize) -> Option<[f32; 4]>) -> Photographed {
     let views = 16;
-    let demo = demo::DemoSettings { views, held_out, width: 64, height: 48, map_size: SIZE, seed: 1 };
+    let demo =
+        demo::DemoSettings { views, held_out, width: 64, height: 48, map_size: SIZE, seed: 1, ..Default::default() };
     let mut scene = demo::build(&demo).unwrap().scene;
     let surface = Surface::new(scene.mesh.clone()).unwrap();
     for view in 0..scene.views.len() {

@@ -14,6 +14,7 @@ mod spoil;
 use crate::error::Result;
 use crate::image::{GreyImage, Image};
 use crate::light::Environment;
+use crate::material::LobeModel;
 use crate::scene::demo::{evening, morning, views_of};
 use crate::scene::synthetic::bake::bake;
 use crate::scene::synthetic::orbit::Orbit;
@@ -200,6 +201,7 @@ pub fn build(case: HardCase, settings: &HardSettings) -> Result<HardScene> {
             environment: light(case, height),
             relight: Some(TruthRelight { environment: evening().resampled(2 * height, height), pictures: Vec::new() }),
             // A mean of pictures is one of lobes for direct light only.
+            lobe: LobeModel::BlinnPhong,
             max_bounces: match case {
                 HardCase::Ggx => 1,
                 HardCase::Plaster => 6,
