@@ -6,21 +6,15 @@
 //! together by F0 and width, and each cluster that covers enough of the surface becomes a family of its own beside the one
 //! for any scene, with the diffuse reflectance that its texels have (empirical Bayes: Efron and Morris 1973).
 //!
-//! All texels together tell besides what lobes of this scene are like as a whole (`lobe_scene`): one more family,
-//! of the kinds that any scene has. That one is there before the first maps as well, by what rounds on the light solved.
-//!
 //! That uses what a texel's own pixels say twice, once in the cluster. So clusters are wide, and families of what any scene
 //! has keep half of what is believed.
 
 use super::estimate::{Estimate, TexelVariance};
 use super::lobe_prior::{LobeFamily, LobeKind, LobePrior, REACH};
-use super::lobe_scene::SceneLobes;
 use crate::material::Material;
 
-/// Share of the prior that is left to kinds of surface that any scene has,
+/// Share of the prior that is left to kinds of surface that any scene has.
 const ANY_SHARE: f64 = 0.5;
-/// and the share of that for lobes as this scene has shown them.
-const SCENE_SHARE: f64 = 0.8;
 /// Most families.
 const MOST: usize = 6;
 /// Texels from which clusters are made, at most.
@@ -119,22 +113,18 @@ impl Sums {
     }
 }
 
-/// What is believed of lobes when maps are made: the prior, the same with lobes as this scene has them, and
-/// a family for each kind of surface that earlier maps show. Where nothing was solved for yet, by
-/// maps or by rounds on the light, it is the prior alone.
+/// What is believed of lobes when maps are made: the prior, and a family for each kind of surface that earlier maps show.
 pub fn with_families_of(estimate: &Estimate) -> LobePrior {
     let any = LobePrior::default();
-    let Some(scene) = SceneLobes::of(estimate) else { return any };
     let clusters = clusters(&known_samples(estimate));
+    if clusters.is_empty() {
+        return any;
+    }
     // Texels that are known well are no fair sample of the surface: shares go with the root of their number.
     let total: f64 = clusters.iter().map(|cluster| cluster.count.sqrt()).sum();
-    let of_any = if total > 0.0 { ANY_SHARE } else { 1.0 };
-    let both = |family: &LobeFamily| {
-        [family.scaled(of_any * (1.0 - SCENE_SHARE)), scene.family(family).scaled(of_any * SCENE_SHARE)]
-    };
+    let of_any = any.families.iter().map(|family| family.scaled(ANY_SHARE));
     let of_cluster = |cluster: &Sums| cluster.family((1.0 - ANY_SHARE) * cluster.count.sqrt() / total);
-    let families = any.families.iter().flat_map(both).chain(clusters.iter().map(of_cluster)).collect();
-    LobePrior { families, keep: any.keep }
+    LobePrior { families: of_any.chain(clusters.iter().map(of_cluster)).collect(), keep: any.keep }
 }
 
 /// Texels whose lobes are known well, evenly chosen where there are more than it takes.
@@ -185,14 +175,14 @@ fn clusters(samples: &[Sample]) -> Vec<Sums> {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
     use crate::image::Image;
     use crate::light::Environment;
     use glam::Vec3;
 
     /// Maps of two materials in stripes, and texels whose lobe is not known.
-    pub(in super::super) fn estimate() -> Estimate {
+    fn estimate() -> Estimate {
         let light = Environment { radiance: Image::filled(4, 2, Vec3::ONE) };
         let mut estimate = Estimate::start(32, &light, 1);
         for texel in 0..32 * 32 {
@@ -212,10 +202,10 @@ pub(super) mod tests {
     #[test]
     fn materials_that_are_known_become_families_and_what_is_not_known_does_not() {
         let prior = with_families_of(&estimate());
-        assert_eq!(prior.families.len(), 4, "{prior:?}");
+        assert_eq!(prior.families.len(), 3, "{prior:?}");
         let total: f64 = prior.families.iter().flat_map(|family| &family.kinds).map(|kind| kind.share).sum();
         assert!((total - 1.0).abs() < 1e-12);
-        let (grey, metal) = (&prior.families[2], &prior.families[3]);
+        let (grey, metal) = (&prior.families[1], &prior.families[2]);
         assert!((grey.log_width.0 + 1.2).abs() < 1e-6 && (grey.kinds[0].specular.0[0] - 0.05).abs() < 1e-3, "{grey:?}");
         assert!(grey.kinds[0].diffuse.1 > 0.15, "its diffuse reflectance may be anything: {grey:?}");
         assert!(
@@ -223,21 +213,6 @@ pub(super) mod tests {
             "{metal:?}"
         );
         assert!(metal.kinds[0].diffuse.1 <= LEAST.1, "{metal:?}");
-    }
-
-    #[test]
-    fn all_texels_together_are_a_family_of_the_scene() {
-        // A quarter at -0.7, half at -1.2, a quarter at -0.3 that is hardly known (a variance of 0.5): all together -0.85 with
-        // a deviation of 0.52 below zero, so a whole normal distribution is wider and lies further up.
-        let families = with_families_of(&estimate()).families;
-        let (any, scene) = (&families[0], &families[1]);
-        let (mean, deviation) = scene.log_width;
-        assert!((-0.75..-0.6).contains(&mean) && (0.6..0.7).contains(&deviation), "{scene:?}");
-        assert_eq!(any.log_width, LobePrior::default().families[0].log_width);
-        for (own, whole) in any.kinds.iter().zip(&scene.kinds) {
-            assert_eq!(own.diffuse, whole.diffuse);
-            assert!((own.share / whole.share - (1.0 - SCENE_SHARE) / SCENE_SHARE).abs() < 1e-9);
-        }
     }
 
     #[test]

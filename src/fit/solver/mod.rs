@@ -17,7 +17,7 @@
 //!    of texels that no block was solved for.
 //! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`) with the footprints of pixels, where the evidence,
 //!    as far as it is independent (`tile_independence`), decides which texels share a lobe ([`lobe_tree`],
-//!    [`lobe_evidence`], [`lobe_prior`], [`lobe_sums`], [`lobe_widths`], [`lobe_families`], `lobe_scene`).
+//!    [`lobe_evidence`], [`lobe_prior`], [`lobe_sums`], [`lobe_widths`], [`lobe_families`]).
 //!    Then `refine`: [`descent`] of the one [`objective`] over all texels (`conjugate_gradients`), by what whole [`pixels`] see
 //!    (`sight`, `pixel_system`), with what `neighbours` have in common and as much `freedom` as predicts photos that took no
 //!    part; from the lobes that were found, or those of one dielectric where that explains pixels as well (`second_start`, `agreement`).
@@ -56,7 +56,6 @@ pub mod lobe_evidence;
 pub mod lobe_families;
 mod lobe_kind;
 pub mod lobe_prior;
-mod lobe_scene;
 pub mod lobe_sums;
 mod lobe_tails;
 pub mod lobe_tree;
