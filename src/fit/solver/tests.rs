@@ -2,8 +2,8 @@
 
 use super::solver::Solver;
 use super::*;
-use crate::material::MaterialMaps;
 use crate::material::texels::{PyramidWeights, TexelPyramid, texels_from_maps};
+use crate::material::{LobeModel, MaterialMaps};
 use crate::render::picture::{PictureSettings, render};
 use crate::render::{Parameters, Surface};
 use crate::scene::{Scene, demo};
@@ -15,24 +15,17 @@ const SIZE: usize = 64;
 /// Photographed once for all tests.
 fn photographed() -> &'static (Scene, Surface) {
     static SCENE: OnceLock<(Scene, Surface)> = OnceLock::new();
-    SCENE.get_or_init(photograph)
+    SCENE.get_or_init(|| photograph(LobeModel::BlinnPhong))
 }
 
-fn photograph() -> (Scene, Surface) {
-    let settings = demo::DemoSettings {
-        views: 12,
-        held_out: 0,
-        width: 80,
-        height: 60,
-        map_size: SIZE,
-        seed: 1,
-        ..Default::default()
-    };
+fn photograph(lobe: LobeModel) -> (Scene, Surface) {
+    let settings = demo::DemoSettings { views: 12, held_out: 0, width: 80, height: 60, map_size: SIZE, seed: 1, lobe };
     let mut scene = demo::build(&settings).unwrap().scene;
     let surface = Surface::new(scene.mesh.clone()).unwrap();
     let truth = scene.truth.clone().unwrap();
     let weights = PyramidWeights::flat(SIZE, SIZE);
-    let lit = Parameters::new(TexelPyramid::from_base(texels_from_maps(&truth.maps), &weights), &truth.environment);
+    let texels = TexelPyramid::from_base(texels_from_maps(&truth.maps), &weights).with_model(lobe);
+    let lit = Parameters::new(texels, &truth.environment);
     for view in 0..scene.views.len() {
         let settings = PictureSettings { samples: 32, max_bounces: truth.max_bounces, ..PictureSettings::default() };
         let camera = scene.views[view].camera;
@@ -129,4 +122,20 @@ fn light_and_maps_are_found_together() {
     // may be off by a third on photos as small as these.
     let ratio = light.power() / truth.power();
     assert!(ratio.min_element() > 0.7 && ratio.max_element() < 1.45, "{ratio}");
+}
+
+/// Photos of one kind of lobe are explained by lobes of that kind, and less well by the others.
+#[test]
+fn lobes_are_of_the_kind_that_photos_show() {
+    let (scene, surface) = photograph(LobeModel::Ggx);
+    let light = &scene.truth.as_ref().unwrap().environment;
+    let [as_others, as_they_are] = LobeModel::ALL.map(|lobe| {
+        let settings = SolverSettings { fixed_light: true, coarse_rounds: 1, fine_rounds: 0, lobe, ..settings() };
+        let mut solver = Solver::new(&scene, &surface, settings, Some(light)).unwrap();
+        let mut error = f64::NAN;
+        solver.run(&AtomicBool::new(false), &mut |_, report, _| error = report.squared_error);
+        error.sqrt()
+    });
+    println!("residual of Blinn-Phong {as_others:.4}, of GGX {as_they_are:.4}");
+    assert!(as_they_are < 0.95 * as_others, "{as_they_are} {as_others}");
 }
