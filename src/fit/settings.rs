@@ -121,7 +121,8 @@ pub struct FitSettings {
     #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
     pub pixel_filter: PixelFilter,
     /// The microfacets of the specular lobe. GGX is what other renderers shade with, so that maps lose nothing on the way to
-    /// them.
+    /// them, and what most surfaces look like; Blinn-Phong is the paper's [default: auto: what a synthetic scene says, else GGX
+    /// for the solver, Blinn-Phong for Adam].
     #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
     pub lobe: LobeModel,
     /// Multi-view gradient consistency, in the last of Adam's steps.

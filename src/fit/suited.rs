@@ -1,8 +1,9 @@
-//! What suits a scene, where nobody chose: method, polishing and gains of photographs, maps as large as photos resolve.
+//! What suits a scene, where nobody chose: method, lobe and gains of photographs, maps as large as photos resolve.
 
 use super::method::Method;
 use super::settings::FitSettings;
 use crate::error::Finding;
+use crate::material::LobeModel;
 use crate::scene::doctor::{self, Report, exposure};
 use crate::scene::{Scene, View};
 
@@ -18,6 +19,8 @@ pub struct Suited {
     pub is_large: bool,
     /// Whether each photo gets a gain.
     pub exposure: bool,
+    /// The microfacets of the lobe, for the solver.
+    pub lobe: LobeModel,
     /// Width and height of maps with about as many texels as photos resolve; `None` where that is not known.
     pub map_size: Option<usize>,
     /// The same for the part of the surface that photos show most sharply.
@@ -37,7 +40,8 @@ impl Suited {
     ///
     /// The solver ends nearer in maps, light and held-out pictures than Adam, in less time, once the photos' exposures, which
     /// cameras choose, are no riddle to the light. Maps with more texels than photos have pixels to tell them apart cost time
-    /// and show the photos' noise. Where there are no photos there is nothing to solve.
+    /// and show the photos' noise. Where there are no photos there is nothing to solve. Most surfaces have tails as those of GGX,
+    /// and other renderers have its lobe; where the truth is known, so is its lobe.
     pub fn to(scene: &Scene, report: &Report) -> Self {
         // Photographs developed to 16 bits are linear too, but cameras write down how they exposed.
         let by_camera = |view: &View| !view.photo.is_linear() || view.exposure_prior_stops.is_some();
@@ -47,6 +51,7 @@ impl Suited {
             is_large: scene.views.iter().map(|view| view.photo.width() * view.photo.height()).sum::<usize>()
                 > MANY_PIXELS,
             exposure: is_photographed && exposure::differ(&report.views),
+            lobe: scene.truth.as_ref().map_or(LobeModel::Ggx, |truth| truth.lobe),
             map_size: report.texels_resolved.map(map_size_for),
             sharpest_map_size: report.texels_resolved_sharpest.map(map_size_for),
         }
@@ -77,6 +82,10 @@ impl Suited {
         if settings.method == Method::Automatic {
             settings.method = if Method::means_adam(chosen) { Method::Adam } else { self.method };
         }
+        // Adam's are those of the paper.
+        if settings.method == Method::Solver && is_free("lobe") {
+            settings.lobe = self.lobe;
+        }
         if self.is_large && is_free("solver-levels") {
             settings.solver_levels = FitSettings::default().solver_levels + 1;
         }
@@ -103,6 +112,11 @@ impl Suited {
                 steps => format!(", then {steps} refinement steps of Adam"),
             };
             tell(format!("Using the solver{polished}"), "method", "adam".into(), "takes Adam only");
+        }
+        if settings.lobe != asked.lobe {
+            let sentence = format!("Lobes are {}", settings.lobe.label());
+            let otherwise = if settings.lobe == LobeModel::Ggx { "blinn-phong" } else { "ggx" };
+            tell(sentence, "lobe", otherwise.into(), "takes the others");
         }
         if settings.exposure != asked.exposure {
             let sentence = "Photo exposures differ: exposure compensation is on, a gain per photo";
@@ -204,6 +218,25 @@ mod tests {
     }
 
     #[test]
+    fn captures_have_lobes_of_ggx_and_synthetic_scenes_those_they_were_made_with() {
+        let mut scene = linear_scene();
+        let taken = |scene: &Scene, from: FitSettings, chosen: &[&str]| {
+            let suited = Suited::to(scene, &Report::default());
+            let settings = applied(&suited, from.clone(), chosen);
+            (settings.lobe, suited.told(&from, &settings).iter().any(|taken| taken.setting == "lobe"))
+        };
+        for lobe in LobeModel::ALL {
+            scene.truth.as_mut().unwrap().lobe = lobe;
+            assert_eq!(taken(&scene, FitSettings::default(), &[]).0, lobe);
+        }
+        scene.truth = None;
+        assert_eq!(taken(&scene, FitSettings::default(), &[]), (LobeModel::Ggx, true));
+        assert_eq!(taken(&scene, FitSettings::default(), &["lobe"]), (LobeModel::BlinnPhong, false));
+        let adam = FitSettings { method: Method::Adam, ..FitSettings::default() };
+        assert_eq!(taken(&scene, adam, &[]), (LobeModel::BlinnPhong, false));
+    }
+
+    #[test]
     fn photographs_whose_exposures_differ_get_gains_unless_that_was_decided() {
         let mut scene = linear_scene();
         let seen = |stops: f64| ViewCheck { exposure_stops: Some(stops), ..ViewCheck::default() };
@@ -227,6 +260,7 @@ mod tests {
             method: Method::Solver,
             is_large: false,
             exposure: true,
+            lobe: LobeModel::BlinnPhong,
             map_size: Some(512),
             sharpest_map_size: None,
         };
@@ -265,8 +299,8 @@ mod tests {
     #[test]
     fn many_pixels_leave_full_size_to_the_descent() {
         let of = |is_large: bool, chosen: &[&str]| {
-            let suited =
-                Suited { method: Method::Solver, is_large, exposure: false, map_size: None, sharpest_map_size: None };
+            let scene = linear_scene();
+            let suited = Suited { is_large, ..Suited::to(&scene, &Report::default()) };
             let settings = applied(&suited, FitSettings::default(), chosen);
             (settings.solver_levels, settings.solver_grid, settings.is_refined())
         };
@@ -285,6 +319,7 @@ mod tests {
             method: Method::Adam,
             is_large: false,
             exposure: false,
+            lobe: LobeModel::BlinnPhong,
             map_size: size,
             sharpest_map_size: None,
         };

@@ -35,7 +35,7 @@ const HEADINGS: [(&str, &str); 16] = [
 
 /// Settings whose value a scene decides when they are not typed ([`crate::fit::Suited`]): a default told beside them
 /// would be one that few fits have. Their help says what is taken.
-const DECIDED_BY_SCENE: [&str; 5] = ["method", "map-size", "exposure", "solver-grid", "solver-levels"];
+const DECIDED_BY_SCENE: [&str; 6] = ["method", "map-size", "exposure", "solver-grid", "solver-levels", "lobe"];
 
 /// Puts the settings of a fit under their headings.
 pub fn arrange(command: clap::Command) -> clap::Command {
@@ -57,6 +57,7 @@ mod tests {
     use super::*;
     use crate::cli::arguments::Arguments;
     use crate::fit::{FitSettings, Method, Suited};
+    use crate::material::LobeModel;
     use clap::CommandFactory;
 
     fn fit_command() -> clap::Command {
@@ -110,7 +111,9 @@ mod tests {
             (Method::Solver, true, true, Some(512)),
             (Method::Adam, false, false, Some(256)),
         ] {
-            let settings = Suited { method, is_large, exposure, map_size, sharpest_map_size: None }.resolve(&base, &[]);
+            let lobe = LobeModel::Ggx;
+            let suited = Suited { method, is_large, exposure, lobe, map_size, sharpest_map_size: None };
+            let settings = suited.resolve(&base, &[]);
             for (name, _, taken) in base.differences(&settings) {
                 assert!(!told(&name), "--{name} tells a default, and {taken} was taken");
             }

@@ -35,7 +35,8 @@ pub struct EntryOptions {
     pub output: PathBuf,
 }
 
-/// The settings of a contest on a scene: the defaults, with sizes of maps, light and paths as the truth has them.
+/// The settings of a contest on a scene: the defaults, with the lobe and the sizes of maps, light and paths as the truth has
+/// them.
 ///
 /// # Errors
 /// `InvalidScene` for a scene without truth; a settings file that cannot be read.
@@ -50,6 +51,7 @@ pub fn base_settings(scene: &Scene, changes: Option<&Path>, seed: u64) -> Result
         map_size,
         environment_height: truth.environment.height(),
         bounces: truth.max_bounces,
+        lobe: truth.lobe,
         // Whoever judges does it afterwards.
         held_out_interval: 0,
         ..Default::default()

@@ -7,7 +7,7 @@ use super::eye::Eye;
 use crate::image::display::DisplaySettings;
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::light::Environment;
-use crate::material::MaterialMaps;
+use crate::material::{LobeModel, MaterialMaps};
 use crate::scene::{Camera, Mesh};
 use eframe::egui::Color32;
 use std::sync::Arc;
@@ -158,6 +158,8 @@ pub struct StageContent {
     pub vertex_colours: Option<Arc<Vec<[f32; 4]>>>,
     /// Strength of the specular lobe in [0, 1]; 0 for maps without one.
     pub lobe_strength: f32,
+    /// The microfacets of the lobe.
+    pub lobe: LobeModel,
     /// The light; black without.
     pub light: Option<StageLight>,
     /// A second light, right of [`StageLook::light_wipe`].
@@ -182,6 +184,7 @@ impl Default for StageContent {
             covered: None,
             vertex_colours: None,
             lobe_strength: 1.0,
+            lobe: LobeModel::default(),
             light: None,
             other_light: None,
             quantity: None,

@@ -33,6 +33,8 @@ pub(super) struct PreparedLight {
     pub mirror: RgbImage,
     /// Irradiance over pi by normal, then the light blurred for each of [`width_of_layer`] by mirror direction.
     pub layers: Vec<RgbImage>,
+    /// [`reflectance_table`] of the lobes that it was blurred by.
+    pub reflectances: &'static RgbImage,
 }
 
 /// The microfacet width that layer `1 + index` is blurred for: a geometric row from [`FIRST_WIDTH`] to 1.
@@ -40,8 +42,8 @@ pub(super) fn width_of_layer(index: usize) -> f32 {
     FIRST_WIDTH.powf(1.0 - index as f32 / (WIDTHS - 1) as f32)
 }
 
-/// Blurs a light; about 20 million products, in parallel.
-pub(super) fn prepare(environment: &Environment) -> PreparedLight {
+/// Blurs a light by lobes of these microfacets; about 20 million products, in parallel.
+pub(super) fn prepare(environment: &Environment, lobe: LobeModel) -> PreparedLight {
     let mirror = if environment.width() > MIRROR_WIDTH {
         environment.resampled(MIRROR_WIDTH, (MIRROR_WIDTH / 2).min(environment.height())).radiance
     } else {
@@ -56,11 +58,19 @@ pub(super) fn prepare(environment: &Environment) -> PreparedLight {
         let source = if width < 0.3 { &sharp } else { &soft };
         // Light towards i reaches the eye in the direction of the normal with D(h) (n.i), and n.h is cos of half the angle.
         let exponent = 1.0 / (width * width) - 1.0;
-        // Below, a texel weighs less than 1e-6.
-        let least = (2.0 * (-13.8 / exponent.max(1e-3)).exp() - 1.0).max(0.0);
-        source.blurred(least, |cosine| cosine * (0.5 + 0.5 * cosine).powf(exponent))
+        match lobe {
+            LobeModel::BlinnPhong => {
+                // Below, a texel weighs less than 1e-6.
+                let least = (2.0 * (-13.8 / exponent.max(1e-3)).exp() - 1.0).max(0.0);
+                source.blurred(least, |cosine| cosine * (0.5 + 0.5 * cosine).powf(exponent))
+            }
+            LobeModel::Ggx => {
+                let spread = |cosine: f32| 1.0 + exponent * (0.5 - 0.5 * cosine);
+                source.blurred(0.0, |cosine| cosine / spread(cosine).powi(2))
+            }
+        }
     }));
-    PreparedLight { mirror, layers }
+    PreparedLight { mirror, layers, reflectances: reflectance_table(lobe) }
 }
 
 /// The texels of a light as directions with their share of the sphere.
@@ -103,31 +113,37 @@ impl Source {
 /// rows, both in [0, 1] with texel centres at `(index + 0.5) / TABLE_SIZE`. z is 0.
 ///
 /// The integral of the lobe of [`crate::material::lobe`] over the hemisphere, by 256 directions drawn from it.
-pub(super) fn reflectance_table() -> &'static RgbImage {
-    static TABLE: LazyLock<RgbImage> = LazyLock::new(|| {
-        let cell = |index: usize| {
-            let at = |place: usize| (place as f32 + 0.5) / TABLE_SIZE as f32;
-            reflectance(at(index % TABLE_SIZE), at(index / TABLE_SIZE))
-        };
-        Image::from_pixels(TABLE_SIZE, TABLE_SIZE, parallel::map(TABLE_SIZE * TABLE_SIZE, cell))
-    });
-    &TABLE
+pub(super) fn reflectance_table(lobe: LobeModel) -> &'static RgbImage {
+    static OF_BLINN_PHONG: LazyLock<RgbImage> = LazyLock::new(|| table_of(LobeModel::BlinnPhong));
+    static OF_GGX: LazyLock<RgbImage> = LazyLock::new(|| table_of(LobeModel::Ggx));
+    match lobe {
+        LobeModel::BlinnPhong => &OF_BLINN_PHONG,
+        LobeModel::Ggx => &OF_GGX,
+    }
 }
 
-fn reflectance(cos_out: f32, width: f32) -> Vec3 {
+fn table_of(lobe: LobeModel) -> RgbImage {
+    let cell = |index: usize| {
+        let at = |place: usize| (place as f32 + 0.5) / TABLE_SIZE as f32;
+        reflectance(lobe, at(index % TABLE_SIZE), at(index / TABLE_SIZE))
+    };
+    Image::from_pixels(TABLE_SIZE, TABLE_SIZE, parallel::map(TABLE_SIZE * TABLE_SIZE, cell))
+}
+
+fn reflectance(lobe: LobeModel, cos_out: f32, width: f32) -> Vec3 {
     const SAMPLES: u32 = 256;
     let towards_viewer = Vec3::new((1.0 - cos_out * cos_out).max(0.0).sqrt(), 0.0, cos_out);
     let frame = Frame::around(Vec3::Z);
     // Channel 0 reflects nothing at normal incidence, channel 1 everything: their difference is the part by F0.
     let material = Material { diffuse: [0.0; 3], specular: [0.0, 1.0, 1.0], log_width: width.ln() };
-    let sampler = material.sampler(LobeModel::BlinnPhong, cos_out, 1.0);
+    let sampler = material.sampler(lobe, cos_out, 1.0);
     let mut sum = Vec3::ZERO;
     for sample in 0..SAMPLES {
         let even = (sample as f32 + 0.5) / SAMPLES as f32;
         let u = radical_inverse(sample + 1, 2);
         let Some(light) = sampler.sample(&frame, towards_viewer, [even, u]) else { continue };
         let Some(geometry) = LobeGeometry::new(Vec3::Z, light, towards_viewer) else { continue };
-        let [low, high, _] = material.reflect(&geometry, 1.0);
+        let [low, high, _] = material.reflect_by(lobe, &geometry, 1.0);
         let density = sampler.density(&geometry);
         if density > 0.0 {
             sum += Vec3::new(high - low, low, 0.0) / density;
@@ -155,10 +171,10 @@ mod tests {
 
     #[test]
     fn an_even_light_stays_even_at_every_blur() {
-        let light = prepare(&Environment::constant(16, 8, Vec3::new(0.5, 1.0, 2.0)));
-        assert_eq!(light.layers.len(), 1 + WIDTHS);
-        for layer in &light.layers {
-            for pixel in layer.pixels() {
+        let even = Environment::constant(16, 8, Vec3::new(0.5, 1.0, 2.0));
+        for light in LobeModel::ALL.map(|lobe| prepare(&even, lobe)) {
+            assert_eq!(light.layers.len(), 1 + WIDTHS);
+            for pixel in light.layers.iter().flat_map(|layer| layer.pixels()) {
                 assert!((*pixel - Vec3::new(0.5, 1.0, 2.0)).abs().max_element() < 2e-3, "{pixel}");
             }
         }
@@ -167,7 +183,7 @@ mod tests {
     #[test]
     fn the_matt_layer_is_the_irradiance_and_a_wider_blur_is_flatter() {
         let sky = sun_and_sky(64, 32, &SkySettings::noon());
-        let light = prepare(&sky);
+        let [light, of_ggx] = LobeModel::ALL.map(|lobe| prepare(&sky, lobe));
         let largest = sky.irradiance(Vec3::Y).as_vec3().max_element() / PI;
         for place in [0, 300, 900, 1500, 2047] {
             let normal = sphere::direction_of_texel(place / WIDTH, place % WIDTH, WIDTH, HEIGHT);
@@ -178,11 +194,18 @@ mod tests {
         let peak = |layer: &RgbImage| layer.pixels().iter().map(|rgb| rgb.y).fold(0.0, f32::max);
         let peaks: Vec<f32> = light.layers[1..].iter().map(peak).collect();
         assert!(peaks.is_sorted_by(|sharper, wider| sharper >= wider), "{peaks:?}");
+        // Tails take from the middle what they have.
+        let of_ggx: Vec<f32> = of_ggx.layers[1..WIDTHS].iter().map(peak).collect();
+        assert!(of_ggx.iter().zip(&peaks).all(|(ggx, peak)| ggx < peak), "{of_ggx:?} {peaks:?}");
     }
 
     #[test]
     fn the_table_reflects_no_more_than_arrives_and_more_at_grazing_angles() {
-        let table = reflectance_table();
+        LobeModel::ALL.into_iter().for_each(table_is_sound);
+    }
+
+    fn table_is_sound(lobe: LobeModel) {
+        let table = reflectance_table(lobe);
         for row in 0..TABLE_SIZE {
             for column in 0..TABLE_SIZE {
                 let cell = table[(row, column)];

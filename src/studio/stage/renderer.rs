@@ -16,7 +16,7 @@ use super::uniforms::{ScreenUniform, Sizes, ViewUniform};
 use crate::error::Finding;
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::light::Environment;
-use crate::material::MaterialMaps;
+use crate::material::{LobeModel, MaterialMaps};
 use crate::scene::Mesh;
 use eframe::{egui, wgpu};
 use glam::Vec3;
@@ -44,11 +44,14 @@ pub struct StageStatus {
 
 type MeshKey = (Arc<Mesh>, Option<Arc<Vec<[f32; 4]>>>);
 type MapsKey = (Arc<MaterialMaps>, Option<Arc<Image<bool>>>);
+/// A light, and the microfacets that it is blurred by.
+type LightKey = (Arc<Environment>, LobeModel);
 
 /// A light on the graphics adapter.
 struct GpuLight {
     map: GpuTexture,
     layers: GpuTexture,
+    reflectances: GpuTexture,
 }
 
 impl GpuLight {
@@ -56,6 +59,7 @@ impl GpuLight {
         GpuLight {
             map: maker.table("stage light", &light.mirror),
             layers: maker.layers("stage blurred light", &light.layers),
+            reflectances: maker.table("stage reflectance", light.reflectances),
         }
     }
 }
@@ -83,11 +87,10 @@ pub(super) struct StageRenderer {
     view_buffer: wgpu::Buffer,
     screen_buffer: wgpu::Buffer,
     missing: Missing,
-    reflectance: GpuTexture,
     mesh: Slot<MeshKey, GpuMesh>,
     maps: Slot<MapsKey, (GpuTexture, GpuTexture, Vec<Finding>)>,
     quantity: Slot<Arc<GreyImage>, GpuTexture>,
-    lights: [Slot<Arc<Environment>, GpuLight>; 2],
+    lights: [Slot<LightKey, GpuLight>; 2],
     photo: Slot<Arc<RgbImage>, GpuTexture>,
     traced: Slot<Arc<RgbImage>, GpuTexture>,
     overlay: Overlay,
@@ -110,18 +113,18 @@ impl StageRenderer {
         };
         let dark = Image::filled(1, 1, Vec3::ZERO);
         let layers = vec![dark.clone(); 1 + light::WIDTHS];
+        let reflectances = light::reflectance_table(LobeModel::default());
         let missing = Missing {
             diffuse: maker.one("stage clay", CLAY),
             specular: maker.one("stage matt", MATT),
             black: maker.one("stage nothing", [0.0; 4]),
-            light: GpuLight::new(&maker, &PreparedLight { mirror: dark, layers }),
+            light: GpuLight::new(&maker, &PreparedLight { mirror: dark, layers, reflectances }),
         };
         StageRenderer {
             pipelines: Pipelines::new(device, screen_format),
             view_buffer: uniform("stage view", size_of::<ViewUniform>()),
             screen_buffer: uniform("stage screen", size_of::<ScreenUniform>()),
             missing,
-            reflectance: maker.table("stage reflectance", light::reflectance_table()),
             mesh: Slot::default(),
             maps: Slot::default(),
             quantity: Slot::default(),
@@ -227,10 +230,10 @@ impl StageRenderer {
 
         for (slot, light) in self.lights.iter_mut().zip([&content.light, &content.other_light]) {
             let maker = self.maker.clone();
-            let environment = light.as_ref().map(|light: &StageLight| light.environment.clone());
+            let key = light.as_ref().map(|light: &StageLight| (light.environment.clone(), content.lobe));
             // Blurring costs the same for a small one.
-            changed |= slot.follow(environment, speed(usize::MAX), move |environment| {
-                GpuLight::new(&maker, &light::prepare(environment))
+            changed |= slot.follow(key, speed(usize::MAX), move |(environment, lobe)| {
+                GpuLight::new(&maker, &light::prepare(environment, *lobe))
             });
         }
         for (slot, picture, label) in [

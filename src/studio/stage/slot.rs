@@ -1,5 +1,6 @@
 //! Something on the graphics adapter that follows something behind an [`Arc`], made on another thread when it is large.
 
+use crate::material::LobeModel;
 use eframe::egui;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -23,6 +24,12 @@ impl<T: Same> Same for Option<T> {
             (None, None) => true,
             _ => false,
         }
+    }
+}
+
+impl Same for LobeModel {
+    fn same(&self, other: &Self) -> bool {
+        self == other
     }
 }
 

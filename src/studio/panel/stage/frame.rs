@@ -82,6 +82,7 @@ impl FrameCache {
                 },
                 vertex_colours: on_vertices.and_then(|laid| laid.vertices.clone()),
                 lobe_strength: if model.edits.fit.has_lobe() { 1.0 } else { 0.0 },
+                lobe: model.edits.fit.lobe,
                 light: first,
                 other_light: second,
                 quantity: quantity(project, layer),

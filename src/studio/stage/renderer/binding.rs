@@ -32,7 +32,7 @@ impl StageRenderer {
             TextureView(&light.layers.view),
             TextureView(&other.map.view),
             TextureView(&other.layers.view),
-            TextureView(&self.reflectance.view),
+            TextureView(&light.reflectances.view),
         ];
         bind(&self.maker.device, &self.pipelines.light_layout, &resources)
     }
