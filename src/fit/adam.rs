@@ -6,7 +6,6 @@
 use crate::material::lobe::MIN_WIDTH;
 use crate::material::{Material, TexelGradient};
 use crate::math::adam::{Decay, LARGEST_GRADIENT};
-use crate::math::parallel;
 use rayon::prelude::*;
 
 /// The second moment forgets sooner than in the paper: a fit is a few hundred steps.
@@ -34,10 +33,6 @@ pub struct TexelRates {
     pub specular: f32,
     /// Of the logarithm of the microfacet width.
     pub log_width: f32,
-    /// The share of the second moment, in [0, 1], that is the square of the step's mean gradient over all texels it
-    /// touched; 0 is plain Adam. With it a texel of which a step says little moves little, where plain Adam's first steps
-    /// are full ones, whatever the gradient.
-    pub common: f32,
 }
 
 impl Moments {
@@ -66,8 +61,6 @@ impl Moments {
             _ => rates.log_width,
         };
         let log_min = MIN_WIDTH.ln();
-        let common =
-            if rates.common > 0.0 { mean_sizes(gradient).map(|size| rates.common * size * size) } else { [0.0; 7] };
         texels
             .par_iter_mut()
             .zip(gradient)
@@ -87,7 +80,7 @@ impl Moments {
                 let (mut numbers, d_numbers) = (texel.to_array(), own.d_material.to_array());
                 for number in 0..7 {
                     let moments = (&mut first[number], &mut second[number]);
-                    let direction = update(d_numbers[number], moments, corrections, (rates.common, common[number]));
+                    let direction = update(d_numbers[number], moments, corrections);
                     let moved = numbers[number] - rate_of(number) * direction;
                     numbers[number] = if number == 6 { moved.clamp(log_min, 0.0) } else { moved.clamp(0.0, 1.0) };
                 }
@@ -136,26 +129,8 @@ impl Moments {
     /// One plain number, the first of a group: returns its step before the rate.
     pub fn direction_of(&mut self, group: usize, gradient: f32) -> f32 {
         let corrections = count_update(&mut self.updates[group]);
-        update(gradient, (&mut self.first[group][0], &mut self.second[group][0]), corrections, (0.0, 0.0))
+        update(gradient, (&mut self.first[group][0], &mut self.second[group][0]), corrections)
     }
-}
-
-/// Mean absolute value of each of the seven numbers over the texels that a gradient touched.
-fn mean_sizes(gradient: &[TexelGradient<f32>]) -> [f32; 7] {
-    let of_chunk = |_: usize, texels: &[TexelGradient<f32>]| {
-        let (mut sums, mut count) = ([0.0f64; 7], 0.0f64);
-        for own in texels.iter().filter(|own| own.evidence != 0.0 && is_sound(own)) {
-            let numbers = own.d_material.to_array();
-            (0..7).for_each(|number| sums[number] += f64::from(numbers[number].abs()));
-            count += 1.0;
-        }
-        (sums, count)
-    };
-    // Chunks of one size, added in their order: the same bits whatever the number of threads.
-    let sums = parallel::map_chunks(gradient, 1 << 14, of_chunk);
-    let count = sums.iter().fold(0.0, |total, (_, count)| total + count);
-    let total = sums.iter().fold([0.0f64; 7], |total, (sums, _)| std::array::from_fn(|k| total[k] + sums[k]));
-    total.map(|sum| (sum / count.max(1.0)) as f32)
 }
 
 /// Whether a gradient is finite and of a size that moments can hold.
@@ -170,18 +145,11 @@ fn count_update(updates: &mut f32) -> (f32, f32) {
     (1.0 / (1.0 - DECAY.first.powf(*updates)), 1.0 / (1.0 - DECAY.second.powf(*updates)))
 }
 
-/// Takes a gradient into both moments and returns the direction of the step. `common` is the share of the second moment
-/// that others set, and that share of it.
+/// Takes a gradient into both moments and returns the direction of the step.
 #[inline(always)]
-fn update(
-    gradient: f32,
-    (first, second): (&mut f32, &mut f32),
-    corrections: (f32, f32),
-    (share, common): (f32, f32),
-) -> f32 {
+fn update(gradient: f32, (first, second): (&mut f32, &mut f32), corrections: (f32, f32)) -> f32 {
     DECAY.accumulate(gradient, first, second);
-    let squared = (1.0 - share) * (*second * corrections.1) + common;
-    *first * corrections.0 / (squared.sqrt() + EPSILON)
+    *first * corrections.0 / ((*second * corrections.1).sqrt() + EPSILON)
 }
 
 #[cfg(test)]
@@ -195,7 +163,7 @@ mod tests {
         let start = texels[1];
         let goal = [0.2, 0.9, 0.4, 0.0, 1.0, 0.3, -2.0];
         let mut moments = Moments::zeros(2);
-        let rates = TexelRates { diffuse: 0.02, specular: 0.02, log_width: 0.05, common: 0.0 };
+        let rates = TexelRates { diffuse: 0.02, specular: 0.02, log_width: 0.05 };
         for step in 0..600 {
             let mut gradient = vec![TexelGradient::default(); 2];
             let numbers = texels[0].to_array();
@@ -206,7 +174,6 @@ mod tests {
                 diffuse: rates.diffuse * fade,
                 specular: rates.specular * fade,
                 log_width: rates.log_width * fade,
-                ..rates
             };
             assert_eq!(moments.step_texels(&mut texels, &mut gradient, rates), 0);
             assert_eq!(gradient[0], TexelGradient::default(), "the gradient is cleared");
@@ -218,31 +185,11 @@ mod tests {
     }
 
     #[test]
-    fn a_texel_of_which_a_first_step_says_little_moves_little_where_moments_are_in_common() {
-        let first_step = |common: f32| {
-            let mut texels = vec![Material { log_width: -1.0, ..Material::from_array([0.5f32; 7]) }; 3];
-            let sizes = [1e-7f32, 1e-9, 0.0];
-            let of_size = |size| TexelGradient { d_material: Material::from_array([size; 7]), evidence: size };
-            let mut gradient = sizes.map(of_size);
-            let rates = TexelRates { diffuse: 0.1, specular: 0.1, log_width: 0.1, common };
-            assert_eq!(Moments::zeros(3).step_texels(&mut texels, &mut gradient, rates), 0);
-            assert_eq!((texels[2].diffuse[0], texels[2].log_width), (0.5, -1.0), "nothing touched it");
-            [0, 1].map(|texel| (0.5 - texels[texel].diffuse[0], -1.0 - texels[texel].log_width))
-        };
-        let [strong, weak] = first_step(0.0);
-        assert!((strong.0 - 0.1).abs() < 1e-6 && (weak.0 - 0.1).abs() < 1e-6, "{strong:?} {weak:?}");
-        let [strong, weak] = first_step(0.5);
-        // The mean over both that were touched is 5.05e-8: by the strong one's root of (1 + 0.505^2) / 2.
-        assert!((strong.0 - 0.1 / (0.5 * (1.0f32 + 0.505 * 0.505)).sqrt()).abs() < 1e-5, "{strong:?}");
-        assert!(weak.0 < 0.003 && weak.0 > 0.0 && (weak.0 - weak.1).abs() < 1e-6, "{weak:?}");
-    }
-
-    #[test]
     fn a_gradient_that_is_not_finite_is_counted_and_left_out() {
         let mut texels = vec![Material::from_array([0.5f32; 7])];
         let mut gradient = vec![TexelGradient { d_material: Material::from_array([f32::NAN; 7]), evidence: f32::NAN }];
         let mut moments = Moments::zeros(1);
-        let rates = TexelRates { diffuse: 0.1, specular: 0.1, log_width: 0.1, common: 0.5 };
+        let rates = TexelRates { diffuse: 0.1, specular: 0.1, log_width: 0.1 };
         assert_eq!(moments.step_texels(&mut texels, &mut gradient, rates), 1);
         assert_eq!(texels[0], Material::from_array([0.5; 7]));
         assert_eq!(moments, Moments::zeros(1));

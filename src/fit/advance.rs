@@ -44,13 +44,11 @@ impl Fitter {
     pub(super) fn move_parameters(&mut self, stage: &Stage, sums: &StepSums) {
         let Some(work) = &mut self.work else { return };
         let rate = stage.rate(self.state.step_in_stage, self.settings.final_rate);
-        let of_maps = rate * stage.share_of_maps();
-        let free = if stage.kind == StageKind::Diffuse { 0.0 } else { of_maps };
+        let free = if stage.kind == StageKind::Diffuse { 0.0 } else { rate };
         let rates = TexelRates {
-            diffuse: of_maps * self.settings.rate_diffuse,
+            diffuse: rate * self.settings.rate_diffuse,
             specular: free * self.settings.rate_specular,
             log_width: free * self.settings.rate_roughness,
-            common: stage.common_moment(),
         };
         let base = &mut work.gradient.texels.levels[0].texels;
         let texels = self.state.moments.step_texels(&mut self.state.texels, base, rates);

@@ -66,7 +66,6 @@ reaches! {
     solver_grid: Fit,
     solver_levels: Fit,
     solver_choices: Fit,
-    solver_polish: NextSteps,
     solver_refine: NextSteps,
     held_out_interval: NextSteps,
     exclude: StageWork,

@@ -99,13 +99,6 @@ impl FitSettings {
                 "leave out --method, and settings that are Adam's alone, such as --samples",
             );
         }
-        if self.solver_polish > 0 {
-            return wrong(
-                "solver-polish",
-                "its steps move the maps, which are to be kept",
-                "leave out --solver-polish",
-            );
-        }
         Ok(())
     }
 
@@ -160,7 +153,6 @@ mod tests {
         for (name, wrong) in [
             ("fixed-light", FitSettings { fixed_light: true, ..base() }),
             ("method", FitSettings { method: Method::Adam, ..base() }),
-            ("solver-polish", FitSettings { solver_polish: 5, ..base() }),
         ] {
             let error = wrong.validate().unwrap_err();
             assert_eq!((error.kind(), error.place()), (ErrorKind::InvalidSetting, &Place::Setting(name.into())));

@@ -30,7 +30,7 @@ impl Method {
     }
 }
 
-/// Settings that say nothing to the solver, unless it polishes.
+/// Settings that say nothing to the solver.
 const OF_ADAM: [&str; 18] = [
     "steps",
     "steps-diffuse",

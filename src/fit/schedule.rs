@@ -21,8 +21,6 @@ pub enum StageKind {
     Maps,
     /// The solver makes diffuse maps of full size from whole pixels.
     Refine,
-    /// Optimiser steps on everything, after the solver's maps.
-    Polish,
 }
 
 impl StageKind {
@@ -67,7 +65,6 @@ impl Stage {
             StageKind::NarrowLight => "narrow light",
             StageKind::Maps => "maps",
             StageKind::Refine => "refine",
-            StageKind::Polish => "polish",
         };
         if self.photo_level == 0 && !matches!(self.kind, StageKind::Diffuse | StageKind::All) {
             return kind.into();
@@ -82,27 +79,12 @@ impl Stage {
         final_rate + (1.0 - final_rate) * 0.5 * (1.0 + (std::f32::consts::PI * progress).cos())
     }
 
-    /// The share of the step sizes that maps are moved by. What polishing begins with is near: full steps only add
-    /// noise to it, which takes most of the polishing to settle.
-    pub fn share_of_maps(&self) -> f32 {
-        if self.kind == StageKind::Polish { 0.25 } else { 1.0 }
-    }
-
-    /// The share of texels' second moment that is common to all, see
-    /// [`TexelRates::common`](super::adam::TexelRates::common). A step of polishing sees a texel by a few pixels, and all of
-    /// them by little more than twenty: plain Adam's first steps of full size would stay as noise.
-    pub fn common_moment(&self) -> f32 {
-        if self.kind == StageKind::Polish { 0.5 } else { 0.0 }
-    }
-
     /// Strength of the specular lobe at a step of this stage: rises linearly over the first `ramp` steps of its kind.
     pub fn lobe_strength(&self, step: usize, ramp: usize) -> f32 {
         match self.kind {
             StageKind::Diffuse => 0.0,
             StageKind::All if ramp == 0 => 1.0,
-            StageKind::WideLight | StageKind::NarrowLight | StageKind::Maps | StageKind::Refine | StageKind::Polish => {
-                1.0
-            }
+            StageKind::WideLight | StageKind::NarrowLight | StageKind::Maps | StageKind::Refine => 1.0,
             StageKind::All => ((self.steps_before + step + 1) as f32 / ramp as f32).min(1.0),
         }
     }
@@ -184,7 +166,7 @@ fn add_stage(stages: &mut Vec<Stage>, position: &Position, before: usize, end: u
 /// the result is `plan`.
 ///
 /// # Errors
-/// `InvalidSetting` at `steps-diffuse`, `steps-all` or `solver-polish` when fewer steps are asked for than are done, or
+/// `InvalidSetting` at `steps-diffuse`, `steps-all` or `solver-rounds` when fewer steps are asked for than are done, or
 /// when the step they belong to is over; without a place when `plan` is not one of these settings at all.
 pub fn revised(settings: &FitSettings, plan: &[Stage], stage: usize, step_in_stage: usize) -> Result<Vec<Stage>> {
     let foreign = || {
@@ -197,7 +179,7 @@ pub fn revised(settings: &FitSettings, plan: &[Stage], stage: usize, step_in_sta
         (None, Some(last)) => (plan.len() - 1, last.steps),
         (None, None) => return Err(foreign()),
     };
-    let share = SolverShare::of(settings).as_begun(&plan[..=stage], settings.map_size);
+    let share = SolverShare::of(settings).as_begun(&plan[..=stage]);
     let positions = positions(settings, share);
     let is_at = |stage: &Stage, position: &Position| {
         (stage.kind, stage.photo_level, stage.map_size, stage.visit)
@@ -264,7 +246,6 @@ fn of_steps(settings: &FitSettings, kind: StageKind, message: String) -> Error {
         (StageKind::Diffuse, _) => "steps-diffuse",
         (StageKind::All, _) => "steps-all",
         (StageKind::Refine, _) => "solver-refine",
-        (StageKind::Polish, _) => "solver-polish",
         _ => "solver-rounds",
     };
     Error::new(ErrorKind::InvalidSetting, message)

@@ -186,11 +186,6 @@ pub struct FitSettings {
     /// What becomes of the judgement of held-out views on lobes, interreflection and resolution of the environment.
     #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
     pub solver_choices: Choosing,
-    /// Refinement steps of Adam after the solver, on all maps and the environment along gradients of the path tracer.
-    ///
-    /// Where its model holds, they make maps worse.
-    #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().solver_polish))]
-    pub solver_polish: usize,
     /// Whole-pixel refinement after the solver: descents over all texels from all pixels of full size, edges included, with a
     /// gain for each photo and channel, and noise and smoothness learned from the photos; 0 leaves it out.
     ///
@@ -240,7 +235,6 @@ impl Default for FitSettings {
             solver_grid: 256,
             solver_levels: 2,
             solver_choices: Choosing::Tell,
-            solver_polish: 0,
             solver_refine: 1,
             held_out_interval: 10,
             exclude: Vec::new(),
@@ -257,12 +251,11 @@ impl FitSettings {
     /// Whether the finest maps are made by what follows the solver's tiles alone: tiles of full size take most of the time
     /// where photos have many pixels, and find narrower lobes where they have few.
     pub fn is_refined(&self) -> bool {
-        self.solver_polish > 0 || (self.solver_refine > 0 && self.solver_levels > FitSettings::default().solver_levels)
+        self.solver_refine > 0 && self.solver_levels > FitSettings::default().solver_levels
     }
 
-    /// Takes over whether others refine the solver's maps, and how.
-    pub fn polish_as(&mut self, other: &FitSettings) {
-        self.solver_polish = other.solver_polish;
+    /// Takes over on which levels and grids the solver works, and what refines its maps.
+    pub fn solve_as(&mut self, other: &FitSettings) {
         self.solver_refine = other.solver_refine;
         self.solver_levels = other.solver_levels;
         self.solver_grid = other.solver_grid;

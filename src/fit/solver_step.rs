@@ -1,8 +1,8 @@
 //! The solver's steps as steps of a fit: same state, same history, same checkpoint.
 //!
 //! A step is a round on the light, or all maps. What it needs and no checkpoint holds, the traced cache, is made before
-//! the first step, and again after a resume. Steps that polish what it found are Adam's ([`super::advance`]). Nothing is
-//! random but by the seed, so a fit that is taken up goes on bit for bit.
+//! the first step, and again after a resume. Nothing is random but by the seed, so a fit that is taken up goes on bit for
+//! bit.
 
 use super::fitter::{Fitter, StepOutcome};
 use super::schedule::{Stage, StageKind};
@@ -117,7 +117,7 @@ impl Fitter {
     pub fn transport_error(&self, stop: &AtomicBool) -> Option<TransportError> {
         let solver = self.solver.as_ref()?;
         let (mut texels, mut size) = (self.state.texels.clone(), self.state.map_size);
-        // Maps that were polished may be finer than those the solver has footprints for.
+        // Those of a fit that was cut short may be finer than those the solver has footprints for.
         while size > solver.settings.map_size {
             (texels, size) = (halved(&texels, size), size / 2);
         }

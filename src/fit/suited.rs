@@ -72,7 +72,7 @@ impl Suited {
         self.apply(&mut settings, chosen);
         if settings.method == Method::Adam {
             // What the solver would do is no setting of such a run.
-            settings.polish_as(asked);
+            settings.solve_as(asked);
         }
         settings
     }
@@ -107,11 +107,7 @@ impl Suited {
             told.push(Taken { sentence, setting, otherwise, does });
         };
         if asked.method == Method::Automatic && settings.method == Method::Solver {
-            let polished = match settings.solver_polish {
-                0 => String::new(),
-                steps => format!(", then {steps} refinement steps of Adam"),
-            };
-            tell(format!("Using the solver{polished}"), "method", "adam".into(), "takes Adam only");
+            tell("Using the solver".into(), "method", "adam".into(), "takes Adam only");
         }
         if settings.lobe != asked.lobe {
             let sentence = format!("Lobes are {}", settings.lobe.label());
@@ -272,8 +268,6 @@ mod tests {
         let all = told(&usual, &[]);
         assert_eq!(all.len(), 3, "{all:?}");
         assert!(all[0].contains("solver") && all[1].contains("gain") && all[2].contains("512 x 512"), "{all:?}");
-        let polished = FitSettings { solver_polish: 7, ..usual.clone() };
-        assert!(told(&polished, &["solver-polish"])[0].contains("then 7 refinement steps"));
         let solver = FitSettings { method: Method::Solver, ..usual.clone() };
         assert_eq!(told(&solver, &["exposure", "map-size"]), Vec::<String>::new());
         let as_it_is = FitSettings { exposure: true, map_size: 256, ..solver };

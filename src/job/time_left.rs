@@ -44,7 +44,7 @@ fn relative_cost(plan: &[Stage], stage: &Stage, step: usize) -> f64 {
             StageKind::WideLight | StageKind::NarrowLight => shrunk.sqrt(),
             StageKind::Maps => 10.0 * shrunk * shrunk.sqrt(),
             StageKind::Refine => 10.0,
-            StageKind::Diffuse | StageKind::All | StageKind::Polish => 0.3,
+            StageKind::Diffuse | StageKind::All => 0.3,
         }
 }
 
@@ -72,22 +72,6 @@ mod tests {
             }
         };
         steps.enumerate().map(row).collect()
-    }
-
-    #[test]
-    fn polishing_after_the_solver_is_not_counted_like_its_rounds() {
-        let settings =
-            FitSettings { method: Method::Solver, solver_polish: 80, map_size: 512, ..FitSettings::default() };
-        let plan = stages(&settings);
-        // Twice as slow a machine as that of the costs.
-        let whole = history(&plan, |stage, step| 2.0 * relative_cost(&plan, stage, step));
-        let total = whole.last().unwrap().seconds;
-        for done in 1..whole.len() {
-            let (_, left) = pace(&plan, &whole[..done]);
-            let truth = total - whole[done - 1].seconds;
-            assert!((left - truth).abs() < 1e-6 * total, "after {done}: {left} for {truth}");
-        }
-        assert_eq!(pace(&plan, &whole).1, 0.0);
     }
 
     #[test]

@@ -51,7 +51,6 @@ fn maps_are_kept_to_the_bit_and_a_fit_without_time_leaves_a_whole_run() {
         (["--fixed-light"].as_slice(), "--fixed-light"),
         (&["--method", "paper"], "--method"),
         (&["--map-size", "64"], "--map-size"),
-        (&["--solver-polish", "5"], "--solver-polish"),
     ] {
         let refused = fit(&place, &third, &[&["--maps", first.to_str().unwrap()], more].concat());
         assert_eq!(refused.status.code(), Some(1), "{more:?}: {}", words(&refused));

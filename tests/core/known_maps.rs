@@ -171,7 +171,7 @@ fn run_folder(path: &Path, lobe: LobeModel) -> RunSettings {
         lobe,
     };
     folder.write_result(&result).unwrap();
-    let fit = FitSettings { lobe, solver_polish: 1, ..free() };
+    let fit = FitSettings { lobe, ..free() };
     folder.write_settings(&RunSettings { fit, ..Default::default() }).unwrap();
     drop(scene);
     RunSettings { known_maps: path.into(), fit: free(), ..Default::default() }

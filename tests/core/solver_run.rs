@@ -98,31 +98,6 @@ fn a_fit_that_is_taken_up_goes_on_bit_for_bit_whatever_the_threads() {
 }
 
 #[test]
-fn polishing_moves_everything_keeps_what_is_known_and_goes_on_bit_for_bit() {
-    let settings = FitSettings { solver_polish: 3, ..base() };
-    let mut whole = new_fitter(&settings);
-    run(&mut whole).unwrap();
-    let stages: Vec<&str> = whole.state().losses.iter().skip(6).map(|row| row.stage.as_str()).collect();
-    assert_eq!(stages, ["maps", "refine", "polish", "polish", "polish"]);
-    let mut before = new_fitter(&settings);
-    (0..STAGES.len()).for_each(|_| drop(before.step(&GO).unwrap()));
-    assert!(whole.state().variances == before.state().variances && whole.deviations().is_some());
-    assert!(whole.state().light != before.state().light);
-    for number in 0..7 {
-        let moved =
-            |fitter: &Fitter| fitter.state().texels.iter().map(|texel| texel.to_array()[number]).collect::<Vec<f32>>();
-        assert_ne!(moved(&whole), moved(&before), "{number}");
-    }
-    assert_taken_up_alike(&settings, &[4, 7, 9], &whole);
-    // More steps may be asked for once it has ended.
-    let mut plain = new_fitter(&base());
-    run(&mut plain).unwrap();
-    plain.change(settings).unwrap();
-    run(&mut plain).unwrap();
-    assert_eq!(plain.state().losses.len(), 11);
-}
-
-#[test]
 fn levels_bring_maps_at_half_size_first_and_go_on_bit_for_bit() {
     let settings = FitSettings { map_size: 256, solver_levels: 3, solver_rounds: 2, ..base() };
     let mut whole = new_fitter(&settings);

@@ -14,7 +14,7 @@ pub const OUTPUT: &str = "Output";
 pub const EXPERT: &str = "Expert";
 
 /// Headings of the settings of a fit; those that are not listed are for experts.
-const HEADINGS: [(&str, &str); 16] = [
+const HEADINGS: [(&str, &str); 15] = [
     ("exclude", SCENE),
     ("environment-height", LIGHT),
     ("background", LIGHT),
@@ -27,7 +27,6 @@ const HEADINGS: [(&str, &str); 16] = [
     ("consistency", METHOD),
     ("steps", METHOD),
     ("solver-choices", METHOD),
-    ("solver-polish", METHOD),
     ("solver-refine", METHOD),
     ("seed", METHOD),
     ("held-out-interval", OUTPUT),

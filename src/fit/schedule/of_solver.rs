@@ -1,4 +1,4 @@
-//! The stages of the solver's method: which maps it makes on photos of which size, and what it leaves to polishing.
+//! The stages of the solver's method: which maps it makes on photos of which size, and what it leaves to the descent.
 
 use super::{Position, Stage, StageKind};
 use crate::fit::settings::FitSettings;
@@ -7,8 +7,8 @@ use crate::fit::settings::FitSettings;
 const LEAST_COARSE_MAP: usize = 128;
 /// Rounds of the solver on the light on each level but the coarsest, where it makes all maps.
 const FINER_ROUNDS: usize = 2;
-/// The same where others make the finest maps.
-const FINER_ROUNDS_BEFORE_POLISHING: usize = 1;
+/// The same where the descent makes the finest maps.
+const FINER_ROUNDS_BEFORE_DESCENT: usize = 1;
 /// Rounds on the coarsest level after its first maps, which tell the lobes they are done with; maps are made anew after
 /// them.
 const ROUNDS_AFTER_MAPS: usize = 1;
@@ -16,20 +16,10 @@ const ROUNDS_AFTER_MAPS: usize = 1;
 /// Who makes the finest maps of the solver's method, where there are coarser ones.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Finest {
-    /// The solver.
-    Solver,
-    /// What follows alone: the descent from whole pixels, or Adam. Tiles of full size take most of the time where photos have
-    /// many pixels.
-    Polish,
-}
-
-/// The size of the solver's maps on halved photos.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum CoarseMaps {
-    /// Halved as often as the photos.
-    Halved,
-    /// Halved once less, as fits with polishing were once begun.
-    Finer,
+    /// Tiles, and then the descent from whole pixels.
+    Tiles,
+    /// The descent alone. Tiles of full size take most of the time where photos have many pixels.
+    Descent,
 }
 
 /// The solver's part in maps of all sizes.
@@ -39,7 +29,6 @@ enum CoarseMaps {
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) struct SolverShare {
     finest: Finest,
-    coarse_maps: CoarseMaps,
     /// Whether the coarsest level is visited twice.
     visits_again: bool,
     /// Rounds on the light on each level but the coarsest.
@@ -50,30 +39,22 @@ impl SolverShare {
     pub(super) fn of(settings: &FitSettings) -> Self {
         let is_refined = settings.is_refined();
         SolverShare {
-            finest: if is_refined { Finest::Polish } else { Finest::Solver },
-            coarse_maps: CoarseMaps::Halved,
+            finest: if is_refined { Finest::Descent } else { Finest::Tiles },
             visits_again: !is_refined,
-            finer_rounds: if is_refined { FINER_ROUNDS_BEFORE_POLISHING } else { FINER_ROUNDS },
+            finer_rounds: if is_refined { FINER_ROUNDS_BEFORE_DESCENT } else { FINER_ROUNDS },
         }
     }
 
-    /// The same once the stages of a plan have begun: what the solver has begun on whole photos is done, maps have the
-    /// sizes they began with, and what was visited again stays so.
-    pub(super) fn as_begun(self, begun: &[Stage], map_size: usize) -> Self {
+    /// The same once the stages of a plan have begun: what the solver has begun on whole photos is done, and what was visited
+    /// again stays so.
+    pub(super) fn as_begun(self, begun: &[Stage]) -> Self {
         let of_solver = || begun.iter().filter(|stage| stage.kind.is_of_solver());
         let has_finest = of_solver().any(|stage| stage.photo_level == 0);
-        let coarse = of_solver().find(|stage| stage.photo_level > 0);
         let coarsest = of_solver().map(|stage| stage.photo_level).max();
         let finer =
             of_solver().find(|stage| stage.kind == StageKind::NarrowLight && Some(stage.photo_level) != coarsest);
         SolverShare {
-            finest: if has_finest { Finest::Solver } else { self.finest },
-            coarse_maps: coarse.map_or(self.coarse_maps, |stage| {
-                match stage.map_size << stage.photo_level == map_size {
-                    true => CoarseMaps::Halved,
-                    false => CoarseMaps::Finer,
-                }
-            }),
+            finest: if has_finest { Finest::Tiles } else { self.finest },
             visits_again: self.visits_again || of_solver().any(|stage| stage.visit > 0),
             finer_rounds: finer.map_or(self.finer_rounds, |stage| stage.steps_of_kind),
         }
@@ -83,15 +64,12 @@ impl SolverShare {
 /// Light and maps on the coarsest level, twice where the solver makes all maps; on each finer one some rounds more, and
 /// maps anew. What is done on the coarsest is cheap, and the second maps know which lobes the first have shown.
 pub(super) fn positions_of_solver(settings: &FitSettings, share: SolverShare) -> Vec<Position> {
-    let SolverShare { finest, coarse_maps, visits_again, finer_rounds } = share;
+    let SolverShare { finest, visits_again, finer_rounds } = share;
     if settings.fixed_maps {
         return positions_with_fixed_maps(settings);
     }
     let mut positions: Vec<Position> = Vec::new();
-    let map_size_at = |photo_level: usize| match coarse_maps {
-        CoarseMaps::Halved => settings.map_size >> photo_level,
-        CoarseMaps::Finer => settings.map_size >> photo_level.saturating_sub(1),
-    };
+    let map_size_at = |photo_level: usize| settings.map_size >> photo_level;
     let mut add = |kind: StageKind, total: usize, photo_level: usize| {
         let map_size = map_size_at(photo_level);
         if total > 0 {
@@ -111,13 +89,12 @@ pub(super) fn positions_of_solver(settings: &FitSettings, share: SolverShare) ->
         add(StageKind::NarrowLight, ROUNDS_AFTER_MAPS, coarsest);
         add(StageKind::Maps, 1, coarsest);
     }
-    let finest = usize::from(finest == Finest::Polish);
+    let finest = usize::from(finest == Finest::Descent);
     for level in (finest..coarsest).rev() {
         add(StageKind::NarrowLight, finer_rounds, level);
         add(StageKind::Maps, 1, level);
     }
     add(StageKind::Refine, settings.solver_refine, 0);
-    add(StageKind::Polish, settings.solver_polish, 0);
     positions
 }
 

@@ -105,32 +105,6 @@ fn the_solver_visits_the_smallest_size_twice_and_keeps_its_plan_wherever_it_is()
     assert_eq!(names[5..], ["narrow light", "maps"]);
     for (stage, step) in walk(&plan) {
         assert_eq!(revised(&settings, &plan, stage, step).unwrap(), plan, "{stage}, {step}");
-        let polished = FitSettings { solver_polish: 3, ..settings.clone() };
-        let revised = revised(&polished, &plan, stage, step).unwrap();
-        // Polishing makes the finest maps, unless the solver has begun them, and needs no second visit that has not begun.
-        let kept = match stage {
-            0..3 => 3,
-            3..5 => 5,
-            _ => plan.len(),
-        };
-        assert_eq!((revised.len(), revised.last().unwrap().steps), (kept + 1, 3), "{stage}, {step}");
-        assert_eq!(revised[..kept], plan[..kept], "{stage}, {step}");
-        assert_eq!((revised[kept].kind, revised[kept].map_size), (StageKind::Polish, 256));
-    }
-    let polished = FitSettings { solver_polish: 3, ..settings.clone() };
-    let plan_with = stages(&polished);
-    let names: Vec<String> = plan_with.iter().map(Stage::name).collect();
-    assert_eq!(names, ["wide light 1/2", "narrow light 1/2", "maps 1/2", "polish"]);
-    for (stage, step) in walk(&plan_with) {
-        assert_eq!(revised(&polished, &plan_with, stage, step).unwrap(), plan_with, "{stage}, {step}");
-    }
-    // Left out once more, it is as if it had never been asked for.
-    assert_eq!(revised(&settings, &plan_with, 2, 0).unwrap(), plan);
-    // A fit begun with full maps on halved photos and a second visit goes on with both.
-    let mut full = revised(&polished, &plan, 4, 0).unwrap();
-    full.iter_mut().for_each(|stage| stage.map_size = 256);
-    for (stage, step) in walk(&full).into_iter().filter(|(stage, _)| *stage >= 3) {
-        assert_eq!(revised(&polished, &full, stage, step).unwrap(), full, "{stage}, {step}");
     }
     // On finer ones there is one round on the light for two, but where two have begun.
     let three = FitSettings { solver_levels: 3, map_size: 512, ..settings.clone() };
@@ -139,13 +113,12 @@ fn the_solver_visits_the_smallest_size_twice_and_keeps_its_plan_wherever_it_is()
         let own = plan.iter().filter(|stage| stage.kind == StageKind::NarrowLight && stage.photo_level == level);
         own.map(|stage| stage.steps).sum::<usize>()
     };
-    let three_polished = FitSettings { solver_polish: 3, ..three };
-    assert_eq!([rounds(&begun, 1), rounds(&stages(&three_polished), 1)], [2, 1]);
-    assert_eq!(rounds(&revised(&three_polished, &begun, 5, 1).unwrap(), 1), 2);
+    let of_descent = FitSettings { solver_refine: 1, solver_levels: 4, ..three.clone() };
+    assert_eq!([rounds(&begun, 1), rounds(&stages(&of_descent), 1)], [2, 1]);
     // Without coarser maps the solver makes what there is, twice as well.
-    let small = stages(&FitSettings { map_size: 64, ..polished });
+    let small = stages(&FitSettings { map_size: 64, ..settings.clone() });
     let names: Vec<String> = small.iter().map(Stage::name).collect();
-    assert_eq!(names, ["wide light", "narrow light", "maps", "narrow light", "maps", "polish"]);
+    assert_eq!(names, ["wide light", "narrow light", "maps", "narrow light", "maps"]);
     // A fit begun without the second visit goes on: with it before its turn, without it after.
     let once: Vec<Stage> = [0, 1, 2, 5, 6].map(|number| plan[number]).to_vec();
     assert_eq!(revised(&settings, &once, 1, 1).unwrap(), plan);

@@ -180,7 +180,6 @@ pub fn stage_words(stage: &str) -> String {
     let words = match kind {
         "wide light" => "Light (coarse)".to_owned(),
         "narrow light" => "Light (fine)".to_owned(),
-        "polish" => "Refinement".to_owned(),
         other => crate::studio::model::log::capitalised(other),
     };
     words + &level
@@ -343,7 +342,6 @@ mod tests {
             ("maps 1/4", "Maps ¼"),
             ("diffuse 1/1", "Diffuse"),
             ("all 1/16", "All 1/16"),
-            ("polish", "Refinement"),
         ] {
             assert_eq!(stage_words(stage), words);
         }

@@ -119,7 +119,7 @@ fn presets(ui: &mut Ui, model: &mut Model) {
         let mut settings = FitSettings::preset(preset);
         match model.project.as_ref().and_then(|project| project.suited.as_ref()) {
             Some(suited) => settings = suited.resolve(&settings, &[]),
-            None => settings.polish_as(&own),
+            None => settings.solve_as(&own),
         }
         settings
     };

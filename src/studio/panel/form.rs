@@ -93,14 +93,10 @@ fn grid<'a>(
     });
 }
 
-/// Settings that only Adam's two steps read; the solver's refinement reads the other ones of Adam too.
-const OF_TWO_STEPS: [&str; 6] = ["steps", "steps-diffuse", "steps-all", "consistency", "levels", "lobe-ramp"];
-
 /// Whether a fit with these settings reads the one of this name.
 fn is_read(name: &str, settings: &FitSettings) -> bool {
     match settings.method {
         Method::Adam => !name.starts_with("solver-"),
-        Method::Solver | Method::Automatic if settings.solver_polish > 0 => !OF_TWO_STEPS.contains(&name),
         Method::Solver | Method::Automatic => !Method::means_adam(&[name.to_owned()]),
     }
 }
@@ -110,7 +106,6 @@ pub fn words(name: &str) -> String {
     let named = [
         ("solver-rounds", "Light iterations"),
         ("solver-refine", "Whole-pixel refinement"),
-        ("solver-polish", "Refinement steps (Adam)"),
         ("bounces", "Max bounces"),
         ("exposure", "Per-photo exposure compensation"),
         ("background", "Background pixels"),

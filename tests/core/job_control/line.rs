@@ -89,15 +89,14 @@ fn photos_are_given_to_the_solver_unless_something_else_was_asked_for() {
     assert_eq!(of(&bytes, &[]), Method::Solver);
     assert_eq!(of(&bytes, &["--method", "paper"]), Method::Adam);
     assert_eq!(of(&bytes, &["--samples", "8"]), Method::Adam, "paths a pixel are Adam's");
-    let polish = |scene: &Scene, more: &[&str]| {
+    let solved = |scene: &Scene, more: &[&str]| {
         let settings = suited(scene, None, &[&["--method", "solver"], more].concat());
-        (settings.solver_refine, settings.solver_polish, settings.solver_levels, settings.solver_grid)
+        (settings.solver_refine, settings.solver_levels, settings.solver_grid)
     };
-    assert_eq!((polish(&linear, &[]), polish(&bytes, &[])), ((1, 0, 2, 256), (1, 0, 2, 256)), "alike");
-    assert_eq!(polish(&linear, &["--solver-polish", "5"]), (1, 5, 2, 256));
-    assert_eq!(polish(&bytes, &["--solver-refine", "0"]), (0, 0, 2, 256));
-    assert_eq!(polish(&bytes, &["--solver-levels", "1"]), (1, 0, 1, 256));
-    assert_eq!(polish(&bytes, &["--solver-grid", "128"]), (1, 0, 2, 128));
+    assert_eq!((solved(&linear, &[]), solved(&bytes, &[])), ((1, 2, 256), (1, 2, 256)), "alike");
+    assert_eq!(solved(&bytes, &["--solver-refine", "0"]), (0, 2, 256));
+    assert_eq!(solved(&bytes, &["--solver-levels", "1"]), (1, 1, 256));
+    assert_eq!(solved(&bytes, &["--solver-grid", "128"]), (1, 2, 128));
 
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("settings.toml");
