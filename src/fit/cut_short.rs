@@ -31,15 +31,24 @@ impl Fitter {
     }
 
     /// Ends the fit with what there is, and with what the step that was stopped had reached by then: maps grow to their
-    /// full size. The cheapest that is a whole result, in no time beside a step.
+    /// full size, and holes in the light are filled. The cheapest that is a whole result, in no time beside a step.
     ///
     /// The state is then that of a fit at its end: a checkpoint to go on from has to be written before.
     pub(crate) fn cut_short(&mut self, reached: Option<Reached>) {
         let Some(stage) = self.stage().copied() else { return };
         // How well maps are known that a descent was half done with nothing tells.
         let knows_deviations = reached.is_none() && self.deviations_are_known();
-        if let Some(reached) = reached.filter(|_| stage.kind.is_of_solver()) {
-            reached.put_into(&mut self.state);
+        if stage.kind.is_of_solver() {
+            let state = &mut self.state;
+            match reached {
+                // A descent begins at a light without holes.
+                Some(reached) => reached.put_into(state),
+                None => {
+                    if let Some(solver) = &self.solver {
+                        solver.fill_holes(&mut state.light);
+                    }
+                }
+            }
         }
         self.grow_maps(self.settings.map_size);
         if !knows_deviations {

@@ -67,6 +67,10 @@ impl Fitter {
             let log_gains = views.iter().copied().zip(log_gains(gains)).collect();
             watch(&Underway { texels, map_size, light, light_size, log_gains });
         });
+        if report.is_some() && whole.fixed_maps && self.steps_total() == self.state.step + 1 {
+            // Else before maps are made under the light.
+            solver.fill_holes(&mut estimate.light);
+        }
         let held_out = report.as_ref().map(|_| solver.held_out_rmse(&self.scene, &estimate));
         self.take_estimate(&solver, estimate);
         self.solver = Some(solver);

@@ -128,14 +128,7 @@ impl SolverScene {
             let radiance = radiance.iter().sum::<f32>().max(0.0) / 3.0;
             if *scatter > 0.0 { radiance / (radiance + scatter) } else { 1.0 }
         };
-        let mut shown = vec![0.0f32; self.transport.basis.count()];
-        for pixel in &self.background {
-            let trust = trust(pixel);
-            for (&texel, &weight) in pixel.tap.index.iter().zip(&pixel.tap.weight) {
-                shown[texel as usize] += trust * weight;
-            }
-        }
-        shown.into_iter().map(|shown| shown.min(1.0)).collect()
+        self.shown_by_background(trust).into_iter().map(|shown| shown.min(1.0)).collect()
     }
 }
 

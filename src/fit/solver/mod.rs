@@ -13,7 +13,8 @@
 //! 4. [`light_step`]: the light from those rows, added up ([`normal_equations`]), at least zero ([`non_negative`]), in
 //!    wide and narrow hats ([`light_shape`]), with a weak wish for smoothness but for suns ([`light_suns`]).
 //!    [`light_round`] is the round as a whole, [`light_evidence`] says what each texel of the light is known by,
-//!    `gains` of photos whose exposures differ; `first_maps` of texels that no block was solved for.
+//!    `light_holes` fills what lies between texels that photos show; `gains` of photos whose exposures differ; `first_maps`
+//!    of texels that no block was solved for.
 //! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`) with the footprints of pixels, where the evidence,
 //!    as far as it is independent (`tile_independence`), decides which texels share a lobe ([`lobe_tree`],
 //!    [`lobe_evidence`], [`lobe_prior`], [`lobe_sums`], [`lobe_widths`], [`lobe_families`]).
@@ -44,6 +45,7 @@ mod gains;
 mod given_maps;
 mod light_colour;
 pub mod light_evidence;
+mod light_holes;
 mod light_reach;
 pub mod light_round;
 mod light_scale;

@@ -20,7 +20,7 @@ use std::sync::atomic::AtomicBool;
 pub enum SolverStep {
     /// A round on the light, counted from 0 over wide and narrow hats.
     Light(usize),
-    /// All maps, under the light as it is.
+    /// All maps, under the light with its holes filled.
     Maps,
     /// All texels at once, from whole pixels.
     Refine,
@@ -45,6 +45,7 @@ impl SolverScene {
             SolverStep::Refine => self.refine(estimate, stop, watch),
             SolverStep::Maps => {
                 let mut next = estimate.clone();
+                self.fill_holes(&mut next.light);
                 let report = self.make_maps(&mut next, stop)?;
                 *estimate = next;
                 Some(report)
