@@ -300,6 +300,7 @@ fn decorate(ui: &mut Ui, model: &Model, frame: &StageFrame, rect: Rect, traced: 
         (_, true) if shown == Layer::Photos && model.fit.status.is_live() => {
             "The mean of the photos · materials are on their way"
         }
+        (_, true) if lit && model.fit.status.is_live() => "Materials are on their way",
         (_, true) if lit || shown == Layer::Photos => match model.can_resume() {
             true => "No materials yet. Press Resume.",
             false => "No materials yet. Press Start.",
