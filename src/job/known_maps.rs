@@ -30,11 +30,8 @@ pub fn settle(settings: &mut RunSettings, chosen: &mut Vec<String>) -> Result<()
     let run = read(&settings.known_maps)?;
     let size = run.maps.diffuse.width();
     let is_chosen = |own: &str| chosen.iter().any(|name| name == own);
-    if is_chosen("lobe") && settings.fit.lobe != run.lobe {
-        let message = format!("the maps that are kept are of {} lobes", run.lobe.label());
-        return Err(Error::new(ErrorKind::InvalidSetting, message)
-            .at(Place::Setting("lobe".into()))
-            .remedy("leave out --lobe: the maps keep theirs"));
+    if is_chosen("lobe") {
+        same_lobe(settings, &run)?;
     }
     if is_chosen("map-size") && settings.fit.map_size != size {
         let message = format!("the maps that are kept are {size} x {size}, not {0} x {0}", settings.fit.map_size);
@@ -47,6 +44,17 @@ pub fn settle(settings: &mut RunSettings, chosen: &mut Vec<String>) -> Result<()
     settings.fit.fixed_maps = true;
     chosen.extend(["map-size".into(), "lobe".into()]);
     Ok(())
+}
+
+/// Fails where the maps of a run are of other lobes than those that are fitted.
+fn same_lobe(settings: &RunSettings, run: &RunResult) -> Result<()> {
+    if settings.fit.lobe == run.lobe {
+        return Ok(());
+    }
+    let message = format!("the maps that are kept are of {} lobes", run.lobe.label());
+    Err(Error::new(ErrorKind::InvalidSetting, message)
+        .at(Place::Setting("lobe".into()))
+        .remedy("leave out --lobe: the maps keep theirs"))
 }
 
 /// Reads the run whose maps are kept; its light may be missing.
@@ -92,8 +100,8 @@ pub(super) fn prepare(
 /// The maps that settings name, for a fit on this surface; `None` where they name none.
 ///
 /// # Errors
-/// As of [`read`]; `InvalidScene` when the surface has another atlas than the maps, `InvalidSetting` when maps are to be
-/// kept and none are named.
+/// As of [`read`]; `InvalidScene` when the surface has another atlas than the maps, `InvalidSetting` when they have another
+/// lobe, or maps are to be kept and none are named.
 pub(super) fn of_settings(settings: &RunSettings, surface: &Surface) -> Result<Option<Arc<KnownMaps>>> {
     let run = &settings.known_maps;
     if run.as_os_str().is_empty() {
@@ -102,7 +110,9 @@ pub(super) fn of_settings(settings: &RunSettings, surface: &Surface) -> Result<O
             true => Err(none_given()),
         };
     }
-    let RunResult { maps, times_seen, mesh, .. } = read(run)?;
+    let result = read(run)?;
+    same_lobe(settings, &result)?;
+    let RunResult { maps, times_seen, mesh, .. } = result;
     let own = surface.mesh();
     if own.triangles != mesh.triangles || own.positions != mesh.positions || own.uvs != mesh.uvs {
         return Err(Error::new(ErrorKind::InvalidScene, "the maps to keep lie on another atlas than that of this fit")
