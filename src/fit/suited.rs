@@ -110,9 +110,12 @@ impl Suited {
             tell("Using the solver".into(), "method", "adam".into(), "takes Adam only");
         }
         if settings.lobe != asked.lobe {
-            let sentence = format!("Lobes are {}", settings.lobe.label());
-            let otherwise = if settings.lobe == LobeModel::Ggx { "blinn-phong" } else { "ggx" };
-            tell(sentence, "lobe", otherwise.into(), "takes the others");
+            let sentence = format!("Fitting {} lobes", settings.lobe.label());
+            let (otherwise, does) = match settings.lobe {
+                LobeModel::Ggx => ("blinn-phong", "fits Blinn-Phong"),
+                LobeModel::BlinnPhong => ("ggx", "fits GGX"),
+            };
+            tell(sentence, "lobe", otherwise.into(), does);
         }
         if settings.exposure != asked.exposure {
             let sentence = "Photo exposures differ: exposure compensation is on, a gain per photo";

@@ -4,16 +4,16 @@ use super::{LobeGeometry, blinn_phong, ggx};
 use crate::math::real::Real;
 use serde::{Deserialize, Serialize};
 
-/// The distribution of microfacets and the shadowing that goes with it. `roughness` means `r = a^2` in both, with `a` the
-/// width of the distribution, and both weigh by the same Fresnel factor.
+/// The distribution of microfacets and the shadowing that goes with it ([`blinn_phong`], [`ggx`]). `roughness` means
+/// `r = a^2` in both, with `a` the width of the distribution, and both weigh by the same Fresnel factor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum LobeModel {
-    /// Normalised Blinn-Phong with Schlick's shadowing, as in the paper: [`blinn_phong`].
+    /// Normalised Blinn-Phong with Schlick's shadowing, as in the paper.
     #[default]
     BlinnPhong,
-    /// GGX with height-correlated Smith shadowing, as other renderers have it: [`ggx`].
+    /// GGX with height-correlated Smith shadowing, as other renderers have it.
     Ggx,
 }
 
