@@ -8,7 +8,7 @@ use crate::fit::views::{ViewUse, uses_of};
 use crate::image::file;
 use crate::insight::scores::{aggregate, score_halves};
 use crate::job::benchmark::Drawing;
-use crate::job::pictures::{OpenedLight, light_of, matched, parameters, relit, surface_of};
+use crate::job::pictures::{OpenedLight, light_of, matched, parameters_of_truth, relit, surface_of};
 use crate::job::prepare::RunSettings;
 use crate::job::regions;
 use crate::job::shown::{exposure_of, fully_covered, in_halves};
@@ -216,7 +216,7 @@ fn truth_of(path: &Path, options: &RenderOptions) -> Result<(Scene, Surface, Par
             .at(Place::File(path.into()))
             .remedy("name a run folder made by `patina fit` or `patina demo`"));
     };
-    let own = parameters(&truth.maps, &truth.environment);
+    let own = parameters_of_truth(truth);
     let surface = Surface::new(scene.mesh.clone())?;
     Ok((scene, surface, own))
 }

@@ -13,7 +13,7 @@ use crate::scene::{Background, Scene};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::pictures::parameters_with;
+use super::pictures::{parameters_of_truth, parameters_with};
 
 /// Paths a pixel in the photographs of the demo.
 const PHOTO_SAMPLES: usize = 16;
@@ -77,7 +77,7 @@ pub fn photograph(
         return Err(Error::new(ErrorKind::Internal, "a scene without ground truth cannot be photographed"));
     };
     let surface = Surface::new(scene.mesh.clone())?;
-    let lit = parameters_with(&truth.maps, &truth.environment, truth.lobe);
+    let lit = parameters_of_truth(&truth);
     let settings = PictureSettings {
         samples,
         max_bounces: truth.max_bounces,

@@ -6,7 +6,7 @@
 //! have moved its reflectance by a factor that no photo forbids.
 
 use super::gallery::{NamedLight, drawn, set_light};
-use super::pictures::parameters;
+use super::pictures::parameters_of_truth;
 use super::shown::exposure_of;
 use crate::error::Result;
 use crate::fit::targets::{Target, shrink_picture};
@@ -98,7 +98,7 @@ pub fn entanglement(
     }
     if has_maps && !lights.is_empty() {
         let true_surface = Surface::new(scene.mesh.clone())?;
-        let mut true_lit = parameters(&truth.maps, &truth.environment);
+        let mut true_lit = parameters_of_truth(truth);
         for light in lights {
             set_light(&mut lit, &light.environment);
             set_light(&mut true_lit, &light.environment);

@@ -9,7 +9,7 @@ use crate::material::texels::{PyramidWeights, TexelPyramid, texels_from_maps};
 use crate::material::{LobeModel, MaterialMaps};
 use crate::render::picture::{Picture, PictureSettings, render};
 use crate::render::{Parameters, Surface};
-use crate::scene::Camera;
+use crate::scene::{Camera, Truth};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -28,6 +28,11 @@ pub fn parameters_with(maps: &MaterialMaps, environment: &Environment, lobe: Lob
 /// Maps, light and lobe of a result as the tracer reads them.
 pub fn parameters_of(result: &RunResult) -> Parameters<f32> {
     parameters_with(&result.maps, &result.environment, result.lobe)
+}
+
+/// Maps, light and lobe of a truth as the tracer reads them.
+pub fn parameters_of_truth(truth: &Truth) -> Parameters<f32> {
+    parameters_with(&truth.maps, &truth.environment, truth.lobe)
 }
 
 /// The surface and the parameters of a run folder.

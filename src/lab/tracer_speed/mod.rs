@@ -21,7 +21,7 @@ use self::rays::RaySets;
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::fit::FitSettings;
 use crate::image::Image;
-use crate::job::pictures::parameters;
+use crate::job::pictures::{parameters, parameters_of_truth};
 use crate::lab::study_table::StudyTable;
 use crate::light::Environment;
 use crate::material::{LobeModel, MaterialMaps};
@@ -132,7 +132,7 @@ fn time(scene: &Scene, name: &str, options: &TracerOptions, table: &mut StudyTab
         return Err(Error::new(ErrorKind::InvalidScene, "the scene has no view to time"));
     }
     let (lit, bounces) = match &scene.truth {
-        Some(truth) => (parameters(&truth.maps, &truth.environment), truth.max_bounces),
+        Some(truth) => (parameters_of_truth(truth), truth.max_bounces),
         None => {
             let (maps, light) = grey();
             (parameters(&maps, &light), FitSettings::default().bounces)

@@ -5,7 +5,7 @@
 
 use super::half_vector_places::{Places, place_count, places};
 use super::light_basis::LightBasis;
-use super::lobe_place::{LobePlace, LobeSums, MIDDLE_TANGENT};
+use super::lobe_place::{LEAST_SHADOWING, LobePlace, LobeSums, MIDDLE_TANGENT};
 use crate::material::LobeModel;
 use crate::math::frame::Frame;
 use crate::math::vector::elementary::exp_minus_one;
@@ -135,7 +135,7 @@ impl<V: Vector> Lobe<V> {
             }
             Microfacets::Ggx { width_squared, rest, cos_out, root_out, .. } => {
                 let root_in = cos_in.mul(cos_in).mul_add(*rest, *width_squared).sqrt();
-                let shadowing = cos_in.mul_add(*root_out, cos_out.mul(root_in)).max(V::splat(1e-12));
+                let shadowing = cos_in.mul_add(*root_out, cos_out.mul(root_in)).max(V::splat(LEAST_SHADOWING));
                 cos_in.mul(half_dot_out).mul(self.scale).mul(share).div(shadowing.mul(cos))
             }
         };

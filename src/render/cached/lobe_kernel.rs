@@ -3,13 +3,11 @@
 //! Written once over [`Vector`]; [`super::lobe_sum`] chooses the version at run time.
 
 use super::light_basis::LightBasis;
-use super::lobe_place::{LobePlace, LobeSums, MIDDLE_TANGENT, wide_from};
+use super::lobe_place::{LEAST_SHADOWING, LobePlace, LobeSums, MIDDLE_TANGENT, wide_from};
 use crate::material::LobeModel;
 use crate::math::vector::Vector;
 use std::f32::consts::{LN_2, PI};
 
-/// The shadowing of GGX, which is divided by, is at least this: it is zero where both directions lie in the surface.
-const LEAST_SHADOWING: f32 = 1e-12;
 /// Widths summed in one walk over the light.
 pub(super) const MOST_AT_ONCE: usize = 8;
 

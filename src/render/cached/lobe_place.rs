@@ -57,6 +57,8 @@ fn variance_added(model: LobeModel, width: f32, normal_variance: f32) -> f32 {
 /// ones mostly over half vectors, others over hats, where the lobe is narrow: its tails are smooth beside a hat, and places
 /// of equal probability are few in them.
 pub(super) const MIDDLE_TANGENT: f32 = 0.2;
+/// The shadowing of GGX, which is divided by, is at least this: it is zero where both directions lie in the surface.
+pub(super) const LEAST_SHADOWING: f32 = 1e-12;
 
 impl LobePlace<'_> {
     /// The width of the lobe as the footprint sees it, for one of this microfacet width: [`width_through`].
