@@ -49,7 +49,7 @@ impl SolverShare {
     /// again stays so.
     pub(super) fn as_begun(self, begun: &[Stage]) -> Self {
         let of_solver = || begun.iter().filter(|stage| stage.kind.is_of_solver());
-        let has_finest = of_solver().any(|stage| stage.photo_level == 0);
+        let has_finest = of_solver().any(|stage| stage.kind != StageKind::Refine && stage.photo_level == 0);
         let coarsest = of_solver().map(|stage| stage.photo_level).max();
         let finer =
             of_solver().find(|stage| stage.kind == StageKind::NarrowLight && Some(stage.photo_level) != coarsest);

@@ -105,7 +105,25 @@ fn the_solver_visits_the_smallest_size_twice_and_keeps_its_plan_wherever_it_is()
     assert_eq!(names[5..], ["narrow light", "maps"]);
     for (stage, step) in walk(&plan) {
         assert_eq!(revised(&settings, &plan, stage, step).unwrap(), plan, "{stage}, {step}");
+        let refined = FitSettings { solver_refine: 1, solver_levels: 3, ..settings.clone() };
+        let revised = revised(&refined, &plan, stage, step).unwrap();
+        // The descent makes the finest maps, unless tiles have begun them, and needs no second visit that has not begun.
+        let kept = match stage {
+            0..3 => 3,
+            3..5 => 5,
+            _ => plan.len(),
+        };
+        assert_eq!((revised.len(), revised.last().unwrap().steps), (kept + 1, 1), "{stage}, {step}");
+        assert_eq!(revised[..kept], plan[..kept], "{stage}, {step}");
+        assert_eq!((revised[kept].kind, revised[kept].map_size), (StageKind::Refine, 256));
     }
+    let refined = FitSettings { solver_refine: 1, solver_levels: 3, ..settings.clone() };
+    let plan_with = stages(&refined);
+    for (stage, step) in walk(&plan_with) {
+        assert_eq!(revised(&refined, &plan_with, stage, step).unwrap(), plan_with, "{stage}, {step}");
+    }
+    // Left out once more, it is as if it had never been asked for.
+    assert_eq!(revised(&settings, &plan_with, 2, 0).unwrap(), plan);
     // On finer ones there is one round on the light for two, but where two have begun.
     let three = FitSettings { solver_levels: 3, map_size: 512, ..settings.clone() };
     let begun = stages(&three);
@@ -115,6 +133,7 @@ fn the_solver_visits_the_smallest_size_twice_and_keeps_its_plan_wherever_it_is()
     };
     let of_descent = FitSettings { solver_refine: 1, solver_levels: 4, ..three.clone() };
     assert_eq!([rounds(&begun, 1), rounds(&stages(&of_descent), 1)], [2, 1]);
+    assert_eq!(rounds(&revised(&of_descent, &begun, 5, 1).unwrap(), 1), 2);
     // Without coarser maps the solver makes what there is, twice as well.
     let small = stages(&FitSettings { map_size: 64, ..settings.clone() });
     let names: Vec<String> = small.iter().map(Stage::name).collect();
