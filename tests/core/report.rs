@@ -228,8 +228,8 @@ fn write_example(folder: &RunFolder, views: usize) -> ReportData {
     let data = ReportData {
         title: "bronze ball <demo>".into(),
         objective: vec![[
-            Objective { pixels: -1000.0, neighbours: 400.0, lobes: 0.0 },
-            Objective { pixels: -1500.0, neighbours: 350.0, lobes: 12.0 },
+            Objective { pixels: -1000.0, neighbours: 400.0, dielectrics: 0.0 },
+            Objective { pixels: -1500.0, neighbours: 350.0, dielectrics: 12.0 },
         ]],
         program: "patina 0.1.0".into(),
         scene_facts: [

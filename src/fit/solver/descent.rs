@@ -10,7 +10,6 @@
 
 use super::conjugate_gradients::conjugate_gradients;
 use super::estimate::Estimate;
-use super::freedom::Freedom;
 use super::light_scale::LightScale;
 use super::neighbours::Neighbours;
 use super::objective::{Learned, Objective};
@@ -152,18 +151,19 @@ impl SolverScene {
         let rows = Learned::of(&pixels, &sight, None).rows(&pixels, &sight);
         let diagonal = descent.system.diagonal(Rows { pieces: &sight.pieces, pixels: &rows });
         let shown: Vec<bool> = diagonal.iter().map(|diagonal| diagonal[0] > 0.0).collect();
-        let freedom = self.choose_freedom(&pixels, &sight, (&start, &shown), lit, stop)?;
+        let texture_scale = self.choose_texture_scale(&pixels, &sight, (&start, &shown), lit, stop)?;
 
         let mut trace = Trace { steps: Vec::new(), watch };
-        let mut place = descent.down(descent.place(&start, sight, (&shown, freedom)), &FIRST_STEPS, &mut trace)?;
+        let mut place =
+            descent.down(descent.place(&start, sight, (&shown, texture_scale)), &FIRST_STEPS, &mut trace)?;
         if lit == Lit::Yes {
-            place = descent.or_plain(place, (&start, &shown, freedom), &mut trace)?;
+            place = descent.or_plain(place, (&start, &shown, texture_scale), &mut trace)?;
         }
         let mut place = descent.down(place, &LAST_STEPS, &mut trace)?;
         let scale = (lit == Lit::Yes && self.is_scale_open()).then(|| LightScale::told_by(&place.texels, &shown));
         let scaled_specular = place.texels.iter().map(LightScale::changes_specular).collect();
         if lit == Lit::Yes {
-            place = descent.settled(place, scale.unwrap_or(LightScale::NONE), (&shown, freedom), &mut trace)?;
+            place = descent.settled(place, scale.unwrap_or(LightScale::NONE), (&shown, texture_scale), &mut trace)?;
         }
 
         let light = std::mem::take(&mut descent.light);
@@ -190,13 +190,13 @@ impl Descent<'_> {
     }
 
     /// The end of the way: the light is multiplied by what was told of its scale, and dielectrics are known to be common
-    /// ones from then on. What was found of a texel until then stands for its region. What all that makes wrong, as
-    /// Schlick's rise, light between surfaces and what the background told of the light, steps make good.
+    /// ones from then on. What that makes wrong, as Schlick's rise, light between surfaces and what the background told of
+    /// the light, steps make good.
     fn settled(
         &mut self,
         place: Place,
         scale: LightScale,
-        (shown, freedom): (&[bool], Freedom),
+        (shown, texture_scale): (&[bool], f32),
         trace: &mut Trace,
     ) -> Option<Place> {
         self.most_diffuse = 1.0;
@@ -208,8 +208,8 @@ impl Descent<'_> {
                 self.sight(&texels, Slopes::OfReflectances)?
             }
         };
-        let mut begun = Place { learned: place.learned, ..self.place(&texels, sight, (shown, freedom)) };
-        begun.beliefs.know_dielectrics();
+        let mut begun = Place { learned: place.learned, ..self.place(&texels, sight, (shown, texture_scale)) };
+        begun.beliefs.know_dielectrics(&texels);
         self.down(begun, &FIRST_STEPS, trace)
     }
 
@@ -233,9 +233,9 @@ impl Descent<'_> {
         watch(OnTheWay { texels: &texels, light: &light, gains });
     }
 
-    /// A place to begin at, around which texels may differ so freely.
-    pub(super) fn place(&self, start: &[Material<f32>], sight: Sight, (shown, freedom): (&[bool], Freedom)) -> Place {
-        let beliefs = Neighbours::new(self.scene.settings.map_size, start, shown.to_vec(), freedom);
+    /// A place to begin at, around which texture has such a scale.
+    pub(super) fn place(&self, start: &[Material<f32>], sight: Sight, (shown, texture_scale): (&[bool], f32)) -> Place {
+        let beliefs = Neighbours::new(self.scene.settings.map_size, start, shown.to_vec(), texture_scale);
         Place { texels: start.to_vec(), sight, learned: None, beliefs, is_exact: false }
     }
 

@@ -19,8 +19,8 @@
 //!    as far as it is independent (`tile_independence`), decides which texels share a lobe ([`lobe_tree`],
 //!    [`lobe_evidence`], [`lobe_prior`], [`lobe_sums`], [`lobe_widths`], [`lobe_families`]).
 //!    Then `refine`: [`descent`] of the one [`objective`] over all texels (`conjugate_gradients`), by what whole [`pixels`] see
-//!    (`sight`, `pixel_system`), with what `neighbours` have in common and as much `freedom` as predicts photos that took no
-//!    part; from the lobes that were found, or those of one dielectric where that explains pixels as well (`second_start`, `agreement`).
+//!    (`sight`, `pixel_system`), with what `neighbours` have in common and the `texture_scale` that predicts photos that took
+//!    no part best; from the lobes that were found, or those of one dielectric where that explains pixels as well (`second_start`, `agreement`).
 //! 6. [`choice`]: views that took no part say what lobes, light between surfaces and the light's resolution bought;
 //!    `lobe_tails` says whether highlights reach further than the model's lobes.
 //! 7. [`solver`]: the steps in their order. A fit does them one by one, as [`crate::fit::Fitter`] does those of Adam: on
@@ -40,7 +40,6 @@ pub mod descent;
 pub mod eliminate;
 pub mod estimate;
 mod first_maps;
-mod freedom;
 mod gains;
 mod given_maps;
 mod light_colour;
@@ -82,6 +81,7 @@ mod sieve;
 mod sight;
 #[allow(clippy::module_inception)]
 pub mod solver;
+mod texture_scale;
 pub mod tile;
 mod tile_independence;
 mod tile_lobes;

@@ -1,5 +1,4 @@
-//! What neighbouring texels are believed to have in common, and lobes with what was found of their region and with
-//! common dielectrics.
+//! What neighbouring texels are believed to have in common, and lobes with common dielectrics.
 //!
 //! Materials change at few places: differences of logarithms between neighbours have Cauchy's distribution, a small scale
 //! with heavy tails. What no pixel tells apart is smooth then, and edges stay. Its negative logarithm is replaced by the
@@ -7,7 +6,6 @@
 //! makes the objective less.
 
 use super::estimate::PLAIN_SPECULAR;
-use super::freedom::Freedom;
 use super::light_scale::{OF_DIELECTRICS, is_dielectric};
 use super::pixel_system::{CHUNK, Lanes};
 use crate::material::Material;
@@ -28,12 +26,8 @@ pub struct Neighbours {
     scales: [f32; 3],
     /// What is added to reflectances under the logarithm, diffuse and specular: darker than this all is equally dark.
     dark: [f32; 2],
-    /// What was found of a texel's region: F0 and logarithm of the width.
-    centre: Vec<[f32; 4]>,
-    /// Standard deviation of a texel's lobe from its region's: of F0 relative to itself, of the logarithm of the width.
-    spread: [f32; 2],
-    /// Whether F0 of common dielectrics is believed as well.
-    knows_dielectrics: bool,
+    /// Texels whose F0 is believed to be that of common dielectrics; empty until that is known.
+    dielectric: Vec<bool>,
 }
 
 /// The parabola that touches the beliefs from above.
@@ -45,13 +39,12 @@ pub struct Parabola<'a> {
     relative: Vec<Lanes>,
     /// Weight of the difference to the right and to the lower neighbour, group by group; 0 where there is none.
     weights: Vec<[[f32; 3]; 2]>,
-    /// Precision of what is believed of each number of a lobe.
-    of_lobes: Vec<[f32; 4]>,
 }
 
 impl Neighbours {
-    /// Beliefs about texels around `start`, of which pixels show those, that may differ so freely.
-    pub fn new(size: usize, start: &[Material<f32>], shown: Vec<bool>, freedom: Freedom) -> Self {
+    /// Beliefs about texels around `start`, of which pixels show those; the logarithms of neighbours' diffuse reflectances
+    /// differ by `texture_scale`.
+    pub fn new(size: usize, start: &[Material<f32>], shown: Vec<bool>, texture_scale: f32) -> Self {
         let seen = start.iter().zip(&shown).filter(|(_, shown)| **shown);
         let (mut sum, mut count) = (0.0f64, 0.0f64);
         for (texel, _) in seen {
@@ -59,17 +52,8 @@ impl Neighbours {
             count += 1.0;
         }
         let mean = (sum / f64::max(count, 1.0)) as f32;
-        let centre = start.iter().map(|own| [own.specular[0], own.specular[1], own.specular[2], own.log_width]);
         let dark = [(DARK[0] * mean).max(1e-6), DARK[1]];
-        Neighbours {
-            size,
-            shown,
-            scales: [freedom.texture, OF_LOBES, OF_LOBES],
-            dark,
-            centre: centre.collect(),
-            spread: [freedom.lobes, 0.5 * freedom.lobes],
-            knows_dielectrics: false,
-        }
+        Neighbours { size, shown, scales: [texture_scale, OF_LOBES, OF_LOBES], dark, dielectric: Vec::new() }
     }
 
     /// Which texels pixels show.
@@ -77,10 +61,17 @@ impl Neighbours {
         &self.shown
     }
 
-    /// From now on F0 of what is no metal by its region is believed to be that of common dielectrics. Not before the scale
-    /// of the light is told: that is told by it.
-    pub fn know_dielectrics(&mut self) {
-        self.knows_dielectrics = true;
+    /// From now on F0 of what is no metal among these texels is believed to be that of common dielectrics. Not before the
+    /// scale of the light is told: that is told by it.
+    pub fn know_dielectrics(&mut self, texels: &[Material<f32>]) {
+        self.dielectric = texels.iter().map(|own| is_dielectric(own.specular)).collect();
+    }
+
+    /// Precision of what is believed of a texel's F0.
+    #[inline]
+    fn precision_of_specular(&self, texel: usize) -> f32 {
+        let is_known = self.dielectric.get(texel) == Some(&true);
+        if is_known { (OF_DIELECTRICS as f32 * PLAIN_SPECULAR).powi(-2) } else { 0.0 }
     }
 
     /// The texel to the right and the one below, where pixels show both.
@@ -112,8 +103,8 @@ impl Neighbours {
         })
     }
 
-    /// Negative logarithm of the densities, constants left out: of differences between neighbours, and of lobes in their
-    /// regions. In nats.
+    /// Negative logarithm of the densities, constants left out: of differences between neighbours, and of
+    /// dielectrics. In nats.
     pub fn energies(&self, texels: &[Material<f32>]) -> [f64; 2] {
         let logarithms: Vec<[f32; 7]> = texels.par_iter().map(|texel| self.logarithms(texel)).collect();
         let of_chunk = |which: usize, chunk: &[Material<f32>]| {
@@ -131,38 +122,13 @@ impl Neighbours {
                         .map(|(square, n)| power(n) * f64::from(square.ln_1p()))
                         .sum::<f64>();
                 }
-                let away = self.away(own, texel);
-                sums[1] += (0..4).map(|k| 0.5 * f64::from(self.lobe(own, k).1 * away[k] * away[k])).sum::<f64>();
+                let square: f32 = away_from_plain(texel).iter().map(|away| away * away).sum();
+                sums[1] += 0.5 * f64::from(self.precision_of_specular(own) * square);
             }
             sums
         };
         let of_chunks = parallel::map_chunks(texels, CHUNK, of_chunk);
         of_chunks.iter().fold([0.0; 2], |total, own| [total[0] + own[0], total[1] + own[1]])
-    }
-
-    /// How far a lobe is from what is believed of it: F0, logarithm of the width.
-    #[inline]
-    fn away(&self, texel: usize, own: &Material<f32>) -> [f32; 4] {
-        let [red, green, blue] = own.specular;
-        let numbers = [red, green, blue, own.log_width];
-        std::array::from_fn(|number| numbers[number] - self.lobe(texel, number).0)
-    }
-
-    /// What is believed of a number of a lobe: mean and precision. Two normal beliefs are as their product.
-    #[inline]
-    fn lobe(&self, texel: usize, number: usize) -> (f32, f32) {
-        let centre = &self.centre[texel];
-        if number == 3 {
-            return (centre[3], (self.spread[1] * self.spread[1]).recip());
-        }
-        let deviation = self.spread[0] * (centre[number] + self.dark[1]);
-        let of_region = (deviation * deviation).recip();
-        if !(self.knows_dielectrics && is_dielectric([centre[0], centre[1], centre[2]])) {
-            return (centre[number], of_region);
-        }
-        let of_dielectrics = (OF_DIELECTRICS as f32 * PLAIN_SPECULAR).powi(-2);
-        let precision = of_region + of_dielectrics;
-        (centre[number] + of_dielectrics / precision * (PLAIN_SPECULAR - centre[number]), precision)
     }
 
     /// The parabola that touches at these texels.
@@ -192,15 +158,18 @@ impl Neighbours {
                 })
             })
             .collect();
-        let of_lobes: Vec<[f32; 4]> =
-            (0..texels.len()).into_par_iter().map(|own| [0, 1, 2, 3].map(|number| self.lobe(own, number).1)).collect();
-        let mut made = Parabola { of: self, slope: Vec::new(), relative, weights, of_lobes };
+        let mut made = Parabola { of: self, slope: Vec::new(), relative, weights };
         let mut slope = vec![[0.0f32; 8]; texels.len()];
         let lanes = |texel: usize| std::array::from_fn(|lane| *logarithms[texel].get(lane).unwrap_or(&0.0));
-        made.add_to(&mut slope, lanes, |texel| self.away(texel, &texels[texel]));
+        made.add_to(&mut slope, lanes, |texel| away_from_plain(&texels[texel]));
         made.slope = slope;
         made
     }
+}
+
+/// How far F0 is from that of common dielectrics.
+fn away_from_plain(texel: &Material<f32>) -> [f32; 3] {
+    texel.specular.map(|specular| specular - PLAIN_SPECULAR)
 }
 
 /// Shares of the mean diffuse reflectance, and F0, below which all is equally dark.
@@ -222,16 +191,16 @@ impl Parabola<'_> {
     /// Adds the curvature times a step.
     pub fn add_product(&self, step: &[Lanes], product: &mut [Lanes]) {
         let logarithm = |texel: usize| std::array::from_fn(|lane| self.relative[texel][lane] * step[texel][lane]);
-        self.add_to(product, logarithm, |texel| [3, 4, 5, 6].map(|lane| step[texel][lane]));
+        self.add_to(product, logarithm, |texel| [3, 4, 5].map(|lane| step[texel][lane]));
     }
 
     /// Adds, to each texel, weights times differences of `value` to its four neighbours, times what a step is in logarithms,
-    /// and the precision of its lobe times `away`.
+    /// and the precision of its F0 times `away`.
     fn add_to(
         &self,
         sums: &mut [Lanes],
         value: impl Fn(usize) -> Lanes + Sync,
-        away: impl Fn(usize) -> [f32; 4] + Sync,
+        away: impl Fn(usize) -> [f32; 3] + Sync,
     ) {
         parallel::each_chunk(sums, CHUNK, &|chunk, sums| {
             let texels = (chunk * CHUNK..).zip(sums).filter(|(texel, _)| self.of.shown[*texel]);
@@ -244,8 +213,8 @@ impl Parabola<'_> {
                         sum[lane] += relative[lane] * weights[lane] * (own[lane] - other[lane]);
                     }
                 });
-                let (away, precision) = (away(texel), &self.of_lobes[texel]);
-                (0..4).for_each(|number| sum[3 + number] += away[number] * precision[number]);
+                let (away, precision) = (away(texel), self.of.precision_of_specular(texel));
+                (0..3).for_each(|channel| sum[3 + channel] += away[channel] * precision);
             }
         });
     }
@@ -271,8 +240,8 @@ impl Parabola<'_> {
         self.for_neighbours(texel, self.of.size, |_, weights| (0..3).for_each(|group| sum[group] += weights[group]));
         let relative = &self.relative[texel];
         std::array::from_fn(|lane| {
-            let of_lobe = if (3..7).contains(&lane) { self.of_lobes[texel][lane - 3] } else { 0.0 };
-            if lane < 7 { sum[lane / 3] * relative[lane] * relative[lane] + of_lobe } else { 0.0 }
+            let own = if (3..6).contains(&lane) { self.of.precision_of_specular(texel) } else { 0.0 };
+            if lane < 7 { sum[lane / 3] * relative[lane] * relative[lane] + own } else { 0.0 }
         })
     }
 }
@@ -283,7 +252,6 @@ mod tests {
     use crate::math::random::SequentialRandom;
 
     const SIZE: usize = 8;
-    const FREEDOM: Freedom = Freedom { texture: 1.0, lobes: 1.0 };
 
     fn made_up() -> (Vec<Material<f32>>, Neighbours) {
         let mut random = SequentialRandom::new(3);
@@ -295,30 +263,32 @@ mod tests {
         };
         let (texels, start): (Vec<_>, Vec<_>) = (0..SIZE * SIZE).map(|_| (texel(), texel())).unzip();
         let shown = (0..SIZE * SIZE).map(|texel| texel % 11 != 5).collect();
-        let beliefs =
-            Neighbours { scales: [0.5, 0.2, 0.3], spread: [0.3, 0.2], ..Neighbours::new(SIZE, &start, shown, FREEDOM) };
-        (texels, beliefs)
+        (texels, Neighbours { scales: [0.5, 0.2, 0.3], ..Neighbours::new(SIZE, &start, shown, 1.0) })
     }
 
-    /// The same texels with half of the regions dielectrics, of which it is known.
+    /// The same texels with half of them dielectrics, of which it is known.
     fn made_up_of_dielectrics() -> (Vec<Material<f32>>, Neighbours) {
-        let (texels, mut beliefs) = made_up();
-        beliefs.centre.iter_mut().step_by(2).for_each(|centre| (0..3).for_each(|c| centre[c] *= 0.2));
-        beliefs.know_dielectrics();
+        let (mut texels, mut beliefs) = made_up();
+        texels.iter_mut().step_by(2).for_each(|own| own.specular = own.specular.map(|specular| 0.2 * specular));
+        beliefs.know_dielectrics(&texels);
         (texels, beliefs)
     }
 
     #[test]
     fn a_dielectric_is_drawn_to_the_common_one_and_a_metal_is_not() {
-        let (_, mut beliefs) = made_up();
-        (beliefs.centre[0], beliefs.centre[1]) = ([0.07, 0.08, 0.09, -0.5], [0.6, 0.4, 0.2, -0.5]);
-        let of = |beliefs: &Neighbours, texel: usize| [0, 1, 2, 3].map(|number| beliefs.lobe(texel, number));
-        let before = [0, 1].map(|texel| of(&beliefs, texel));
-        beliefs.know_dielectrics();
-        for (now, before) in of(&beliefs, 0).into_iter().zip(before[0]).take(3) {
-            assert!(now.0 < before.0 && now.0 > PLAIN_SPECULAR && now.1 > before.1, "{now:?} {before:?}");
-        }
-        assert_eq!((of(&beliefs, 0)[3], of(&beliefs, 1)), (before[0][3], before[1]));
+        let (texels, beliefs) = made_up_of_dielectrics();
+        let is_known = |texel: &usize| beliefs.precision_of_specular(*texel) > 0.0;
+        let metals: Vec<usize> = (0..texels.len()).filter(|&texel| !is_dielectric(texels[texel].specular)).collect();
+        assert!(metals.len() > 8 && !metals.iter().any(is_known), "{metals:?}");
+        let dielectrics: Vec<usize> = (0..texels.len()).filter(is_known).collect();
+        assert_eq!(dielectrics.len() + metals.len(), texels.len());
+        let energy = |specular: f32| {
+            let mut texels = texels.clone();
+            dielectrics.iter().for_each(|&texel| texels[texel].specular = [specular; 3]);
+            beliefs.energies(&texels)[1]
+        };
+        assert_eq!(energy(PLAIN_SPECULAR), 0.0);
+        assert!(energy(0.03) > 0.0 && energy(0.02) > energy(0.03) && energy(0.06) > energy(0.05));
     }
 
     fn total(beliefs: &Neighbours, texels: &[Material<f32>]) -> f64 {
@@ -400,8 +370,7 @@ mod tests {
         let (mut texels, _) = made_up();
         let flat = Material { diffuse: [0.3; 3], specular: [0.04; 3], log_width: -0.5 };
         texels.fill(flat);
-        let free = Neighbours::new(SIZE, &texels, vec![true; SIZE * SIZE], FREEDOM);
-        let beliefs = Neighbours { scales: [0.1; 3], spread: [10.0; 2], ..free };
+        let beliefs = Neighbours { scales: [0.1; 3], ..Neighbours::new(SIZE, &texels, vec![true; SIZE * SIZE], 1.0) };
         let step = |ratio: f32| {
             let mut texels = texels.clone();
             texels[..SIZE * SIZE / 2].iter_mut().for_each(|texel| texel.diffuse = [0.3 * ratio; 3]);

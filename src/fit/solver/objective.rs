@@ -1,6 +1,6 @@
 //! The one function that a fit makes less: the negative logarithm of how likely photos and beliefs are, in nats.
 //!
-//! `J = sum over pixels of -ln Student((y - g I) / sigma)`, plus what is believed of neighbouring texels and of lobes.
+//! `J = sum over pixels of -ln Student((y - g I) / sigma)`, plus what is believed of neighbouring texels and of dielectrics.
 //! What noise and gains are is learned from the capture ([`Learned`]); by those of one moment J is compared with itself.
 
 use super::photo_gains::{GainSums, gains};
@@ -23,14 +23,15 @@ pub struct Objective {
     pub pixels: f64,
     /// Neighbouring texels.
     pub neighbours: f64,
-    /// Lobes in their regions.
-    pub lobes: f64,
+    /// F0 of dielectrics.
+    #[serde(alias = "lobes")]
+    pub dielectrics: f64,
 }
 
 impl Objective {
     /// All terms.
     pub fn total(&self) -> f64 {
-        self.pixels + self.neighbours + self.lobes
+        self.pixels + self.neighbours + self.dielectrics
     }
 }
 
@@ -127,12 +128,12 @@ impl Learned {
         self.noise.nats(self.residual(pixels, sight, index).1)
     }
 
-    /// The objective of what pixels see, beside what is believed of neighbours and of lobes.
-    pub fn objective(&self, pixels: &Pixels, sight: &Sight, [neighbours, lobes]: [f64; 2]) -> Objective {
+    /// The objective of what pixels see, beside what is believed of neighbours and of dielectrics.
+    pub fn objective(&self, pixels: &Pixels, sight: &Sight, [neighbours, dielectrics]: [f64; 2]) -> Objective {
         let count = pixels.count();
         let nats = |index: usize| self.nats(pixels, sight, index);
         let of_chunk = |chunk: usize| -> f64 { (chunk * CHUNK..((chunk + 1) * CHUNK).min(count)).map(nats).sum() };
         let sums = parallel::map(count.div_ceil(CHUNK), of_chunk);
-        Objective { pixels: sums.into_iter().sum(), neighbours, lobes }
+        Objective { pixels: sums.into_iter().sum(), neighbours, dielectrics }
     }
 }

@@ -10,7 +10,6 @@ use super::agreement::SquareGains;
 use super::choice::clustered::ClusteredMean;
 use super::descent::{Descent, FIRST_STEPS, Place, Trace, difference};
 use super::estimate::{PLAIN_SPECULAR, START_TEXEL};
-use super::freedom::Freedom;
 use super::objective::Learned;
 use super::sight::{Sight, Slopes};
 use crate::material::Material;
@@ -22,11 +21,12 @@ impl Descent<'_> {
     pub(super) fn or_plain(
         &mut self,
         found: Place,
-        (start, shown, freedom): (&[Material<f32>], &[bool], Freedom),
+        (start, shown, texture_scale): (&[Material<f32>], &[bool], f32),
         trace: &mut Trace,
     ) -> Option<Place> {
         let (plain_start, sight) = self.plain(&found, start, shown)?;
-        let plain = self.down(self.place(&plain_start, sight, (shown, freedom)), &FIRST_STEPS, &mut Trace::unseen())?;
+        let plain =
+            self.down(self.place(&plain_start, sight, (shown, texture_scale)), &FIRST_STEPS, &mut Trace::unseen())?;
         let by = Learned::of(self.pixels, &found.sight, found.learned.as_ref());
         let is_plain = self.plain_texels(&found, &plain, &by);
         let choose = |one: &[Material<f32>], other: &[Material<f32>]| -> Vec<Material<f32>> {
@@ -34,7 +34,7 @@ impl Descent<'_> {
         };
         let texels = choose(&found.texels, &plain.texels);
         let sight = self.sight_of_both([&found, &plain], &texels, &is_plain);
-        let begun = self.place(&choose(start, &plain_start), sight, (shown, freedom));
+        let begun = self.place(&choose(start, &plain_start), sight, (shown, texture_scale));
         // Where squares meet neighbours differ at once; a step makes that good before it is judged.
         let begun = Place { texels, learned: found.learned.clone(), ..begun };
         let mixed = self.down(begun, &FIRST_STEPS[..1], &mut Trace::unseen())?;

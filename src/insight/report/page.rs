@@ -60,12 +60,13 @@ fn objective(data: &ReportData) -> String {
                 format!("{:.0}", before.total() - begin.total()),
                 fell(before.pixels, after.pixels),
                 fell(before.neighbours, after.neighbours),
-                fell(before.lobes, after.lobes),
+                fell(before.dielectrics, after.dielectrics),
                 fell(before.total(), after.total()),
             ]
         })
         .collect();
-    let head = ["step", "objective<small>nats, from the first</small>", "pixels", "neighbours", "lobes", "<b>all</b>"];
+    let head =
+        ["step", "objective<small>nats, from the first</small>", "pixels", "neighbours", "dielectrics", "<b>all</b>"];
     format!(
         "<h3>Objective of the last descent</h3><p class=note>The negative logarithm of how likely photos and beliefs are. Each \
          step makes it less, by the noise and gains learned before it; learning them anew changes what it is from step to \

@@ -1,10 +1,10 @@
-//! How freely texels may differ: by what predicts photos that took no part.
+//! How freely neighbouring texels may differ in colour: by what predicts photos that took no part.
 //!
-//! The finest texture of a capture, and whether each texel may have a lobe of its own, are no constants: a granite of a
-//! thousand grains asks for another prior than a painted toy, and photos whose cameras are a fraction of a pixel off bear
-//! fewer freedoms out. Noise alone cannot tell, since errors of model, mesh and cameras go together over pixels. So every
-//! fourth view is withheld from a few short descents on a part of the surface, with one [`Freedom`] each, and the one is
-//! taken that predicts those views best (cross-validation; Stone 1974).
+//! The finest texture of a capture is no constant: a granite of a thousand grains asks for another prior than a painted toy, and
+//! photos whose cameras are a fraction of a pixel off bear fewer freedoms out. Noise alone cannot tell, since errors of
+//! model, mesh and cameras go together over pixels. So every fourth view is withheld from a few short descents on a part of
+//! the surface, with one scale of texture each, and the one is taken that predicts those views best (cross-validation;
+//! Stone 1974).
 
 use super::conjugate_gradients::conjugate_gradients;
 use super::descent::{Step, difference, stepped};
@@ -17,22 +17,10 @@ use super::sight::{Lit, Sight, Slopes};
 use crate::material::Material;
 use std::sync::atomic::AtomicBool;
 
-/// How freely texels may differ.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Freedom {
-    /// Scale of the differences between logarithms of neighbours' diffuse reflectances.
-    pub texture: f32,
-    /// How far a texel's lobe may go from its region's (standard deviations): F0 relative to itself, and twice the logarithm
-    /// of the width.
-    pub lobes: f32,
-}
-
-/// Scales of texture that are looked at, the least free first.
-const TEXTURES: [f32; 2] = [0.5, 4.0];
-/// Freedoms of lobes that are looked at, the least free first; the last one while textures are.
-const LOBES: [f32; 2] = [0.1, 1.0];
+/// Scales of the differences between logarithms of neighbours' diffuse reflectances that are looked at, the least free first.
+const SCALES: [f32; 2] = [0.5, 4.0];
 /// Taken where too few views could judge.
-const USUAL: Freedom = Freedom { texture: 1.0, lobes: 0.3 };
+const USUAL: f32 = 1.0;
 /// One of so many views judges.
 const JUDGE_EVERY: usize = 4;
 /// Fewer views do not judge.
@@ -58,16 +46,16 @@ struct Contest<'a> {
 }
 
 impl SolverScene {
-    /// The freedom that suits a capture, around these texels, of which pixels show some, and what pixels see of them. `None`
-    /// when `stop` was raised.
-    pub(super) fn choose_freedom(
+    /// The scale of texture that suits a capture, around these texels, of which pixels show some, and what pixels see of them.
+    /// `None` when `stop` was raised.
+    pub(super) fn choose_texture_scale(
         &self,
         pixels: &Pixels,
         sight: &Sight,
         (texels, shown): (&[Material<f32>], &[bool]),
         lit: Lit,
         stop: &AtomicBool,
-    ) -> Option<Freedom> {
+    ) -> Option<f32> {
         if (0..self.views.len()).filter(|&view| is_judge(view)).count() < LEAST_JUDGES {
             return Some(USUAL);
         }
@@ -76,17 +64,9 @@ impl SolverScene {
         let mut system = PixelSystem::new(&some, self.settings.map_size);
         let sight = sight.of_some(pixels, &taken);
         let mut contest = Contest { scene: self, pixels: some, sight, texels, shown, lit, noise: None };
-        let mut nats = |texture: f32, lobes: f32| contest.nats(&mut system, Freedom { texture, lobes }, stop);
-        let [held, free] = LOBES;
-        let mut of_textures: Vec<Vec<f64>> =
-            TEXTURES.into_iter().map(|texture| nats(texture, free)).collect::<Option<_>>()?;
-        let chosen = best(&of_textures);
-        let texture = TEXTURES[chosen];
-        if lit == Lit::No {
-            return Some(Freedom { texture, lobes: free });
-        }
-        let lobes = LOBES[best(&[nats(texture, held)?, of_textures.swap_remove(chosen)])];
-        Some(Freedom { texture, lobes })
+        let nats: Vec<Vec<f64>> =
+            SCALES.into_iter().map(|scale| contest.nats(&mut system, scale, stop)).collect::<Option<_>>()?;
+        Some(SCALES[best(&nats)])
     }
 }
 
@@ -97,9 +77,9 @@ fn is_judge(view: usize) -> bool {
 
 impl Contest<'_> {
     /// Mean negative logarithm of the density of the judging views' pixels, view by view.
-    fn nats(&mut self, system: &mut PixelSystem, freedom: Freedom, stop: &AtomicBool) -> Option<Vec<f64>> {
+    fn nats(&mut self, system: &mut PixelSystem, texture_scale: f32, stop: &AtomicBool) -> Option<Vec<f64>> {
         let Contest { scene, pixels, sight, texels, shown, lit, noise } = self;
-        let beliefs = Neighbours::new(scene.settings.map_size, texels, shown.to_vec(), freedom);
+        let beliefs = Neighbours::new(scene.settings.map_size, texels, shown.to_vec(), texture_scale);
         let (mut own, mut seen): (Vec<Material<f32>>, Option<Sight>) = (texels.to_vec(), None);
         let mut learned: Option<Learned> = None;
         for step in STEPS {
