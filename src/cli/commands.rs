@@ -92,6 +92,8 @@ pub fn relight(options: &RelightOptions, json: bool) -> Result<()> {
         samples: options.samples,
         max_bounces: options.bounces,
         background_visible: !options.hide_background,
+        background_blur_degrees: options.background_blur,
+        ground: if options.ground { surface.mesh().bounds().map(|(low, _)| low.y) } else { None },
         two_sided: scene.truth.is_none(),
         lobe_strength: if settings.fit.has_lobe() { 1.0 } else { 0.0 },
         ..Default::default()
@@ -169,6 +171,7 @@ pub fn render(options: &RenderOptions, json: bool) -> Result<()> {
         groups,
         max_bounces: options.bounces,
         background_visible: !options.hide_background && scene.background == Background::Environment,
+        background_blur_degrees: options.background_blur,
         two_sided: scene.truth.is_none(),
         lobe_strength: strength,
         seed: options.seed,

@@ -77,6 +77,8 @@ pub struct RelitRequest {
     pub lights: Vec<RelitLight>,
     /// Whether the lights show behind the surface; it is black otherwise.
     pub background_visible: bool,
+    /// By how many degrees they are blurred there.
+    pub background_blur_degrees: f32,
     /// Chosen by who asks; comes back with the pictures.
     pub key: u64,
     /// The same, equal for requests that differ in their lights alone.
@@ -243,8 +245,9 @@ impl Worker {
         let began = Instant::now();
         let mut pictures = Vec::with_capacity(request.lights.len());
         for light in &request.lights {
-            let (environment, behind) = (light.environment(), request.background_visible);
-            let lit = seen.view.lit(&request.transport, &environment, &seen.reflectance, behind, stop);
+            let environment = light.environment();
+            let behind = request.background_visible.then(|| environment.out_of_focus(request.background_blur_degrees));
+            let lit = seen.view.lit(&request.transport, &environment, &seen.reflectance, behind.as_ref(), stop);
             let Some(lit) = lit else { break };
             pictures.push(Arc::new(lit.radiance));
         }
@@ -296,6 +299,7 @@ mod tests {
             camera: scene.views[0].camera,
             lights: vec![light(0.0, 1.0), light(0.0, 2.0)],
             background_visible: false,
+            background_blur_degrees: 0.0,
             key: 1,
             view: 7,
         };

@@ -35,7 +35,25 @@ impl Environment {
         let pixels = rows.into_iter().flatten().map(|value| value.as_vec3()).collect();
         Environment { radiance: Image::from_pixels(width, height, pixels) }
     }
+
+    /// The map as it looks out of focus behind a thing: blurred by so many degrees, as it is for 0. Of the size that such a
+    /// blur leaves something to see of, since the time goes with the square of the texels.
+    pub fn out_of_focus(&self, degrees: f32) -> Self {
+        if degrees <= 0.0 {
+            return self.clone();
+        }
+        let height = ((TEXELS_A_BLUR * 180.0 / degrees) as usize).clamp(8, LARGEST_BLURRED).min(self.height());
+        let width = (2 * height).min(self.width());
+        let is_small = (width, height) == (self.width(), self.height());
+        let small = (!is_small).then(|| self.resampled(width, height));
+        small.as_ref().unwrap_or(self).blurred(f64::from(degrees))
+    }
 }
+
+/// Rows of texels to the angle of a blur, in [`Environment::out_of_focus`].
+const TEXELS_A_BLUR: f32 = 2.5;
+/// Most rows of what is blurred there.
+const LARGEST_BLURRED: usize = 64;
 
 /// Weights of a blur between the rows of a map; by symmetry they are functions of two rows and a number of columns.
 pub struct BlurKernel {
@@ -94,5 +112,20 @@ mod tests {
         // Two axes of 15 degrees each: 21.2 degrees in the root mean square.
         let spread = (squares / total).sqrt();
         assert!((spread - 15.0 * 2f64.sqrt()).abs() < 1.5, "{spread}");
+    }
+
+    #[test]
+    fn what_is_out_of_focus_is_blurred_at_a_size_that_goes_with_the_angle() {
+        let mut sun = Environment::constant(256, 128, Vec3::ONE);
+        sun.radiance[(40, 90)] = Vec3::splat(1000.0);
+        assert_eq!(sun.out_of_focus(0.0), sun);
+        let [wide, narrow] = [20.0, 2.0].map(|degrees| sun.out_of_focus(degrees));
+        assert_eq!((wide.width(), wide.height()), (44, 22));
+        assert_eq!((narrow.width(), narrow.height()), (128, 64));
+        let brightest = |light: &Environment| light.radiance.pixels().iter().map(|own| own.x).fold(0.0, f32::max);
+        assert!(brightest(&wide) < brightest(&narrow) && brightest(&narrow) < 200.0);
+        for light in [wide, narrow] {
+            assert!((light.mean_radiance().x / sun.mean_radiance().x - 1.0).abs() < 0.03);
+        }
     }
 }

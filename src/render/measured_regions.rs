@@ -13,7 +13,7 @@ use super::picture::{Picture, PictureSettings, picture_of_groups};
 use super::regions::{MeasuredMaterial, Regions};
 use super::sums::Parameters;
 use super::surface::{Surface, SurfacePoint};
-use crate::light::{EnvironmentSampler, LightSample};
+use crate::light::{Environment, EnvironmentSampler, LightSample};
 use crate::material::{LobeGeometry, LobeSampler, Material};
 use crate::math::frame::Frame;
 use crate::math::random::SampleStream;
@@ -76,6 +76,8 @@ struct RegionTracer<'a> {
     parameters: &'a Parameters<f32>,
     regions: &'a Regions,
     light: &'a EnvironmentSampler,
+    /// What shows behind the surface, where that is not the light as it is.
+    out_of_focus: Option<Environment>,
     settings: &'a PictureSettings,
 }
 
@@ -110,8 +112,11 @@ impl RegionTracer<'_> {
     /// Radiance along a camera ray whose first hit is known.
     fn radiance(&self, camera_ray: &Ray, first_hit: Option<Hit>, stream: &mut SampleStream) -> Vec3 {
         let Some(mut hit) = first_hit else {
-            let shows = self.settings.background_visible;
-            return if shows { self.radiance_of_light(camera_ray.direction) } else { Vec3::ZERO };
+            return match &self.out_of_focus {
+                Some(shown) => shown.radiance_towards(camera_ray.direction),
+                None if !self.settings.background_visible => Vec3::ZERO,
+                None => self.radiance_of_light(camera_ray.direction),
+            };
         };
         let (mut sum, mut throughput, mut ray) = (Vec3::ZERO, Vec3::ONE, *camera_ray);
         for _ in 0..self.settings.max_bounces.min(MAX_BOUNCES) {
@@ -155,8 +160,11 @@ pub fn render_regions(
     settings: &PictureSettings,
     stop: &AtomicBool,
 ) -> Picture {
-    let light = EnvironmentSampler::new(&parameters.environment());
-    let tracer = RegionTracer { surface, parameters, regions, light: &light, settings };
+    let environment = parameters.environment();
+    let light = EnvironmentSampler::new(&environment);
+    let is_blurred = settings.background_visible && settings.background_blur_degrees > 0.0;
+    let out_of_focus = is_blurred.then(|| environment.out_of_focus(settings.background_blur_degrees));
+    let tracer = RegionTracer { surface, parameters, regions, light: &light, out_of_focus, settings };
     let rays = CameraRays::fresh(surface, camera, settings.filter, settings.samples);
     picture_of_groups(
         camera,

@@ -1,6 +1,5 @@
 //! Pictures and layers of a view.
 
-use super::accumulate::{PassKey, estimate_pixel};
 use super::first_hits::{CameraRays, PixelFilter};
 use super::path::PathArena;
 pub use super::picture_settings::PictureSettings;
@@ -43,13 +42,10 @@ pub fn render(
     settings: &PictureSettings,
     stop: &AtomicBool,
 ) -> Picture {
-    let prepared = PictureTracer::new(surface, parameters, *settings);
-    let tracer = prepared.paths();
-    let rays = CameraRays::fresh(surface, camera, settings.filter, settings.samples);
+    let tracer = PictureTracer::new(surface, parameters, *settings);
     picture_of_groups(camera, settings.groups, stop, PathArena::default, |arena, pixel, group| {
-        let key = PassKey::whole(settings.seed, group, view, 0);
-        let estimate = estimate_pixel(&tracer, &rays, pixel, key, parameters, arena);
-        (estimate.mean(rays.samples()), estimate.escaped)
+        let (mean, coverage) = tracer.pixel(camera, view, pixel, settings.samples, group, arena);
+        (mean, 1.0 - coverage)
     })
 }
 

@@ -17,10 +17,12 @@ pub struct PictureSettings {
     pub lobe_strength: f32,
     /// Whether the environment shows behind the surface.
     pub background_visible: bool,
+    /// By how many degrees the environment is blurred where it shows behind the surface; what it lights stays sharp.
+    pub background_blur_degrees: f32,
     /// Whether the back of a triangle reflects like its front; otherwise it is black.
     pub two_sided: bool,
-    /// Height (y of the world) of a level ground that shows the shadow of the surface on the environment behind it; of
-    /// pictures that are refined ([`PictureTracer`](super::progressive::PictureTracer)).
+    /// Height (y of the world) of a level ground that shows the shadow of the surface on the environment behind it; none
+    /// with measured regions.
     pub ground: Option<f32>,
     /// Seed of the random numbers.
     pub seed: u64,
@@ -35,6 +37,7 @@ impl Default for PictureSettings {
             max_bounces: 3,
             lobe_strength: 1.0,
             background_visible: true,
+            background_blur_degrees: 0.0,
             two_sided: false,
             ground: None,
             seed: 1,

@@ -32,6 +32,8 @@ pub struct PictureTracer<'a> {
     sampler: EnvironmentSampler,
     /// The environment where a ground lies in it.
     environment: Option<Environment>,
+    /// What shows behind the surface in place of the environment, where that is blurred there.
+    out_of_focus: Option<Environment>,
     settings: PictureSettings,
 }
 
@@ -40,8 +42,10 @@ impl<'a> PictureTracer<'a> {
     pub fn new(surface: &'a Surface, parameters: &'a Parameters<f32>, settings: PictureSettings) -> Self {
         let environment = parameters.environment();
         let sampler = EnvironmentSampler::new(&environment);
+        let is_blurred = settings.background_visible && settings.background_blur_degrees > 0.0;
+        let out_of_focus = is_blurred.then(|| environment.out_of_focus(settings.background_blur_degrees));
         let environment = settings.ground.is_some().then_some(environment);
-        PictureTracer { surface, parameters, sampler, environment, settings }
+        PictureTracer { surface, parameters, sampler, environment, out_of_focus, settings }
     }
 
     /// The path tracer behind it, for sums of one's own.
@@ -54,7 +58,7 @@ impl<'a> PictureTracer<'a> {
             settings: PathSettings {
                 max_bounces: self.settings.max_bounces,
                 lobe_strength: self.settings.lobe_strength,
-                background_visible: self.settings.background_visible,
+                background_visible: self.settings.background_visible && self.out_of_focus.is_none(),
                 two_sided: self.settings.two_sided,
                 camera_cone_radians: 0.0,
                 bounce_cone_radians: 0.0,
@@ -102,18 +106,26 @@ impl<'a> PictureTracer<'a> {
         let rays = CameraRays::fresh(self.surface, camera, self.settings.filter, samples);
         let estimate = estimate_pixel(&self.paths(), &rays, pixel, key, self.parameters, arena);
         let mean = estimate.mean(rays.samples());
-        match (self.settings.ground, &self.environment) {
-            (Some(height), Some(environment)) if estimate.escaped > 0.0 => {
-                let lit = self.lit_ground(environment, height, camera, key, pixel, samples);
-                let behind = match self.settings.background_visible {
-                    true => environment.radiance_towards(lit.direction) * estimate.escaped,
-                    false => Vec3::ZERO,
-                };
-                // Never below nothing: within a pixel the environment may be brighter than where it is looked up.
-                ((mean - behind * (1.0 - lit.share)).max(Vec3::ZERO), 1.0 - estimate.escaped * lit.share)
-            }
-            _ => (mean, 1.0 - estimate.escaped),
+        if estimate.escaped <= 0.0 {
+            return (mean, 1.0 - estimate.escaped);
         }
+        let (lit_share, direction) = match (self.settings.ground, &self.environment) {
+            (Some(height), Some(environment)) => {
+                let lit = self.lit_ground(environment, height, camera, key, pixel, samples);
+                (lit.share, lit.direction)
+            }
+            _ => (1.0, camera.ray_through(centre_of(pixel, camera)).direction),
+        };
+        let behind = match (&self.out_of_focus, &self.environment) {
+            (Some(shown), _) => lit_share * shown.radiance_towards(direction),
+            // The paths have brought it already, and what is in the shadow is taken off.
+            (None, Some(shown)) if self.settings.background_visible => {
+                (lit_share - 1.0) * shown.radiance_towards(direction)
+            }
+            _ => Vec3::ZERO,
+        };
+        // Never below nothing: within a pixel the environment may be brighter than where it is looked up.
+        ((mean + estimate.escaped * behind).max(Vec3::ZERO), 1.0 - estimate.escaped * lit_share)
     }
 
     /// The share of light on the ground that a ray of this pixel meets.
@@ -170,6 +182,11 @@ impl<'a> PictureTracer<'a> {
 struct LitGround {
     share: f32,
     direction: Vec3,
+}
+
+/// The middle of a pixel, in pixels.
+fn centre_of(pixel: usize, camera: &Camera) -> Vec2 {
+    Vec2::new((pixel % camera.width) as f32 + 0.5, (pixel / camera.width) as f32 + 0.5)
 }
 
 /// Directions towards the light for a look at the ground: a ratio of sums of fewer is biased.
@@ -318,6 +335,9 @@ fn pixels_of_tile(tile: usize, width: usize, height: usize) -> impl Iterator<Ite
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::material::TexelPyramid;
+    use crate::material::texels::{PyramidWeights, texels_from_maps};
+    use crate::scene::demo::{DemoSettings, build};
 
     #[test]
     fn tiles_cover_each_pixel_once_and_passes_reach_their_target() {
@@ -334,5 +354,38 @@ mod tests {
             done += passes[passes.len() - 1];
         }
         assert_eq!(passes, [1, 1, 2, 4, 3]);
+    }
+
+    #[test]
+    fn a_background_out_of_focus_changes_nothing_on_the_surface() {
+        let settings =
+            DemoSettings { views: 1, held_out: 0, width: 40, height: 30, map_size: 64, seed: 1, ..Default::default() };
+        let scene = build(&settings).unwrap().scene;
+        let surface = Surface::new(scene.mesh.clone()).unwrap();
+        let truth = scene.truth.as_ref().unwrap();
+        let texels = TexelPyramid::from_base(texels_from_maps(&truth.maps), &PyramidWeights::flat(64, 64))
+            .with_model(truth.lobe);
+        let parameters = Parameters::new(texels, &truth.environment);
+        let camera = scene.views[0].camera;
+        let render = |background_blur_degrees: f32| {
+            let settings = PictureSettings { samples: 4, background_blur_degrees, ..Default::default() };
+            super::super::picture::render(&surface, &camera, &parameters, 0, &settings, &AtomicBool::new(false))
+        };
+        let [sharp, blurred] = [0.0, 20.0].map(render);
+        let shown = truth.environment.out_of_focus(20.0);
+        let mut seen = [0; 2];
+        for pixel in 0..camera.width * camera.height {
+            let [sharp_radiance, radiance] = [&sharp, &blurred].map(|picture| picture.radiance.pixels()[pixel]);
+            match blurred.coverage.pixels()[pixel] {
+                1.0 => assert_eq!(radiance, sharp_radiance),
+                0.0 => {
+                    let towards = camera.ray_through(centre_of(pixel, &camera)).direction;
+                    assert!((radiance - shown.radiance_towards(towards)).abs().max_element() < 1e-4);
+                }
+                _ => continue,
+            }
+            seen[usize::from(blurred.coverage.pixels()[pixel] > 0.0)] += 1;
+        }
+        assert!(seen.iter().all(|&count| count > 50), "{seen:?}");
     }
 }

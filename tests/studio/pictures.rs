@@ -145,6 +145,11 @@ fn the_stage_shows_the_mesh_and_changes_with_layer_and_light() {
     let again = part(&picture(&mut studio, "fitted"), rect, 1.0);
     assert!(share_changed(&lit, &again) < 0.002, "nothing changed, nothing moves");
 
+    studio.click("Blurred");
+    let out_of_focus = once(&mut studio, "out of focus", rect, |pixels| share_changed(&lit, pixels) > 0.05);
+    studio.click("Blurred");
+    once(&mut studio, "in focus", rect, |pixels| share_changed(&out_of_focus, pixels) > 0.05);
+
     studio.press(Modifiers::NONE, Key::Num2);
     let diffuse = once(&mut studio, "diffuse", rect, |pixels| share_changed(&lit, pixels) > 0.3);
     studio.press(Modifiers::NONE, Key::Num5);

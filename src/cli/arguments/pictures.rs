@@ -29,6 +29,14 @@ fn hits(text: &str) -> Result<usize, String> {
     }
 }
 
+/// An angle by which a background is blurred, in degrees.
+fn blur(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(degrees) if (0.0..=90.0).contains(&degrees) => Ok(degrees),
+        _ => Err("give degrees from 0 to 90".into()),
+    }
+}
+
 /// Options of `patina relight`.
 #[derive(Debug, Args)]
 pub struct RelightOptions {
@@ -65,6 +73,12 @@ pub struct RelightOptions {
     /// Do not show the environment as background.
     #[arg(long)]
     pub hide_background: bool,
+    /// Show the environment out of focus behind the surface, blurred by so many degrees; what it lights stays sharp.
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, conflicts_with = "hide_background", value_parser = blur)]
+    pub background_blur: f32,
+    /// Lay a level ground under the surface that shows its shadow on the environment behind it.
+    #[arg(long, conflicts_with = "material")]
+    pub ground: bool,
     /// Give parts of the surface a measured reflectance: a `.binary` file, the result folder of `patina object`, or the
     /// name of a material of the neural model. One for each --region, or one for the whole surface.
     #[arg(long)]
@@ -131,6 +145,9 @@ pub struct RenderOptions {
     /// Do not show the environment as background.
     #[arg(long)]
     pub hide_background: bool,
+    /// Show the environment out of focus behind the surface, blurred by so many degrees.
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, conflicts_with = "hide_background", value_parser = blur)]
+    pub background_blur: f32,
     /// How the scene is read.
     #[command(flatten)]
     pub read: ReadOptions,

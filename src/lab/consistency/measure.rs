@@ -117,6 +117,7 @@ fn sums(
         max_bounces: fit.bounces,
         lobe_strength: if fit.has_lobe() { 1.0 } else { 0.0 },
         background_visible: scene.background == Background::Environment,
+        background_blur_degrees: 0.0,
         seed: fit.seed ^ 0x57d7,
     };
     let mut total = AlignmentSums::default();

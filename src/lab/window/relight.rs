@@ -147,7 +147,7 @@ pub fn measure(path: Option<&Path>, is_quick: bool, tell: &dyn Fn(&str)) -> Resu
         tell(&format!("{}: {light}", own.name));
         let lit = |environment: &Environment| {
             let began = Instant::now();
-            let picture = view.lit(&transport, environment, &reflectance, true, &stop);
+            let picture = view.lit(&transport, environment, &reflectance, Some(environment), &stop);
             picture.map(|picture| (picture, began.elapsed().as_secs_f64())).ok_or_else(stopped)
         };
         let mut seconds = Vec::new();
@@ -159,7 +159,7 @@ pub fn measure(path: Option<&Path>, is_quick: bool, tell: &dyn Fn(&str)) -> Resu
             lit(&environment.rotated_about_up((5.0 * step as f32).to_radians()))?;
         }
         let turns_per_second = TIMES as f64 / began.elapsed().as_secs_f64();
-        let of_surface = view.lit(&transport, &environment, &reflectance, false, &stop).ok_or_else(stopped)?;
+        let of_surface = view.lit(&transport, &environment, &reflectance, None, &stop).ok_or_else(stopped)?;
         let (relative_error, bias) = errors(&own, &transport, &of_surface.radiance, &environment, is_quick, &view);
         rows.push(RelightRow {
             scene: own.name.clone(),

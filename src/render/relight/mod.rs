@@ -91,13 +91,13 @@ impl RelitView {
     }
 
     /// The view under a light. `reflectance` is that of [`CachedTransport::reflectance_of_points`] for the same maps. The
-    /// background is black unless `background_visible`; `None` when `stop` was raised.
+    /// background shows `behind`, and is black without it; `None` when `stop` was raised.
     pub fn lit(
         &self,
         transport: &CachedTransport,
         environment: &Environment,
         reflectance: &[[f32; 3]],
-        background_visible: bool,
+        behind: Option<&Environment>,
         stop: &AtomicBool,
     ) -> Option<RelitPicture> {
         let basis = &transport.basis;
@@ -129,12 +129,12 @@ impl RelitView {
                 let radiance = [0, 1, 2].map(|c| material[c] * arriving[c] + strength * reflected[c]);
                 pixels[point.pixel as usize - row * width] += Vec3::from_array(radiance) * point.share;
             }
-            if background_visible {
+            if let Some(behind) = behind {
                 for (column, pixel) in pixels.iter_mut().enumerate() {
                     let escaped = footprints.escaped[row * width + column];
                     if escaped > 0.0 {
                         let ray = self.camera.ray_through(Vec2::new(column as f32 + 0.5, row as f32 + 0.5));
-                        *pixel += environment.radiance_towards(ray.direction) * escaped;
+                        *pixel += behind.radiance_towards(ray.direction) * escaped;
                     }
                 }
             }
@@ -193,7 +193,7 @@ mod tests {
         let camera = &scene.views[0].camera;
         let footprints = FootprintSettings { map_size, ..FootprintSettings::default() };
         let view = RelitView::new(&surface, &transport, camera, &texels, &footprints, &stop).unwrap();
-        let own = view.lit(&transport, &truth.environment, &reflectance, false, &stop).unwrap();
+        let own = view.lit(&transport, &truth.environment, &reflectance, None, &stop).unwrap();
         let light: Vec<[f32; 3]> = truth.environment.radiance.pixels().iter().map(|rgb| rgb.to_array()).collect();
         let light = transport.basis.planes(&light);
         let at = transport.point_light(&light, &reflectance);
@@ -216,15 +216,19 @@ mod tests {
         assert!(error < 0.015 && own.lobe_points < traced.points.len(), "{error} {}", own.lobe_points);
         // Twice the light is twice the picture.
         let twice = Environment { radiance: truth.environment.radiance.map(|radiance| *radiance * 2.0) };
-        let twice = view.lit(&transport, &twice, &reflectance, true, &stop).unwrap().radiance;
-        let once = view.lit(&transport, &truth.environment, &reflectance, true, &stop).unwrap().radiance;
+        let twice = view.lit(&transport, &twice, &reflectance, Some(&twice), &stop).unwrap().radiance;
+        let once =
+            view.lit(&transport, &truth.environment, &reflectance, Some(&truth.environment), &stop).unwrap().radiance;
         let doubled = once.map(|pixel| *pixel * 2.0);
         assert!(relative_error(&twice, &doubled) < 1e-5);
         // The environment is seen behind, as the path tracer shows it.
         assert!(
             once.pixels().iter().zip(own.radiance.pixels()).any(|(with, without)| with.length() > without.length())
         );
-        assert!(view.lit(&transport, &truth.environment, &reflectance, true, &AtomicBool::new(true)).is_none());
+        assert!(
+            view.lit(&transport, &truth.environment, &reflectance, Some(&truth.environment), &AtomicBool::new(true))
+                .is_none()
+        );
     }
 
     #[test]

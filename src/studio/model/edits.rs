@@ -39,6 +39,8 @@ pub struct Relight {
     pub matched: bool,
     /// Whether the light shows behind the surface.
     pub as_background: bool,
+    /// Whether it is out of focus there.
+    pub is_background_blurred: bool,
     /// Whether a ground under the surface catches its shadow.
     pub ground: bool,
     /// Whether a chrome and a grey ball show the light over the stage.
@@ -57,10 +59,21 @@ impl Default for Relight {
             strength_stops: 0.0,
             matched: true,
             as_background: true,
+            is_background_blurred: false,
             ground: false,
             balls: false,
             day: Day::default(),
         }
+    }
+}
+
+/// By how many degrees a background that is out of focus is blurred: about as the stage's second layer of a light is.
+const BACKGROUND_BLUR_DEGREES: f32 = 10.0;
+
+impl Relight {
+    /// By how many degrees the light is blurred where it shows behind the surface.
+    pub fn background_blur_degrees(&self) -> f32 {
+        if self.is_background_blurred { BACKGROUND_BLUR_DEGREES } else { 0.0 }
     }
 }
 

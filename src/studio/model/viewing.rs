@@ -135,6 +135,7 @@ impl Model {
             samples,
             max_bounces: fit.bounces.max(2),
             background_visible: self.edits.relight.as_background,
+            background_blur_degrees: self.edits.relight.background_blur_degrees(),
             lobe_strength: if fit.has_lobe() { 1.0 } else { 0.0 },
             two_sided: self
                 .project

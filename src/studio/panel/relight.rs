@@ -67,6 +67,8 @@ fn controls(ui: &mut Ui, model: &mut Model) {
             .on_hover_text("Scale other environments to the mean luminance of the estimated one");
         let on = model.edits.relight.as_background;
         act_switch(ui, model, Act::LightBackground, "Background", on);
+        ui.add_enabled(on, egui::Checkbox::new(&mut model.edits.relight.is_background_blurred, "Blurred"))
+            .on_hover_text("Show the background out of focus; it lights the surface as before");
         ui.checkbox(&mut model.edits.relight.ground, "Ground plane")
             .on_hover_text("Show the shadow of the object on a level ground; path-traced images only");
         ui.checkbox(&mut model.edits.relight.balls, "Reference balls")

@@ -201,6 +201,8 @@ impl Default for StageContent {
 pub enum Backdrop {
     /// The light itself.
     Light,
+    /// The light out of focus.
+    BlurredLight,
     /// One colour, not changed by exposure or curve.
     Colour(Color32),
 }

@@ -23,6 +23,8 @@ const MIRROR_WIDTH: usize = 1024;
 pub(super) const WIDTHS: usize = 6;
 /// Smallest of these widths: its blur is about one texel. Below, the mirror image is blended in.
 pub(super) const FIRST_WIDTH: f32 = 0.07;
+/// The layer that a background out of focus shows, blurred by some ten degrees.
+pub(super) const OUT_OF_FOCUS: usize = 2;
 /// Texels along each side of the table of reflectances.
 pub(super) const TABLE_SIZE: usize = 32;
 

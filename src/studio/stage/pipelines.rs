@@ -3,7 +3,7 @@
 //! Only what a downlevel adapter has: no storage buffers, no features, at most five textures a stage of the pipeline.
 
 use super::frustum::{Line, PictureCorner};
-use super::light::{FIRST_WIDTH, WIDTHS};
+use super::light::{FIRST_WIDTH, OUT_OF_FOCUS, WIDTHS};
 use super::uniforms::{ScreenUniform, ViewUniform};
 use crate::image::display::{SCALE, STRIPE_PIXELS, TOO_BRIGHT, TOO_DARK};
 use eframe::wgpu;
@@ -60,6 +60,7 @@ fn constants() -> String {
     let _ = writeln!(text, "const TOO_BRIGHT = {};\nconst TOO_DARK = {};", vec3(TOO_BRIGHT), vec3(TOO_DARK));
     let _ = writeln!(text, "const UNKNOWN = vec3<f32>(0.4);\nconst STRIPE_PIXELS: u32 = {STRIPE_PIXELS}u;");
     let _ = writeln!(text, "const FIRST_WIDTH: f32 = {FIRST_WIDTH:?};\nconst WIDTHS: i32 = {WIDTHS};");
+    let _ = writeln!(text, "const OUT_OF_FOCUS: i32 = {OUT_OF_FOCUS};");
     text
 }
 

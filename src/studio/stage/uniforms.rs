@@ -98,8 +98,9 @@ impl ViewUniform {
                 if per_unit.is_finite() { per_unit } else { 0.0 },
             ),
             backdrop: match look.backdrop {
-                Backdrop::Light if content.light.is_some() => Vec4::W,
-                Backdrop::Light => Vec4::ZERO,
+                Backdrop::Light | Backdrop::BlurredLight if content.light.is_none() => Vec4::ZERO,
+                Backdrop::Light => Vec4::W,
+                Backdrop::BlurredLight => Vec4::W * 2.0,
                 Backdrop::Colour(colour) => vec3_of(colour).extend(0.0),
             },
             choice: UVec4::new(look.layer as u32, u32::from(content.vertex_colours.is_some()), 0, 0),

@@ -67,6 +67,7 @@ impl FrameCache {
         let on_texels = laid.and_then(|laid| laid.texels.clone());
         let on_vertices = laid.filter(|_| on_texels.is_none());
         let backdrop = match lit && relight.as_background {
+            true if relight.is_background_blurred => Backdrop::BlurredLight,
             true => Backdrop::Light,
             false => Backdrop::Colour(colours.stage),
         };

@@ -105,9 +105,17 @@ impl Relit {
                 };
                 let lights: Option<Vec<RelitLight>> = names.iter().map(light).collect();
                 let transport = cached.transport();
-                let background_visible = model.edits.relight.as_background;
-                let lights = lights?;
-                let request = RelitRequest { surface, transport, maps, camera, lights, background_visible, key, view };
+                let request = RelitRequest {
+                    surface,
+                    transport,
+                    maps,
+                    camera,
+                    lights: lights?,
+                    background_visible: model.edits.relight.as_background,
+                    background_blur_degrees: model.edits.relight.background_blur_degrees(),
+                    key,
+                    view,
+                };
                 self.asked = (key, view);
                 self.request(model, request, is_other_view);
             }

@@ -227,6 +227,7 @@ pub(super) fn key_of(
     let fitted = model.shelf.find(&LightName::Fitted).map_or(0, |light| Arc::as_ptr(&light.environment) as usize);
     (name, light, fitted, Arc::as_ptr(maps) as usize, size).hash(&mut hasher);
     let relight = &model.edits.relight;
-    (relight.matched, relight.as_background, relight.ground, model.edits.fit.bounces).hash(&mut hasher);
+    (relight.matched, relight.as_background, relight.is_background_blurred).hash(&mut hasher);
+    (relight.ground, model.edits.fit.bounces).hash(&mut hasher);
     hasher.finish() | 1
 }

@@ -180,5 +180,12 @@ fn colour_behind(behind: Behind) -> @location(0) vec4<f32> {
     let on_plane = (behind.place - view.focal_centre.zw) / view.focal_centre.xy;
     let axes = view.world_from_camera;
     let direction = axes[0].xyz * on_plane.x + axes[1].xyz * on_plane.y + axes[2].xyz;
-    return vec4(min(light_towards(normalize(direction), behind.place.x), vec3(LARGEST)), RADIANCE + BEHIND);
+    let towards = normalize(direction);
+    var radiance: vec3<f32>;
+    if view.backdrop.w > 1.5 {
+        radiance = blurred_light(towards, OUT_OF_FOCUS, behind.place.x);
+    } else {
+        radiance = light_towards(towards, behind.place.x);
+    }
+    return vec4(min(radiance, vec3(LARGEST)), RADIANCE + BEHIND);
 }
