@@ -100,8 +100,8 @@ const GGX: &str = "the Blinn-Phong lobe becomes the nearest GGX lobe";
 const OF_METALNESS: &str = "base colour and metalness stand for the specular map in the variant that is chosen at first, where readers that pass over a specular colour \
     have one F0 for all that is no metal; the variant \
     `specular` holds the maps as fitted, for importers that know that workflow";
-const WEB_SHOWS: &str = "the page shows the fitted lobe by maps blurred beforehand: no sharp shadows but those of the sun, soft ones by what \
-     each vertex sees of the sky in nine spherical harmonics, light between surfaces as if all around were of one colour";
+const WEB_SHOWS: &str = "the page shows the fitted lobe by maps blurred beforehand: no sharp shadows but those of the sun, soft ones and light \
+     between surfaces by what each vertex gets of the light in nine spherical harmonics";
 
 /// What to export, and how.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

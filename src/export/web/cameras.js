@@ -88,5 +88,12 @@ function cameras_of(mesh) {
     }
     return new Float32Array(result.flat());
   }
-  return { orbit, radius, inverse, orbit_camera, photo_camera, sun_of, turned_harmonics };
+  // Harmonics of the whole light: of the sky and of a sun that shines from one place.
+  function with_sun(sky, { towards, irradiance }) {
+    const [x, y, z] = [towards[2], towards[0], towards[1]];
+    const values = [0.2820948, 0.4886025 * y, 0.4886025 * z, 0.4886025 * x, 1.0925484 * x * y, 1.0925484 * y * z,
+      0.3153916 * (3 * z * z - 1), 1.0925484 * x * z, 0.5462742 * (x * x - y * y)];
+    return sky.map((own, index) => own + irradiance[index % 3] * values[Math.floor(index / 3)]);
+  }
+  return { orbit, radius, inverse, orbit_camera, photo_camera, sun_of, turned_harmonics, with_sun };
 }

@@ -26,21 +26,37 @@ const common = `#version 300 es
   uniform float sun_cosine;`;
 const surface_vertex = `#version 300 es
   precision highp float;
-  in vec3 position; in vec4 normal; in vec2 uv; in vec4 transfer_a, transfer_b;
+  in vec3 position; in vec4 normal; in vec2 uv; in vec4 direct_a, direct_b;
+  // By way of other surface: nine numbers of red, of green, of blue, and the openness of the back.
+  in vec4 between_0, between_1, between_2, between_3, between_4, between_5, between_6;
   uniform vec3 low, extent; uniform mat4 clip_from_world;
-  out vec3 world, direction; out vec2 coordinate; out float openness; out vec4 passed_a, passed_b;
+  // The light in spherical harmonics, turned, its sun among it.
+  uniform vec3 harmonics_with_sun[9];
+  uniform float largest_between;
+  out vec3 world, direction, between; out vec2 coordinate; out float openness, openness_behind; out vec4 passed_a, passed_b;
+  float sum_of(vec4 a, vec4 b, float c, int channel) {
+    float sum = c * harmonics_with_sun[8][channel];
+    for (int i = 0; i < 4; i++) sum += a[i] * harmonics_with_sun[i][channel] + b[i] * harmonics_with_sun[i + 4][channel];
+    return sum;
+  }
   void main() {
     world = low + extent * position;
     direction = normal.xyz;
     openness = normal.w;
-    passed_a = transfer_a;
-    passed_b = transfer_b;
+    openness_behind = between_6.w;
+    passed_a = direct_a;
+    passed_b = direct_b;
+    vec3 sums = vec3(
+      sum_of(between_0, between_1, between_2.x, 0),
+      sum_of(vec4(between_2.yzw, between_3.x), vec4(between_3.yzw, between_4.x), between_4.y, 1),
+      sum_of(vec4(between_4.zw, between_5.xy), vec4(between_5.zw, between_6.xy), between_6.z, 2));
+    between = max(largest_between * sums, 0.0);
     coordinate = uv;
     gl_Position = clip_from_world * vec4(world, 1.0);
   }`;
 const surface_fragment = `${common.replace('precision highp float;', `#define SUNS ${suns}\n    precision highp float;`)}
   precision highp sampler2DArrayShadow;
-  in vec3 world, direction; in vec2 coordinate; in float openness; in vec4 passed_a, passed_b;
+  in vec3 world, direction, between; in vec2 coordinate; in float openness, openness_behind; in vec4 passed_a, passed_b;
   uniform vec3 eye;
   // The light in spherical harmonics about +y, turned, and the transfer that a byte of 127 stands for.
   uniform vec3 harmonics[9];
@@ -49,8 +65,6 @@ const surface_fragment = `${common.replace('precision highp float;', `#define SU
   uniform mat4 shadow_from_world[SUNS];
   uniform sampler2DArrayShadow shadow_map;
   uniform float shadow_lift;
-  // Mean diffuse reflectance of the surface.
-  uniform vec3 mean_albedo;
   uniform bool is_ggx;
   uniform sampler2D diffuse_map, specular_map, width_map, table, irradiance_map;
   uniform sampler2D levels;
@@ -105,17 +119,20 @@ const surface_fragment = `${common.replace('precision highp float;', `#define SU
   }
   void main() {
     vec3 n = normalize(direction), o = normalize(eye - world);
+    vec3 facet = cross(dFdx(world), dFdy(world));
+    bool is_back = dot(facet, n) * dot(facet, o) < 0.0;
+    if (is_back) n = -n;
     if (dot(n, o) < 0.0) n = normalize(n - 1.02 * dot(n, o) * o);
+    float open_here = is_back ? openness_behind : openness;
     vec2 at = vec2(coordinate.x, 1.0 - coordinate.y);
     float cosine = clamp(dot(n, o), 0.0, 1.0);
     vec3 albedo = texture(diffuse_map, at).rgb;
     vec3 sun_share = vec3(0.0);
     float i = dot(n, sun_towards);
     if (sun_cosine <= 1.0 && i > 0.0) sun_share = sun_irradiance * i * sunlit(n);
-    // What is hidden of the sky is a surface like this one, as brightly lit: light goes back and forth in it.
-    vec3 falling = sky(n) + sun_share / PI;
-    vec3 returned = (1.0 - openness) * albedo;
-    vec3 light = albedo * (falling / (1.0 - returned) - sun_share / PI);
+    // Of the back only the share of the sky is known that it sees.
+    vec3 falling = is_back ? open_here * texture(irradiance_map, place(n)).rgb : sky(n) + between;
+    vec3 light = albedo * falling;
     if (has_lobe) {
       vec3 f0 = texture(specular_map, at).rgb;
       float width = texture(width_map, at).r;
@@ -125,9 +142,9 @@ const surface_fragment = `${common.replace('precision highp float;', `#define SU
       vec3 near = index < 1.0 ? texture(level0, place(r)).rgb : level(r, floor(index));
       vec3 far = level(r, min(floor(index) + 1.0, level_count - 1.0));
       // Lagarde and de Rousiers 2014: what a closed place hides of a lobe.
-      float open = clamp(pow(cosine + openness, exp2(-16.0 * width - 1.0)) - 1.0 + openness, 0.0, 1.0);
-      // What is hidden of it shows the surface, lit as this place is.
-      vec3 around = mean_albedo * falling / (1.0 - (1.0 - openness) * mean_albedo);
+      float open = clamp(pow(cosine + open_here, exp2(-16.0 * width - 1.0)) - 1.0 + open_here, 0.0, 1.0);
+      // What is hidden of it shows other surface, as bright as what sends light here is in the mean.
+      vec3 around = is_back ? vec3(0.0) : between / max(1.0 - openness, 0.05);
       light += (f0 * ab.x + ab.y) * mix(around, mix(near, far, fract(index)), open);
     }
     if (sun_share != vec3(0.0)) {

@@ -1,21 +1,26 @@
-//! What each vertex lets through of the sky: precomputed transfer in spherical harmonics of bands 0 to 2 (Sloan, Kautz and
-//! Snyder 2002, without light between surfaces).
+//! What each vertex gets of a light, past the mesh and by way of it: precomputed transfer in spherical harmonics of bands 0
+//! to 2 (Sloan, Kautz and Snyder 2002).
 //!
 //! The polar axis is +y, so that a light that turns about it only turns the two functions of each order within each other.
 
 use crate::error::Result;
+use crate::image::RgbImage;
 use crate::light::Environment;
 use crate::math::frame::{Frame, sample_cosine_hemisphere};
 use crate::math::parallel;
 use crate::math::sphere::{direction_of_texel, solid_angle_of_texel};
 use crate::scene::Mesh;
 use crate::trace::{Bvh, Ray};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 /// Functions of bands 0 to 2.
 pub const COUNT: usize = 9;
 /// Largest transfer that a byte holds; none is larger but at places that see next to nothing.
 pub const LARGEST: f32 = 0.6;
+/// The same of light that comes by way of other surface.
+pub const LARGEST_BETWEEN: f32 = 0.3;
+/// How often light goes from surface to surface.
+const BOUNCES: usize = 2;
 /// Rays from a vertex along each side of the square that spreads them.
 const SIDE: usize = 12;
 
@@ -50,39 +55,117 @@ pub fn coefficients(light: &Environment) -> [Vec3; COUNT] {
     sums.map(|sum| sum.as_vec3())
 }
 
-/// For each vertex the integral over the directions it sees of cosine over pi times each function: times a light's
-/// coefficients, summed, it is the irradiance over pi that reaches the vertex past the mesh itself.
+/// What a vertex gets of a light: times the light's coefficients, summed, it is irradiance over pi.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transfer {
+    /// Past the mesh itself: the integral over directions that see the sky of cosine over pi times each function.
+    pub direct: [f32; COUNT],
+    /// By way of other surface, channel by channel.
+    pub between: [[f32; COUNT]; 3],
+    /// Share of the sky, by the cosine, that the back of the surface sees.
+    pub openness_behind: f32,
+}
+
+impl Transfer {
+    const NONE: Self = Transfer { direct: [0.0; COUNT], between: [[0.0; COUNT]; 3], openness_behind: 0.0 };
+
+    /// Share of the sky, by the cosine, that the vertex sees.
+    pub fn openness(&self) -> f32 {
+        self.direct[0] / harmonics(Vec3::Y)[0]
+    }
+}
+
+/// The transfer of each vertex. Backs of surface send nothing on.
 ///
 /// # Errors
 /// A mesh in which no rays can be traced.
-pub fn transfer(mesh: &Mesh) -> Result<Vec<[f32; COUNT]>> {
-    let bvh = Bvh::build(&mesh.positions, &mesh.triangles)?;
-    let (low, high) = bvh.bounds();
-    let lift = 1e-4 * (high - low).length();
-    let of_vertex = |vertex: usize| {
-        let (position, normal) = (mesh.positions[vertex], mesh.normals[vertex].try_normalize().unwrap_or(Vec3::Y));
-        let frame = Frame::around(normal);
-        let mut sum = [0.0; COUNT];
-        for index in 0..SIDE * SIDE {
-            let u = [(index / SIDE) as f32 + 0.5, (index % SIDE) as f32 + 0.5].map(|place| place / SIDE as f32);
-            let direction = frame.outer_from_local(sample_cosine_hemisphere(u));
-            if !bvh.is_occluded(&Ray { origin: position + normal * lift, direction, t_max: f32::INFINITY }) {
-                sum.iter_mut().zip(harmonics(direction)).for_each(|(sum, value)| *sum += value);
-            }
-        }
-        sum.map(|sum| sum / (SIDE * SIDE) as f32)
-    };
-    Ok(parallel::map(mesh.positions.len().min(mesh.normals.len()), of_vertex))
+pub fn transfer(mesh: &Mesh, diffuse: &RgbImage) -> Result<Vec<Transfer>> {
+    let gatherer = Gatherer::new(mesh, diffuse)?;
+    let count = mesh.positions.len().min(mesh.normals.len());
+    let mut all = parallel::map(count, |vertex| gatherer.of_sky(vertex));
+    for _ in 0..BOUNCES {
+        let between = parallel::map(count, |vertex| gatherer.of_surface(vertex, &all));
+        all.iter_mut().zip(between).for_each(|(own, between)| own.between = between);
+    }
+    Ok(all)
 }
 
-/// Share of the sky, by the cosine, that a vertex sees.
-pub fn openness(transfer: &[f32; COUNT]) -> f32 {
-    transfer[0] / harmonics(Vec3::Y)[0]
+struct Gatherer<'a> {
+    mesh: &'a Mesh,
+    diffuse: &'a RgbImage,
+    bvh: Bvh,
+    lift: f32,
+}
+
+impl<'a> Gatherer<'a> {
+    fn new(mesh: &'a Mesh, diffuse: &'a RgbImage) -> Result<Self> {
+        let bvh = Bvh::build(&mesh.positions, &mesh.triangles)?;
+        let (low, high) = bvh.bounds();
+        Ok(Gatherer { mesh, diffuse, lift: 1e-4 * (high - low).length(), bvh })
+    }
+
+    /// Rays from a vertex, spread by the cosine about this normal.
+    fn rays(&self, vertex: usize, normal: Vec3) -> impl Iterator<Item = Ray> {
+        let origin = self.mesh.positions[vertex] + normal * self.lift;
+        let frame = Frame::around(normal);
+        (0..SIDE * SIDE).map(move |index| {
+            let u = [(index / SIDE) as f32 + 0.5, (index % SIDE) as f32 + 0.5].map(|place| place / SIDE as f32);
+            Ray { origin, direction: frame.outer_from_local(sample_cosine_hemisphere(u)), t_max: f32::INFINITY }
+        })
+    }
+
+    fn normal(&self, vertex: usize) -> Vec3 {
+        self.mesh.normals[vertex].try_normalize().unwrap_or(Vec3::Y)
+    }
+
+    fn of_sky(&self, vertex: usize) -> Transfer {
+        const SHARE: f32 = 1.0 / (SIDE * SIDE) as f32;
+        let mut own = Transfer::NONE;
+        for ray in self.rays(vertex, self.normal(vertex)).filter(|ray| !self.bvh.is_occluded(ray)) {
+            own.direct.iter_mut().zip(harmonics(ray.direction)).for_each(|(sum, value)| *sum += SHARE * value);
+        }
+        let open = self.rays(vertex, -self.normal(vertex)).filter(|ray| !self.bvh.is_occluded(ray)).count();
+        Transfer { openness_behind: SHARE * open as f32, ..own }
+    }
+
+    /// What arrives from other surface, of what arrives there by now.
+    fn of_surface(&self, vertex: usize, all: &[Transfer]) -> [[f32; COUNT]; 3] {
+        let mut sums = [[0.0; COUNT]; 3];
+        for ray in self.rays(vertex, self.normal(vertex)) {
+            let Some(hit) = self.bvh.closest_hit(&ray) else { continue };
+            let corners = self.mesh.triangles[hit.triangle as usize].map(|corner| corner as usize);
+            let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
+            let there = || corners.into_iter().zip(weights);
+            let normal: Vec3 = there().map(|(corner, weight)| weight * self.mesh.normals[corner]).sum();
+            if normal.dot(ray.direction) >= 0.0 {
+                continue;
+            }
+            let uv: Vec2 = there().map(|(corner, weight)| weight * self.mesh.uvs[corner]).sum();
+            let albedo = self.diffuse_at(uv).to_array();
+            for (corner, weight) in there().filter(|(corner, _)| *corner < all.len()) {
+                let own = &all[corner];
+                for (channel, sums) in sums.iter_mut().enumerate() {
+                    let share = albedo[channel] * weight / (SIDE * SIDE) as f32;
+                    let arriving = own.direct.iter().zip(&own.between[channel]);
+                    sums.iter_mut().zip(arriving).for_each(|(sum, (direct, between))| *sum += share * (direct + between));
+                }
+            }
+        }
+        sums
+    }
+
+    /// Diffuse reflectance of the texel at these texture coordinates.
+    fn diffuse_at(&self, uv: Vec2) -> Vec3 {
+        let (width, height) = (self.diffuse.width(), self.diffuse.height());
+        let place = |share: f32, count: usize| ((share * count as f32).max(0.0) as usize).min(count - 1);
+        self.diffuse[(place(1.0 - uv.y, height), place(uv.x, width))]
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::image::Image;
 
     #[test]
     fn harmonics_are_orthonormal() {
@@ -107,12 +190,13 @@ mod tests {
     fn a_vertex_in_the_open_gets_the_irradiance_of_a_smooth_light_and_one_in_a_corner_what_it_sees() {
         // Radiance 1 + y over the sphere: over pi the irradiance of an upward surface is 1 + 2/3.
         let light = Environment {
-            radiance: crate::image::Image::from_fn(64, 32, |row, column| {
+            radiance: Image::from_fn(64, 32, |row, column| {
                 Vec3::splat(1.0 + direction_of_texel(row, column, 64, 32).y)
             }),
         };
         let coefficients = coefficients(&light);
-        let at = |transfer: &[f32; COUNT]| -> f32 { transfer.iter().zip(&coefficients).map(|(t, l)| t * l.x).sum() };
+        let lit = |transfer: &[f32; COUNT]| -> f32 { transfer.iter().zip(&coefficients).map(|(t, l)| t * l.x).sum() };
+        let black = Image::filled(4, 4, Vec3::ZERO);
         let floor = |x: f32, z: f32| Vec3::new(x, 0.0, z);
         let mut mesh = Mesh {
             positions: vec![floor(-9.0, -9.0), floor(9.0, -9.0), floor(9.0, 9.0), floor(-9.0, 9.0), Vec3::ZERO],
@@ -120,18 +204,42 @@ mod tests {
             ..Mesh::default()
         };
         mesh.normals = vec![Vec3::Y; 5];
-        let open = transfer(&mesh).unwrap()[4];
-        assert!((at(&open) - 5.0 / 3.0).abs() < 0.02 && (openness(&open) - 1.0).abs() < 1e-6, "{}", at(&open));
+        mesh.uvs = vec![Vec2::splat(0.5); 9];
+        let open = transfer(&mesh, &black).unwrap()[4];
+        assert!((lit(&open.direct) - 5.0 / 3.0).abs() < 0.02 && (open.openness() - 1.0).abs() < 1e-6, "{open:?}");
+        assert_eq!(open.openness_behind, 1.0);
         // A high wall beside it hides the half of +x: it sees half of the sky, and of this light half of the irradiance.
         let wall = |y: f32, z: f32| Vec3::new(0.05, y, z);
         let first = mesh.positions.len() as u32;
         mesh.positions.extend([wall(0.0, -500.0), wall(0.0, 500.0), wall(500.0, 500.0), wall(500.0, -500.0)]);
         mesh.normals.extend([Vec3::NEG_X; 4]);
         mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
-        let beside = transfer(&mesh).unwrap()[4];
-        assert!((openness(&beside) - 0.5).abs() < 0.02, "{}", openness(&beside));
-        assert!((at(&beside) - 5.0 / 6.0).abs() < 0.03, "{}", at(&beside));
+        let beside = transfer(&mesh, &black).unwrap()[4];
+        assert!((beside.openness() - 0.5).abs() < 0.02, "{}", beside.openness());
+        assert!((lit(&beside.direct) - 5.0 / 6.0).abs() < 0.03, "{}", lit(&beside.direct));
         // And a light from +x alone reaches it no more.
-        assert!(beside[1] < -0.1, "{beside:?}");
+        assert!(beside.direct[1] < -0.1, "{beside:?}");
+        assert_eq!(beside.between, [[0.0; COUNT]; 3]);
+    }
+
+    #[test]
+    fn light_goes_between_two_faces_in_the_colour_of_the_surface() {
+        let corner = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
+        let face = |y: f32| [corner(-1.0, y, -1.0), corner(1.0, y, -1.0), corner(1.0, y, 1.0), corner(-1.0, y, 1.0)];
+        let mut mesh = Mesh { positions: [face(0.0), face(0.5)].concat(), ..Mesh::default() };
+        mesh.triangles = vec![[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]];
+        mesh.normals = [[Vec3::Y; 4], [Vec3::NEG_Y; 4]].concat();
+        mesh.uvs = vec![Vec2::splat(0.5); 8];
+        let [white, red] = [Vec3::ONE, Vec3::X].map(|rgb| transfer(&mesh, &Image::filled(2, 2, 0.5 * rgb)).unwrap());
+        for (white, red) in white.iter().zip(&red) {
+            assert_eq!((white.direct, white.openness_behind), (red.direct, 1.0));
+            let even = |between: &[f32; COUNT]| between[0] / harmonics(Vec3::Y)[0];
+            let [one, none] = [even(&red.between[0]), even(&red.between[1])];
+            // A corner sees a part of the other face, which has as much of the sky as it, and some of what that reflects.
+            let hidden = 1.0 - white.openness();
+            let (least, most) = (0.5 * hidden * white.openness(), 0.5 * hidden / (1.0 - 0.5 * hidden));
+            assert!(none == 0.0 && one > least && one < most, "{one} {least} {most}");
+            assert_eq!(red.between[0], white.between[2]);
+        }
     }
 }

@@ -1,7 +1,6 @@
 // A viewer of one fitted surface. Light is read from maps that were blurred by the lobe beforehand, but for the sun of an
 // environment, which casts shadows; see convention.txt.
-(() => {
-  const data = JSON.parse(document.getElementById("document").textContent);
+(async () => {
   const element = (name) => document.getElementById(name);
   const canvas = element("canvas");
   const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
@@ -10,8 +9,19 @@
     note.textContent = "This browser has no WebGL 2: the surface cannot be shown.";
     return;
   }
-  const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-  const words = (text) => new Uint16Array(bytes(text).buffer);
+  // What is deflated in the document, wherever it stands, as bytes.
+  const unpacked = async (value) => {
+    if (value === null || typeof value !== "object") return value;
+    if (value.deflated !== undefined) {
+      const bytes = Uint8Array.from(atob(value.deflated), (c) => c.charCodeAt(0));
+      const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+      return new Uint8Array(await new Response(stream).arrayBuffer());
+    }
+    if (Array.isArray(value)) return Promise.all(value.map(unpacked));
+    return Object.fromEntries(await Promise.all(Object.entries(value).map(async ([name, own]) => [name, await unpacked(own)])));
+  };
+  const data = await unpacked(JSON.parse(element("document").textContent));
+  const words = (bytes) => new Uint16Array(bytes.buffer);
 
   // ---- Programs
   function program_of(vertex, fragment) {
@@ -49,18 +59,21 @@
     gl.vertexAttribPointer(place, size, type, normalised, 0, 0);
   };
   attribute("position", words(data.mesh.positions), 3, gl.UNSIGNED_SHORT, true);
-  attribute("normal", new Int8Array(bytes(data.mesh.normals).buffer), 4, gl.BYTE, true);
-  const transfer = new Int8Array(bytes(data.mesh.transfer).buffer);
-  const half_of = (first) => {
-    const part = new Int8Array(transfer.length / 2);
-    for (let vertex = 0; vertex < part.length / 4; vertex++)
-      for (let k = 0; k < 4; k++) part[4 * vertex + k] = transfer[8 * vertex + first + k];
-    return part;
+  attribute("normal", data.mesh.normals, 4, gl.BYTE, true);
+  // Numbers of a vertex that lie side by side, four to an attribute.
+  const fours = (names, values) => {
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
+    names.forEach((name, k) => {
+      const place = gl.getAttribLocation(surface.program, name);
+      gl.enableVertexAttribArray(place);
+      gl.vertexAttribPointer(place, 4, gl.BYTE, true, 4 * names.length, 4 * k);
+    });
   };
-  attribute("transfer_a", half_of(0), 4, gl.BYTE, true);
-  attribute("transfer_b", half_of(4), 4, gl.BYTE, true);
+  fours(["direct_a", "direct_b"], data.mesh.direct);
+  fours([0, 1, 2, 3, 4, 5, 6].map((k) => `between_${k}`), data.mesh.between);
   attribute("uv", words(data.mesh.uvs), 2, gl.UNSIGNED_SHORT, true);
-  const indices = new Uint32Array(bytes(data.mesh.indices).buffer);
+  const indices = new Uint32Array(data.mesh.indices.buffer);
   gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
   gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
   gl.bindVertexArray(null);
@@ -119,7 +132,7 @@
     return texture;
   };
 
-  const { orbit, radius, inverse, orbit_camera, photo_camera, sun_of, turned_harmonics } = cameras_of(data.mesh);
+  const { orbit, radius, inverse, orbit_camera, photo_camera, sun_of, turned_harmonics, with_sun } = cameras_of(data.mesh);
 
   // ---- Controls
   const chosen = { light: 0, view: -1 };
@@ -127,7 +140,7 @@
   lights.forEach((light, i) => option(element("light"), light.name, i));
   option(element("view"), "none", -1);
   data.photos.forEach((photo, i) => option(element("view"), photo.name, i));
-  const remarks = ["Raster preview: only the sun casts sharp shadows; light between surfaces is a rough guess."];
+  const remarks = ["Raster preview: only the sun casts sharp shadows."];
   if (!data.hasLobe) remarks.push("The surface was fitted without a specular lobe.");
   if (!lights.length) remarks.push("The run has no environment.");
   note.textContent = `${data.name} · ${remarks.join(" ")}`;
@@ -253,8 +266,11 @@
     gl.uniform3fv(surface.uniforms.extent, data.mesh.extent);
     gl.uniform3fv(surface.uniforms.eye, camera.eye);
     gl.uniformMatrix4fv(surface.uniforms.clip_from_world, false, camera.clip);
-    gl.uniform3fv(surface.uniforms["harmonics[0]"], turned_harmonics(light, (+element("rotation").value * Math.PI) / 180));
+    const sky = turned_harmonics(light, (+element("rotation").value * Math.PI) / 180);
+    gl.uniform3fv(surface.uniforms["harmonics[0]"], sky);
+    gl.uniform3fv(surface.uniforms["harmonics_with_sun[0]"], with_sun(sky, sun));
     gl.uniform1f(surface.uniforms.largest, data.mesh.largest);
+    gl.uniform1f(surface.uniforms.largest_between, data.mesh.largestBetween);
     gl.uniform1f(surface.uniforms.level_count, data.levels);
     gl.uniform1i(surface.uniforms.has_lobe, data.hasLobe ? 1 : 0);
     bind(1, "levels", light.levels, surface);
@@ -265,7 +281,6 @@
     gl.bindTexture(gl.TEXTURE_2D_ARRAY, shadow_map);
     gl.uniform1i(surface.uniforms.shadow_map, 7);
     gl.uniformMatrix4fv(surface.uniforms["shadow_from_world[0]"], false, sun.matrices);
-    gl.uniform3fv(surface.uniforms.mean_albedo, data.meanAlbedo || [0.25, 0.25, 0.25]);
     gl.uniform1f(surface.uniforms.shadow_lift, (3 * radius) / shadow_size);
     gl.uniform1i(surface.uniforms.is_ggx, data.lobe === "ggx" ? 1 : 0);
     gl.drawElements(gl.TRIANGLES, indices.length, gl.UNSIGNED_INT, 0);
@@ -298,4 +313,4 @@
     redraw();
   }).catch((error) => { note.textContent = `The maps cannot be read: ${error.message}`; });
   redraw();
-})();
+})().catch((error) => { document.getElementById("note").textContent = `The page cannot be shown: ${error.message}`; });
