@@ -145,10 +145,14 @@ fn the_stage_shows_the_mesh_and_changes_with_layer_and_light() {
     let again = part(&picture(&mut studio, "fitted"), rect, 1.0);
     assert!(share_changed(&lit, &again) < 0.002, "nothing changed, nothing moves");
 
+    // An estimated light is smooth: what changes is little, but over all of the background.
+    let share_unlike = |before: &[[u8; 3]], after: &[[u8; 3]]| {
+        before.iter().zip(after).filter(|(before, after)| before != after).count() as f64 / before.len() as f64
+    };
     studio.click("Blurred");
-    let out_of_focus = once(&mut studio, "out of focus", rect, |pixels| share_changed(&lit, pixels) > 0.05);
+    let out_of_focus = once(&mut studio, "out of focus", rect, |pixels| share_unlike(&lit, pixels) > 0.1);
     studio.click("Blurred");
-    once(&mut studio, "in focus", rect, |pixels| share_changed(&out_of_focus, pixels) > 0.05);
+    once(&mut studio, "in focus", rect, |pixels| share_unlike(&out_of_focus, pixels) > 0.1);
 
     studio.press(Modifiers::NONE, Key::Num2);
     let diffuse = once(&mut studio, "diffuse", rect, |pixels| share_changed(&lit, pixels) > 0.3);
