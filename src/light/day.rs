@@ -6,6 +6,8 @@
 use super::environment::Environment;
 use super::sky::{SkySettings, physical_irradiance, sun_and_sky};
 use crate::error::{Error, ErrorKind, Place, Result};
+use crate::math::sphere::direction_of_angles;
+use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use std::f32::consts::{PI, TAU};
 
@@ -83,6 +85,12 @@ impl Day {
         let east = -declination.cos() * angle.sin();
         let north = latitude.cos() * declination.sin() - latitude.sin() * declination.cos() * angle.cos();
         (up.clamp(-1.0, 1.0).asin(), east.atan2(north).rem_euclid(TAU))
+    }
+
+    /// Direction towards the sun.
+    pub fn towards_sun(&self) -> Vec3 {
+        let (elevation, azimuth) = self.sun();
+        direction_of_angles(azimuth, 0.5 * PI - elevation)
     }
 
     /// The hours between which the sun is up; `None` where it does not rise.

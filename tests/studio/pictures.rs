@@ -102,24 +102,36 @@ fn the_sun_is_dragged_and_two_balls_show_the_light() {
     studio.click_role(Role::RadioButton, "Noon sky");
     studio.frames(3);
     let (from, turn) = (studio.control("Sun").rect().center(), studio.number("Rotation"));
-    let button = |pos, pressed| {
-        let (button, modifiers) = (PointerButton::Primary, Modifiers::NONE);
-        Event::PointerButton { pos, button, pressed, modifiers }
+    let drag_sun = |studio: &mut TestStudio, from: Pos2, to: Pos2| {
+        let button = |pos, pressed| {
+            let (button, modifiers) = (PointerButton::Primary, Modifiers::NONE);
+            Event::PointerButton { pos, button, pressed, modifiers }
+        };
+        studio.harness.event(Event::PointerMoved(from));
+        studio.frames(1);
+        studio.harness.event(button(from, true));
+        for share in [0.3, 0.7, 1.0] {
+            studio.harness.event(Event::PointerMoved(from + share * (to - from)));
+            studio.frames(2);
+        }
+        studio.harness.event(button(to, false));
+        studio.frames(3);
     };
     // The sun of noon stands over the stage: it goes along its border.
     let to = from + vec2(60.0, 0.0);
-    studio.harness.event(Event::PointerMoved(from));
-    studio.frames(1);
-    studio.harness.event(button(from, true));
-    for share in [0.3, 0.7, 1.0] {
-        studio.harness.event(Event::PointerMoved(from + share * (to - from)));
-        studio.frames(2);
-    }
-    studio.harness.event(button(to, false));
-    studio.frames(3);
+    drag_sun(&mut studio, from, to);
     let at = studio.control("Sun").rect().center();
     assert_ne!(studio.number("Rotation"), turn);
     assert!((at - to).length() < 8.0, "the sun follows the hand: {at:?} in place of {to:?}");
+    // That of a sky by the hour goes along its way over the day, and the sky does not turn.
+    studio.click_role(Role::RadioButton, "Sky by the hour");
+    studio.frames(3);
+    let (from, turn, hour) =
+        (studio.control("Sun").rect().center(), studio.number("Rotation"), studio.model().edits.relight.day.hour);
+    let towards = if from.x > stage_rect(&studio).center().x { -60.0 } else { 60.0 };
+    drag_sun(&mut studio, from, from + vec2(towards, 0.0));
+    assert_ne!(studio.model().edits.relight.day.hour, hour);
+    assert_eq!(studio.number("Rotation"), turn);
     // A light without a sun has no handle.
     studio.click_role(Role::RadioButton, "Overcast sky");
     studio.frames(3);

@@ -147,7 +147,9 @@ impl<'a> Gatherer<'a> {
                 for (channel, sums) in sums.iter_mut().enumerate() {
                     let share = albedo[channel] * weight / (SIDE * SIDE) as f32;
                     let arriving = own.direct.iter().zip(&own.between[channel]);
-                    sums.iter_mut().zip(arriving).for_each(|(sum, (direct, between))| *sum += share * (direct + between));
+                    sums.iter_mut()
+                        .zip(arriving)
+                        .for_each(|(sum, (direct, between))| *sum += share * (direct + between));
                 }
             }
         }

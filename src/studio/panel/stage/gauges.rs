@@ -5,6 +5,7 @@ use crate::image::RgbImage;
 use crate::image::display::DisplaySettings;
 use crate::light::Environment;
 use crate::light::ball::{matte_ball, mirror_ball};
+use crate::light::day::Day;
 use crate::scene::Camera;
 use crate::studio::model::{LightName, Model};
 use crate::studio::panel::relight::colour_image;
@@ -74,12 +75,24 @@ pub(super) fn show(
     if model.edits.relight.balls {
         balls(ui, model, memory, (&name, &own), (frame, rect, is_settled));
     }
+    if name == LightName::Day {
+        return handle(ui, model, Sun::OfDay, frame, rect);
+    }
     if memory.sun.as_ref().is_none_or(|(of, _)| !Arc::ptr_eq(of, &own)) {
         memory.sun = Some((Arc::clone(&own), sun_of(&own)));
     }
     if let Some((_, Some(sun))) = memory.sun {
-        handle(ui, model, sun, frame, rect);
+        handle(ui, model, Sun::Towards(sun), frame, rect);
     }
+}
+
+/// What is dragged.
+#[derive(Clone, Copy)]
+enum Sun {
+    /// The sun of a light that turns about the up axis.
+    Towards(Vec3),
+    /// The sun of a sky by the hour, which goes along its way over the day.
+    OfDay,
 }
 
 /// Direction of a light's sun; `None` where no texel stands out.
@@ -105,13 +118,17 @@ fn place_of(direction: Vec3, camera: &Camera, size: Vec2) -> (Vec2, bool) {
     (middle + towards * reach, false)
 }
 
-/// The sun, which is dragged about the up axis.
-fn handle(ui: &mut Ui, model: &mut Model, sun: Vec3, frame: &StageFrame, rect: Rect) {
+/// The sun, which is dragged about the up axis, or along its way over the day.
+fn handle(ui: &mut Ui, model: &mut Model, sun: Sun, frame: &StageFrame, rect: Rect) {
     let size = Vec2::new(rect.width(), rect.height());
     let camera = frame.eye.as_camera(size.x as usize, size.y as usize);
-    let turned = |degrees: f32| Quat::from_rotation_y(degrees.to_radians()) * sun;
-    let turn = model.edits.relight.turn_degrees;
-    let (place, is_on_stage) = place_of(turned(turn), &camera, size);
+    let turned = |sun: Vec3, degrees: f32| Quat::from_rotation_y(degrees.to_radians()) * sun;
+    let (turn, day) = (model.edits.relight.turn_degrees, model.edits.relight.day);
+    let towards = match sun {
+        Sun::Towards(sun) => sun,
+        Sun::OfDay => day.towards_sun(),
+    };
+    let (place, is_on_stage) = place_of(turned(towards, turn), &camera, size);
     let at = rect.min + vec2(place.x, place.y);
     let grip = Rect::from_center_size(at, vec2(1.0, 1.0) * 4.0 * SUN_RADIUS);
     let response = ui.interact(grip, ui.scope_id().with("sun"), Sense::drag());
@@ -120,18 +137,32 @@ fn handle(ui: &mut Ui, model: &mut Model, sun: Vec3, frame: &StageFrame, rect: R
         && let Some(pointer) = response.interact_pointer_pos()
     {
         let wanted = place_in(rect, pointer);
-        let distance = |degrees: f32| place_of(turned(degrees), &camera, size).0.distance_squared(wanted);
+        let distance =
+            |sun: Vec3, degrees: f32| place_of(turned(sun, degrees), &camera, size).0.distance_squared(wanted);
         let steps = -MOST_DEGREES * TURNS_PER_DEGREE..=MOST_DEGREES * TURNS_PER_DEGREE;
-        let candidates = steps.map(|step| turn + step as f32 / TURNS_PER_DEGREE as f32);
-        if let Some(nearest) = candidates.min_by(|a, b| distance(*a).total_cmp(&distance(*b))) {
-            model.edits.relight.turn_degrees = nearest.rem_euclid(360.0);
+        // The sky turns by 15 degrees an hour.
+        let of_step = |step: i32| step as f32 / TURNS_PER_DEGREE as f32;
+        match sun {
+            Sun::Towards(sun) => {
+                let nearest = steps.map(|step| turn + of_step(step));
+                let nearest = nearest.min_by(|a, b| distance(sun, *a).total_cmp(&distance(sun, *b)));
+                model.edits.relight.turn_degrees = nearest.unwrap_or(turn).rem_euclid(360.0);
+            }
+            Sun::OfDay => {
+                let (rise, set) = day.daylight().unwrap_or((12.0, 12.0));
+                let at = |hour: f32| Day { hour, ..day }.towards_sun();
+                let nearest = steps.map(|step| (day.hour + of_step(step) / 15.0).clamp(rise, set));
+                let nearest = nearest.min_by(|a, b| distance(at(*a), turn).total_cmp(&distance(at(*b), turn)));
+                model.edits.relight.day.hour = nearest.unwrap_or(day.hour);
+            }
         }
     }
     let is_held = response.hovered() || response.dragged();
     draw_sun(&ui.painter_at(rect), at, is_on_stage, is_held);
-    response
-        .on_hover_cursor(CursorIcon::Grab)
-        .on_hover_text("The brightest direction of the environment\nDrag it to rotate the environment");
+    response.on_hover_cursor(CursorIcon::Grab).on_hover_text(match sun {
+        Sun::Towards(_) => "The brightest direction of the environment\nDrag it to rotate the environment",
+        Sun::OfDay => "The sun\nDrag it along its way over the day to set the hour",
+    });
 }
 
 fn draw_sun(painter: &Painter, at: egui::Pos2, is_on_stage: bool, is_held: bool) {
