@@ -11,16 +11,19 @@
 //! | [`audit`] | derivatives against central differences |
 //! | [`fuzz`] | damaged files of every kind that is read |
 //! | [`nightly`] | what takes too long to be asked on every change |
-//! | [`proof`] | exports, opened and rendered by other programs |
+//! | [`proof`], [`readers`] | exports, opened and rendered by other programs; what they write, read here |
+//! | [`pipelines`] | the workflow for many captures, with kills and failures |
 //! | [`consistency`], [`object_study`] | the figures of the two papers |
 //! | [`study`] | studies as lists of cases that several sittings work off |
 //! | [`rivals`], [`neural`] | reflectance models on measured tables; training of the neural one |
 //! | [`scenes`] | scenes made in code with their truth |
-//! | [`study_table`], [`bar_picture`] | tables over seeds, bars without a browser |
+//! | [`study_table`], [`bar_table`], [`bar_picture`] | tables over seeds, of bars; bars without a browser |
+//! | [`other_programs`] | scripts of this project in another program |
 
 pub mod atlas_quality;
 pub mod audit;
 pub mod bar_picture;
+pub mod bar_table;
 pub mod cached_error;
 pub mod cli;
 pub mod consistency;
@@ -30,7 +33,10 @@ pub mod hard;
 pub mod neural;
 pub mod nightly;
 pub mod object_study;
+pub mod other_programs;
+pub mod pipelines;
 pub mod proof;
+pub mod readers;
 pub mod rivals;
 pub mod scale;
 pub mod scenes;

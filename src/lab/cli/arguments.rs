@@ -35,6 +35,10 @@ pub enum Task {
     Fuzz(FuzzOptions),
     /// Have other programs open and render the exports of a run, and compare; fails where a bar is missed.
     Proof(crate::lab::proof::ProofOptions),
+    /// Have other tools write cameras and meshes, read them, and compare; fails where a bar is missed or a tool is missing.
+    Readers(crate::lab::readers::ReaderOptions),
+    /// Run the workflow for many captures, with kills and failures; fails where it does otherwise than it should.
+    Pipelines(crate::lab::pipelines::PipelineOptions),
     /// Ask what takes too long to be asked on every change; fails where something falls short.
     Nightly(NightlyOptions),
     /// Write the demo and the study scenes as exchange folders for the Mitsuba scripts.

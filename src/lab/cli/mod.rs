@@ -1,7 +1,8 @@
 //! The command line of the lab, `patina-lab`; it holds no algorithm.
 //!
 //! [`arguments`] is what can be typed, [`measure`] audits and times, [`contest`] holds methods against each other,
-//! [`study`] and [`object_study`] run studies, [`proof`] holds exports against other programs, [`measured`] and [`neural`] are for measured reflectance.
+//! [`study`] and [`object_study`] run studies, [`proof`] holds exports against other programs, [`others`] what they write and
+//! start, [`measured`] and [`neural`] are for measured reflectance.
 
 pub mod arguments;
 pub mod contest;
@@ -9,6 +10,7 @@ pub mod measure;
 pub mod measured;
 pub mod neural;
 pub mod object_study;
+pub mod others;
 pub mod proof;
 pub mod study;
 
@@ -47,6 +49,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Task::Study(StudyTask::Tables(options)) => study::tables(&options, json),
         Task::Fuzz(options) => measure::fuzz(&options, json),
         Task::Proof(options) => proof::prove(&options, json),
+        Task::Readers(options) => others::readers(&options, json),
+        Task::Pipelines(options) => others::pipelines(&options, json),
         Task::Nightly(options) => measure::nightly(&options, json),
         Task::References(options) => {
             crate::lab::scenes::write_references(&options.output, &contest::teller("references", json))

@@ -6,6 +6,7 @@ use super::{BOUNCES, ProofOptions, ProofView};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::files::write_bytes;
 use crate::image::{Image, file};
+use crate::lab::other_programs::{self, Remedies};
 use glam::Vec3;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -31,32 +32,21 @@ fn camera_of(view: &ProofView) -> Value {
     })
 }
 
-/// Starts a program and gives what it prints.
-fn output_of(command: &mut Command) -> Result<String> {
-    let name = command.get_program().to_string_lossy().into_owned();
-    let output = command.output().map_err(|source| {
-        Error::new(ErrorKind::Missing, format!("{name} cannot be started: {source}"))
-            .remedy("name it with --python, --node or --browser, or leave it out with --only")
-    })?;
-    if output.status.success() {
-        return Ok(String::from_utf8_lossy(&output.stdout).into_owned());
-    }
-    let text = String::from_utf8_lossy(&output.stderr);
-    let lines: Vec<&str> = text.lines().filter(|line| !line.trim().is_empty()).collect();
-    let last = lines[lines.len().saturating_sub(12)..].join("\n");
-    Err(Error::new(ErrorKind::Unsupported, format!("{name} ended with {}:\n{last}", output.status))
-        .remedy("install what tests/proof/README.md names, or leave the program out with --only"))
-}
+/// What to do about a program.
+const REMEDIES: Remedies = Remedies {
+    unstarted: "name it with --python, --node or --browser, or leave it out with --only",
+    failed: "install what tests/proof/README.md names, or leave the program out with --only",
+};
 
 /// Starts a script of the proof on a job.
 fn script(options: &ProofOptions, name: &str, arguments: &[&Path]) -> Result<String> {
-    let path = options.scripts.join(name);
-    if !path.is_file() {
-        return Err(Error::new(ErrorKind::Missing, "the script is missing")
-            .at(Place::File(path))
-            .remedy("name the folder of the scripts with --scripts"));
-    }
-    output_of(Command::new(&options.python).arg(path).args(arguments))
+    let mut command = other_programs::script(&options.python, &options.scripts, name)?;
+    other_programs::output_of(command.args(arguments), REMEDIES)
+}
+
+/// Starts a program and gives what it prints.
+fn output_of(command: &mut Command) -> Result<String> {
+    other_programs::output_of(command, REMEDIES)
 }
 
 /// Writes a job and starts a script on it.
