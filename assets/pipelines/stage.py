@@ -43,6 +43,12 @@ def result_of(stage, found):
     return {"aggregates": of_kind(found, "aggregate")}
 
 
+def told(error):
+    """The message of an error, with its place in front."""
+    place, message = error.get("place", ""), error.get("message", "")
+    return f"{place}: {message}" if place and place not in message else message
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("stage", choices=["check", "fit", "relight", "score"])
@@ -82,7 +88,7 @@ def main():
         write({"status": "done", **result})
         return 0
     errors = of_kind(found, "error") or of_kind(found, "failed")
-    message = errors[-1].get("message") if errors else f"ended with code {ended.returncode}, see {options.log}"
+    message = told(errors[-1]) if errors else f"ended with code {ended.returncode}, see {options.log}"
     remedy = errors[-1].get("remedy", "") if errors else ""
     print(f"{options.stage} of {options.capture or options.run}: {message} ({remedy})", file=sys.stderr)
     if options.attempt < options.attempts:

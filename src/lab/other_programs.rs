@@ -48,6 +48,7 @@ pub fn script(python: &Path, folder: &Path, name: &str) -> Result<Command> {
             .remedy("name the folder of the scripts with --scripts"));
     }
     let mut command = Command::new(python);
-    command.arg(path);
+    // A script leaves nothing beside itself.
+    command.env("PYTHONDONTWRITEBYTECODE", "1").arg(path);
     Ok(command)
 }

@@ -4,7 +4,8 @@
 
 FOLDER/meshes.json holds, for each file, triangles, copies (triangles between the corners of an earlier one), area and
 bounding box by each reader. Files in the folders MESHES are read too. Polygons are cut into triangles first: a polygon of n
-corners has n - 2 of them.
+corners has n - 2 of them. One that lies in no plane has an area only once it is cut; what the choice of the cut can change
+stands beside the answers.
 """
 
 import json
@@ -104,6 +105,27 @@ def figures(corners):
     }
 
 
+def area_left_to_cuts(path):
+    """Area of an OBJ file's polygons that depends on how they are cut: over the fans from each of their corners."""
+    if path.suffix.lower() != ".obj":
+        return 0.0
+    lines = [line.split() for line in path.read_text(errors="replace").splitlines()]
+    points = np.array([[float(word) for word in words[1:4]] for words in lines if words[:1] == ["v"]])
+    left = 0.0
+    for words in lines:
+        if words[:1] != ["f"] or len(words) < 5:
+            continue
+        indices = [int(word.split("/")[0]) for word in words[1:]]
+        polygon = points[[index - 1 if index > 0 else index for index in indices]]
+        fans = []
+        for _ in polygon:
+            polygon = np.roll(polygon, 1, axis=0)
+            to = polygon[1:] - polygon[0]
+            fans.append(np.linalg.norm(np.cross(to[:-1], to[1:]), axis=1).sum() / 2)
+        left += max(fans) - min(fans)
+    return left
+
+
 def by_trimesh(path):
     return figures(trimesh.load_scene(str(path), process=False).to_mesh().triangles)
 
@@ -133,7 +155,8 @@ def main():
                     said[name] = read(path)
                 except Exception as error:
                     said[name] = {"error": f"{type(error).__name__}: {error}"[:200]}
-            files.append({"path": str(path.absolute()), "name": str(path.relative_to(base)), "said": said})
+            name, left = str(path.relative_to(base)), area_left_to_cuts(path)
+            files.append({"path": str(path.absolute()), "name": name, "area_left_to_cuts": left, "said": said})
     tools = [f"{name} {version(package)}" for name, package in [("trimesh", "trimesh"), ("PyMeshLab", "pymeshlab")]]
     (folder / "meshes.json").write_text(json.dumps({"tools": tools, "files": files}))
 

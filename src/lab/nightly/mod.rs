@@ -2,11 +2,13 @@
 //!
 //! A [`Check`] fits, measures, and says a figure; where it falls short of what the program promises it says by how much.
 //! One that lacks an input it needs is told as left out, never as passed. [`captures`] fits spoiled captures,
-//! [`contests`] starts processes as `patina-lab bench fit` does, [`slow_tests`] runs what `cargo test` leaves out.
+//! [`contests`] starts processes as `patina-lab bench fit` does, [`slow_tests`] runs what `cargo test` leaves out, [`tools`] asks
+//! other tools.
 
 mod captures;
 mod contests;
 mod slow_tests;
+mod tools;
 
 use crate::error::{Error, ErrorKind, Result};
 use std::path::Path;
@@ -34,7 +36,7 @@ pub struct Check {
 }
 
 /// All checks, the quick ones first.
-pub const CHECKS: [Check; 6] = [
+pub const CHECKS: [Check; 8] = [
     Check {
         name: "contest",
         about: "a contest leaves tables and says who could not run",
@@ -52,6 +54,12 @@ pub const CHECKS: [Check; 6] = [
     },
     Check { name: "lobe-tails", about: "lobes with tails are told, over seeds", run: captures::tails_are_told },
     Check { name: "slow-tests", about: "every test marked as slow passes", run: slow_tests::pass },
+    Check { name: "readers", about: "what other tools write is read as they read it", run: tools::readers_agree },
+    Check {
+        name: "pipelines",
+        about: "the workflow for many captures goes on after kills",
+        run: tools::workflow_goes_on,
+    },
     Check { name: "mitsuba", about: "Mitsuba takes part in a contest", run: contests::with_mitsuba },
 ];
 

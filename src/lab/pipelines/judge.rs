@@ -1,7 +1,7 @@
 //! What a run of the workflow left behind, and whether it is what the guide promises.
 
 use super::sitting::Ended;
-use super::{BROKEN, FAILS_ONCE, KILLED};
+use super::{BROKEN, BROKEN_PHOTO, FAILS_ONCE, KILLED};
 use crate::lab::bar_table::BarRow;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -35,6 +35,11 @@ fn events(log: &Path, kind: &str) -> Vec<Value> {
 /// Steps that a fit has told of in its log.
 pub fn steps_in(log: &Path) -> usize {
     events(log, "progress").len()
+}
+
+/// Whether a fit said that it ended early, its checkpoint written.
+pub fn has_stopped(log: &Path) -> bool {
+    !events(log, "stopped").is_empty()
 }
 
 /// Results that stand, with the time they were written.
@@ -106,7 +111,7 @@ pub fn retried(results: &Path) -> BarRow {
     row("what failed once is tried again", seen, done && again == 2 && once == 1)
 }
 
-/// The broken capture is written down as failed, with what to do about it; stages behind are skipped.
+/// The broken capture is written down as failed, with the file and what to do about it; stages behind are skipped.
 pub fn broken(results: &Path) -> BarRow {
     let check = stage(results, BROKEN, "check");
     let text = |key: &str| check[key].as_str().unwrap_or_default().to_string();
@@ -124,7 +129,7 @@ pub fn broken(results: &Path) -> BarRow {
     );
     let holds = text("status") == "failed"
         && check["attempt"] == 2
-        && !text("message").is_empty()
+        && text("message").contains(BROKEN_PHOTO)
         && !text("remedy").is_empty()
         && others.iter().all(|status| status == "skipped");
     row("a broken capture is written down", seen, holds)
@@ -171,4 +176,75 @@ pub fn page(results: &Path) -> BarRow {
         && of(FAILS_ONCE) > 0
         && read(&results.join("index.html")).contains(BROKEN);
     row("one page of thumbnails", seen, holds)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn write(results: &Path, capture: &str, name: &str, text: &str) {
+        let path = results.join(capture).join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, text).unwrap();
+    }
+
+    #[test]
+    fn each_promise_of_the_guide_is_seen_to_be_kept_and_to_be_broken() {
+        let folder = tempfile::tempdir().unwrap();
+        let results = folder.path();
+        let holds = |row: BarRow| row.shortfall.is_none();
+        for row in [table(results), page(results), broken(results), retried(results)] {
+            assert!(!holds(row.clone()), "nothing was done: {row:?}");
+        }
+        assert!(!holds(untouched("", &Files::under(results), results)), "nothing stood there");
+
+        let log = results.join(KILLED).join("fit.log");
+        let line = |event: Value| format!("{event}\n");
+        let started = |done: usize| line(json!({"event": "started", "steps_done": done, "steps_total": 9}));
+        let text = [started(6), line(json!({"event": "progress"})), line(json!({"event": "finished"}))].concat();
+        write(results, KILLED, "fit.log", &text);
+        assert!(holds(resumed(&log, 6)) && !holds(resumed(&log, 8)), "steps that were done are not done again");
+        write(results, KILLED, "fit.log", &text.replace("\"steps_done\":6", "\"steps_done\":0"));
+        assert!(!holds(resumed(&log, 0)), "a fit from its beginning is none that went on");
+
+        let attempt = |count: usize| json!({"status": "done", "attempt": count}).to_string();
+        write(results, KILLED, "relight.json", &attempt(1));
+        write(results, FAILS_ONCE, "relight.json", &attempt(1));
+        assert!(!holds(retried(results)));
+        write(results, FAILS_ONCE, "relight.json", &attempt(2));
+        assert!(holds(retried(results)));
+
+        let failed =
+            json!({"status": "failed", "attempt": 2, "message": "0000.exr: cut short", "remedy": "copy it again"});
+        write(results, BROKEN, "check.json", &failed.to_string());
+        for of in &STAGES[1..] {
+            assert!(!holds(broken(results)));
+            write(results, BROKEN, &format!("{of}.json"), "{\"status\": \"skipped\"}");
+        }
+        assert!(holds(broken(results)));
+
+        let before = Files::under(results);
+        assert!(holds(untouched("", &before, results)));
+        std::fs::remove_file(results.join(KILLED).join("relight.json")).unwrap();
+        assert!(!holds(untouched("", &before, results)), "what is gone does not stand");
+
+        let rows = format!(
+            "capture,status,held-out PSNR dB,message\n{BROKEN},check failed,,\"cut, short\"\n{FAILS_ONCE},done,20.1,\n"
+        );
+        write(results, "", "table.csv", &rows);
+        assert!(!holds(table(results)), "a capture is missing");
+        write(results, "", "table.csv", &format!("{rows}{KILLED},done,21.3,\n"));
+        assert!(holds(table(results)));
+
+        let section = |capture: &str, class: &str, picture: &str| {
+            format!("<section class=\"{class}\"><h2>{capture}</h2><img src=\"{capture}/{picture}\"></section>")
+        };
+        let text = section(KILLED, "done", "a.png") + &section(FAILS_ONCE, "done", "a.png");
+        write(results, KILLED, "a.png", "");
+        write(results, "", "index.html", &format!("{text}<section class=\"failed\">{BROKEN}</section>"));
+        assert!(!holds(page(results)), "a picture is missing");
+        write(results, FAILS_ONCE, "a.png", "");
+        assert!(holds(page(results)));
+    }
 }

@@ -23,6 +23,10 @@ pub const KILLED: &str = "killed";
 pub const FAILS_ONCE: &str = "fails-once";
 /// The capture with a photo that is cut short.
 pub const BROKEN: &str = "broken";
+/// That photo.
+pub const BROKEN_PHOTO: &str = "0000.exr";
+/// The file that says that the relight has failed.
+const MARKER: &str = "failed_once";
 /// Steps that a fit has taken before it is told to end.
 const STEPS_BEFORE_END: usize = 5;
 
@@ -55,24 +59,30 @@ pub fn run(options: &PipelineOptions, stop: &AtomicBool, tell: &dyn Fn(&str)) ->
     let workflow = prepare(options, tell)?;
     let results = workflow.results.clone();
     let fit_log = results.join(KILLED).join("fit.log");
-    let checkpoint = results.join(KILLED).join("run").join("checkpoint");
+    let marker = workflow.folder.join(MARKER);
 
     tell("first sitting: killed as soon as a fit is on its way");
     let mut sitting = Sitting::start(&workflow, &[], "first")?;
     sitting.wait_until(|| judge::steps_in(&fit_log) > 0, stop)?;
     sitting.kill()?;
     let after_kill = judge::Files::under(&results);
+    // The steps of the next fit are counted in a log of its own.
+    remove(&fit_log)?;
 
     tell("second sitting: told to end in the fit, then killed");
     workflow.unlock()?;
     let mut sitting = Sitting::start(&workflow, &["--rerun-incomplete"], "second")?;
     sitting.wait_until(|| judge::steps_in(&fit_log) >= STEPS_BEFORE_END, stop)?;
     sitting.tell_to_end()?;
-    sitting.wait_until_left(|| checkpoint.is_file(), stop)?;
+    sitting.wait_until_left(|| judge::has_stopped(&fit_log), stop)?;
     sitting.kill()?;
     let steps_at_end = judge::steps_in(&fit_log);
 
     tell("third sitting: to the end");
+    if !results.join(FAILS_ONCE).join("relight.json").is_file() {
+        // The failure may have been cut off together with its sitting.
+        remove(&marker)?;
+    }
     workflow.unlock()?;
     let third = Sitting::start(&workflow, &["--rerun-incomplete"], "third")?.wait(stop)?;
     let after_third = judge::Files::under(&results);
@@ -108,17 +118,15 @@ fn prepare(options: &PipelineOptions, tell: &dyn Fn(&str)) -> Result<Workflow> {
     }
     std::fs::create_dir_all(&options.output).map_err(|source| Error::writing(&options.output, source))?;
     let folder = whole(&options.output)?;
-    let marker = folder.join("failed_once");
-    if marker.exists() {
-        std::fs::remove_file(&marker).map_err(|source| Error::writing(&marker, source))?;
-    }
+    let marker = folder.join(MARKER);
+    remove(&marker)?;
     tell("making three captures");
     for (seed, name) in (1u64..).zip([KILLED, FAILS_ONCE, BROKEN]) {
         let settings =
             DemoSettings { views: 8, held_out: 2, width: 80, height: 60, map_size: 128, seed, ..Default::default() };
         write_folder(&settings, &folder.join("captures").join(name))?;
     }
-    cut_a_photo(&folder.join("captures").join(BROKEN))?;
+    cut(&folder.join("captures").join(BROKEN).join("views").join(BROKEN_PHOTO))?;
     let (captures, results) = (folder.join("captures"), folder.join("results"));
     let words = [
         "python3".to_string(),
@@ -129,7 +137,7 @@ fn prepare(options: &PipelineOptions, tell: &dyn Fn(&str)) -> Result<Workflow> {
         quoted(&patina),
     ];
     // Fits of a few seconds that say each step: Adam on small maps.
-    let fit: Vec<&str> = "--method adam --map-size 128 --steps-diffuse 100 --steps-all 150 --samples 4 --bounces 1 \
+    let fit: Vec<&str> = "--method adam --map-size 128 --steps-diffuse 50 --steps-all 70 --samples 2 --bounces 1 \
          --environment-height 16 --held-out-interval 0"
         .split_whitespace()
         .collect();
@@ -141,6 +149,14 @@ fn prepare(options: &PipelineOptions, tell: &dyn Fn(&str)) -> Result<Workflow> {
     let path = folder.join("config.json");
     write_bytes(&path, config.to_string().as_bytes())?;
     Ok(Workflow { python: options.python.clone(), snakefile, config: path, folder, results })
+}
+
+/// Removes a file where there is one.
+fn remove(path: &Path) -> Result<()> {
+    match std::fs::remove_file(path) {
+        Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(Error::writing(path, source)),
+        _ => Ok(()),
+    }
 }
 
 /// The program that the workflow starts.
@@ -158,17 +174,10 @@ fn program(options: &PipelineOptions) -> Result<PathBuf> {
     })
 }
 
-/// Cuts the first photo of a capture in half.
-fn cut_a_photo(capture: &Path) -> Result<()> {
-    let folder = capture.join("images");
-    let entries = std::fs::read_dir(&folder).map_err(|source| Error::reading(&folder, source))?;
-    let mut photos: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    photos.sort();
-    let photo = photos.into_iter().next().ok_or_else(|| {
-        Error::new(ErrorKind::Internal, "the capture that was made has no photos").at(Place::File(folder.clone()))
-    })?;
-    let bytes = std::fs::read(&photo).map_err(|source| Error::reading(&photo, source))?;
-    write_bytes(&photo, &bytes[..bytes.len() / 2])
+/// Cuts a photo in half.
+fn cut(photo: &Path) -> Result<()> {
+    let bytes = std::fs::read(photo).map_err(|source| Error::reading(photo, source))?;
+    write_bytes(photo, &bytes[..bytes.len() / 2])
 }
 
 /// A path as a word for a shell.
