@@ -31,7 +31,7 @@ pub struct ReadSettings {
     /// The mesh, where the source names none or another is meant.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<PathBuf>,
-    /// The chunk of a Metashape project, by label or number; none takes the one whose photos are here.
+    /// The chunk of a Metashape project or export, by label or number; none takes the one whose photos are here.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chunk: Option<String>,
     /// Photos are averaged over squares of this many pixels, in linear radiance; 1 keeps them. Older settings files name

@@ -5,7 +5,7 @@ use super::{
     alicevision, blended_mvs, bundler, colmap, exchange, manifest, metashape, neural_scenes, objects_with_lighting,
     openmvs, opensfm, realitycapture, realitycapture_csv, transforms,
 };
-use crate::error::{Error, ErrorKind, Place, Result};
+use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::scene::settings::ReadSettings;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -172,13 +172,13 @@ impl Located {
     /// # Errors
     /// Those of the reader of its kind.
     pub fn list(&self, settings: &ReadSettings) -> Result<SourceScene> {
-        match self.format {
+        let mut scene = match self.format {
             Format::Manifest => manifest::read(&self.evidence),
             Format::Exchange => exchange::read(&self.folder),
             Format::BlendedMvs => blended_mvs::read(&self.folder),
             Format::MetashapeProject => metashape::read_project(&self.evidence, settings.chunk.as_deref()),
             Format::Transforms => transforms::read(&self.folder),
-            Format::MetashapeCameras => metashape::read_export(&self.evidence),
+            Format::MetashapeCameras => metashape::read_export(&self.evidence, settings.chunk.as_deref()),
             Format::Colmap => colmap::read(&self.folder),
             Format::ObjectsWithLighting => objects_with_lighting::read(&self.folder),
             Format::OpenSfm => opensfm::read(&self.folder),
@@ -189,7 +189,15 @@ impl Located {
             Format::Bundler => bundler::read(&self.folder),
             Format::Neus => neural_scenes::read_neus(&self.evidence),
             Format::Llff => neural_scenes::read_llff(&self.evidence),
+        }?;
+        let has_chunks = matches!(self.format, Format::MetashapeProject | Format::MetashapeCameras);
+        if settings.chunk.is_some() && !has_chunks {
+            let message = format!("a scene of {} has no chunks: --chunk has no effect", self.format);
+            scene
+                .findings
+                .push(Finding::new(Severity::Warning, "chunk-without-effect", message).remedy("leave it out"));
         }
+        Ok(scene)
     }
 }
 

@@ -1,7 +1,8 @@
 use super::super::zip::packed;
 use super::*;
 use crate::image::{Image, file};
-use glam::DVec2;
+use glam::{DMat3, DVec2, DVec3};
+use std::path::Path;
 
 /// Exported cameras of two sensors, in the words of version 1.5: offsets, affinity, P1 and P2 in Agisoft's order.
 const EXPORT: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
@@ -34,7 +35,7 @@ fn folder_with_photos(photos: &[&str]) -> tempfile::TempDir {
 fn exported_cameras_follow_the_manual() {
     let folder = folder_with_photos(&["a.png", "b.png"]);
     std::fs::write(folder.path().join("cameras.xml"), EXPORT).unwrap();
-    let scene = read_export(&export_of(folder.path()).unwrap()).unwrap();
+    let scene = read_export(&export_of(folder.path()).unwrap(), None).unwrap();
     assert_eq!(scene.views.len(), 2);
     let view = &scene.views[0];
     // The manual's formulas by hand at x = 0.3, y = 0.4, r² = 0.25.
@@ -112,4 +113,105 @@ fn the_chunk_whose_photos_are_here_is_read_unless_another_is_asked_for() {
     assert!(error.remedy_text().contains("--chunk") && error.remedy_text().contains("Elsewhere (0)"), "{error}");
     write("project.zip", r#"<document><chunks><chunk id="0" path="../../outside.zip"/></chunks></document>"#);
     assert_eq!(read_project(&project, None).unwrap_err().kind(), ErrorKind::Malformed);
+}
+
+const EYE: &str = "<transform>1 0 0 1 0 1 0 2 0 0 1 3 0 0 0 1</transform>";
+
+/// Exported cameras of version 2 with one sensor `0`; what stands for a chunk's cameras is given.
+fn export(chunks: &[(&str, &str)]) -> String {
+    let chunk = |(label, inner): &(&str, &str)| {
+        format!(
+            r#"<chunk label="{label}"><sensors>
+            <sensor id="0" type="frame"><resolution width="40" height="30"/><calibration class="adjusted"><f>50</f></calibration></sensor>
+            <sensor id="1" type="frame"><resolution width="40" height="30"/></sensor>
+            <sensor id="2" type="spherical"><resolution width="9" height="5"/><calibration type="spherical"/></sensor>
+            <sensor id="3" type="frame" master_id="0"><resolution width="40" height="30"/><calibration><f>50</f></calibration></sensor>
+            </sensors>{inner}</chunk>"#
+        )
+    };
+    let chunks: String = chunks.iter().map(chunk).collect();
+    format!(r#"<?xml version="1.0"?><document version="2.0.0">{chunks}</document>"#)
+}
+
+fn read_text_of(folder: &Path, text: &str, chunk: Option<&str>) -> Result<SourceScene> {
+    std::fs::write(folder.join("cameras.xml"), text).unwrap();
+    read_export(&folder.join("cameras.xml"), chunk)
+}
+
+fn codes(scene: &SourceScene) -> Vec<&str> {
+    scene.findings.iter().map(|finding| finding.code).collect()
+}
+
+#[test]
+fn components_have_transforms_and_cameras_of_others_are_brought_over() {
+    let folder = folder_with_photos(&["a.png", "b.png", "c.png"]);
+    let component = |id: &str, translation: &str, scale: &str| {
+        format!(
+            r#"<component id="{id}"><transform><rotation>1 0 0 0 1 0 0 0 1</rotation>
+            <translation>{translation}</translation><scale>{scale}</scale></transform></component>"#
+        )
+    };
+    let cameras = format!(
+        r#"<cameras><camera id="0" sensor_id="0" component_id="0" label="a">{EYE}</camera>
+        <camera id="1" sensor_id="0" component_id="0" label="b">{EYE}</camera>
+        <camera id="2" sensor_id="0" component_id="1" label="c">{EYE}</camera></cameras>"#
+    );
+    let components = component("0", "500000 4000000 100", "2") + &component("1", "500010 4000000 100", "4");
+    let inner = format!(r#"<components active_id="0">{components}</components>{cameras}"#);
+    let scene = read_text_of(folder.path(), &export(&[("1", &inner)]), None).unwrap();
+    assert_eq!(scene.views.len(), 3);
+    let to_mesh = &scene.mesh_frames[0].source_from_mesh;
+    assert!(
+        (to_mesh.transform_point3(DVec3::new(500_002.0, 4_000_004.0, 106.0)) - DVec3::new(1.0, 2.0, 3.0)).length()
+            < 1e-6
+    );
+    // 4 (1, 2, 3) + (10, 0, 0) in the world, seen from the first component: half of that.
+    let position = |index: usize| {
+        let camera = &scene.views[index].camera;
+        camera.rotation.transpose() * -camera.translation
+    };
+    assert!((position(0) - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-9);
+    assert!((position(2) - DVec3::new(7.0, 4.0, 6.0)).length() < 1e-6, "{}", position(2));
+    assert!((scene.views[2].camera.rotation - DMat3::IDENTITY).to_cols_array().iter().all(|own| own.abs() < 1e-9));
+    let unknown = format!(r#"<components active_id="0"><component id="0"/><component id="1"/></components>{cameras}"#);
+    let scene = read_text_of(folder.path(), &export(&[("1", &unknown)]), None).unwrap();
+    assert_eq!((scene.views.len(), scene.mesh_frames.len()), (2, 0));
+    assert_eq!(codes(&scene)[..1], ["camera-of-other-component"]);
+}
+
+#[test]
+fn of_several_exported_chunks_one_is_chosen_and_told() {
+    let folder = folder_with_photos(&["a.png", "b.png"]);
+    let camera =
+        |label: &str| format!(r#"<cameras><camera id="0" sensor_id="0" label="{label}">{EYE}</camera></cameras>"#);
+    let text = export(&[("far", &camera("x")), ("near", &camera("a")), ("also", &camera("b"))]);
+    let name = |chunk| read_text_of(folder.path(), &text, chunk).map(|scene| scene.views[0].name.clone());
+    assert_eq!(name(None).unwrap(), "a");
+    assert_eq!(name(Some("also")).unwrap(), "b");
+    assert_eq!(name(Some("2")).unwrap(), "b");
+    let error = name(Some("nonsense")).unwrap_err();
+    assert!(error.kind() == ErrorKind::InvalidSetting && error.remedy_text().contains("near (1)"), "{error}");
+    let scene = read_text_of(folder.path(), &text, None).unwrap();
+    assert!(scene.findings[0].code == "chunk-chosen" && scene.findings[0].message.contains("near"));
+}
+
+#[test]
+fn what_no_camera_uses_is_not_read_and_rigs_and_sensors_without_calibration_are_named() {
+    let folder = folder_with_photos(&["a.png", "b.png"]);
+    let cameras = format!(
+        r#"<cameras><camera id="0" sensor_id="0" label="a">{EYE}</camera><camera id="1" sensor_id="3" label="s"/>
+        <camera id="2" sensor_id="1" label="b">{EYE}</camera><camera id="3" sensor_id="2" label="u"/></cameras>"#
+    );
+    let scene = read_text_of(folder.path(), &export(&[("1", &cameras)]), None).unwrap();
+    assert_eq!(scene.views.len(), 1);
+    assert_eq!(codes(&scene)[..3], ["camera-not-aligned", "camera-of-rig", "camera-not-calibrated"]);
+    let none = format!(r#"<cameras><camera id="2" sensor_id="1" label="b">{EYE}</camera></cameras>"#);
+    let error = read_text_of(folder.path(), &export(&[("1", &none)]), None).unwrap_err();
+    assert!(error.kind() == ErrorKind::Missing && error.to_string().contains("no calibration"), "{error}");
+    let used = format!(r#"<cameras><camera id="3" sensor_id="2" label="b">{EYE}</camera></cameras>"#);
+    let error = read_text_of(folder.path(), &export(&[("1", &used)]), None).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Unsupported);
+    let unaligned = r#"<cameras><camera id="3" sensor_id="0" label="b"/></cameras>"#;
+    let error = read_text_of(folder.path(), &export(&[("1", unaligned)]), None).unwrap_err();
+    assert!(error.to_string().contains("no camera has a pose"), "{error}");
 }

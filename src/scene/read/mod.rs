@@ -27,6 +27,7 @@ mod mesh_choice;
 pub mod mesh_file;
 mod mesh_frame;
 pub mod metashape;
+mod metashape_cameras;
 mod metashape_project;
 mod neural_scenes;
 pub(crate) mod numpy;

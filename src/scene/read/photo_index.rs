@@ -176,6 +176,11 @@ pub fn views_of(
         });
     }
     let folder = photos.roots.first().cloned().unwrap_or_default();
+    if listed == 0 {
+        return Err(Error::new(ErrorKind::Missing, "no camera has a pose: no photo was aligned")
+            .at(Place::File(folder))
+            .remedy("align the photos in the program that made the cameras, and export them again"));
+    }
     if views.is_empty() {
         let example = missing.first().map(|name| format!(", such as {name}")).unwrap_or_default();
         return Err(Error::new(
