@@ -44,6 +44,11 @@ impl Lens {
         self.shear.abs() < NOTHING && self.model.is_pinhole(NOTHING)
     }
 
+    /// Whether every number of it is finite.
+    pub fn is_finite(&self) -> bool {
+        self.shear.is_finite() && self.model.is_finite()
+    }
+
     /// Where a direction in the camera falls, in units of the focal length from the principal point. The direction needs
     /// no length; for models on the plane it must point forward.
     pub fn project(&self, direction: DVec3) -> DVec2 {
@@ -203,5 +208,14 @@ mod tests {
         assert!(Lens::new(Model::Division { k: 0.0 }).is_pinhole());
         assert!(!Lens::new(Model::Polynomial(Polynomial { base: Base::Angle, ..Default::default() })).is_pinhole());
         assert!(!Lens { shear: 0.01, ..Default::default() }.is_pinhole());
+    }
+
+    #[test]
+    fn a_number_that_is_none_is_neither_nothing_nor_finite() {
+        let polynomial = Polynomial { tangential: [0.0, f64::NAN], ..Default::default() };
+        for lens in [Lens::new(Model::Polynomial(polynomial)), Lens { shear: f64::NAN, ..Default::default() }] {
+            assert!(!lens.is_pinhole() && !lens.is_finite(), "{lens:?}");
+        }
+        assert!(lenses().iter().all(|(_, lens)| lens.is_finite()));
     }
 }

@@ -133,18 +133,33 @@ impl Model {
     /// Whether no coefficient is larger than `nothing`: a pinhole.
     pub fn is_pinhole(&self, nothing: f64) -> bool {
         match self {
-            Model::Polynomial(polynomial) => polynomial.base == Base::Plane && polynomial.largest() < nothing,
+            Model::Polynomial(polynomial) => {
+                polynomial.base == Base::Plane && polynomial.coefficients().all(|value| value.abs() < nothing)
+            }
             Model::FieldOfView { omega } => omega.abs() < nothing,
             Model::Division { k } => k.abs() < nothing,
             Model::ExtendedUnified { alpha, .. } => alpha.abs() < nothing,
         }
     }
+
+    /// Whether every coefficient is a finite number.
+    pub fn is_finite(&self) -> bool {
+        match self {
+            Model::Polynomial(polynomial) => {
+                polynomial.coefficients().chain(polynomial.tangential_growth).all(f64::is_finite)
+            }
+            Model::FieldOfView { omega } => omega.is_finite(),
+            Model::Division { k } => k.is_finite(),
+            Model::ExtendedUnified { alpha, beta } => alpha.is_finite() && beta.is_finite(),
+        }
+    }
 }
 
 impl Polynomial {
-    fn largest(&self) -> f64 {
+    /// The coefficients that move a place by themselves.
+    fn coefficients(&self) -> impl Iterator<Item = f64> {
         let all = self.numerator.iter().chain(&self.denominator).chain(&self.tangential);
-        all.chain(&self.prism_x).chain(&self.prism_y).fold(0.0, |most, value| most.max(value.abs()))
+        all.chain(&self.prism_x).chain(&self.prism_y).copied()
     }
 
     fn distort<T: Real>(&self, x: T, y: T) -> (T, T) {

@@ -110,7 +110,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
     let models = models_of(folder);
     let model = models.first().map_or_else(|| folder.to_path_buf(), |(model, _)| model.clone());
     let is_binary = model.join("cameras.bin").is_file() && model.join("images.bin").is_file();
-    let (cameras, images) = if is_binary {
+    let (mut cameras, images) = if is_binary {
         (read_cameras_bin(&model.join("cameras.bin"))?, read_images_bin(&model.join("images.bin"))?)
     } else {
         (read_cameras_txt(&model.join("cameras.txt"))?, read_images_txt(&model.join("images.txt"))?)
@@ -118,14 +118,17 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
     let mut findings: Vec<Finding> = told_of_others(&models, folder).into_iter().collect();
     let mut posed = Vec::new();
     for image in images {
-        let camera = cameras.get(&image.camera).ok_or_else(|| {
-            Error::new(
+        if cameras.get(&image.camera).is_some_and(Result::is_err) {
+            cameras.remove(&image.camera).transpose()?;
+        }
+        let Some(Ok(camera)) = cameras.get(&image.camera) else {
+            return Err(Error::new(
                 ErrorKind::Malformed,
                 format!("the image {} names camera {}, which is not there", image.name, image.camera),
             )
-            .at(image.place.clone())
-            .remedy("export the model again: cameras and images do not belong together")
-        })?;
+            .at(image.place)
+            .remedy("export the model again: cameras and images do not belong together"));
+        };
         let (intrinsics, lens) = lens_of(camera.model, &camera.parameters, &camera.place)?;
         let [w, x, y, z] = image.rotation;
         let rotation = DQuat::from_xyzw(x, y, z, w);
@@ -161,7 +164,10 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
     Ok(SourceScene { findings, ..SourceScene::of_photographs(folder, mesh, views) })
 }
 
-fn read_cameras_bin(path: &Path) -> Result<BTreeMap<u32, ColmapCamera>> {
+/// Cameras by their number. One that cannot be read is an error only for the images that name it.
+type ColmapCameras = BTreeMap<u32, Result<ColmapCamera>>;
+
+fn read_cameras_bin(path: &Path) -> Result<ColmapCameras> {
     let mut bytes = Bytes::open(path)?;
     let count = bytes.count("the number of cameras", 24)?;
     let mut cameras = BTreeMap::new();
@@ -171,7 +177,7 @@ fn read_cameras_bin(path: &Path) -> Result<BTreeMap<u32, ColmapCamera>> {
         let (model, parameter_count) = model_of_id(bytes.u32("the model of a camera")? as i32, &place)?;
         let size = (bytes.u64("the width")? as usize, bytes.u64("the height")? as usize);
         let parameters = (0..parameter_count).map(|_| bytes.f64("a parameter")).collect::<Result<_>>()?;
-        cameras.insert(id, ColmapCamera { model, size, parameters, place });
+        cameras.insert(id, Ok(ColmapCamera { model, size, parameters, place }));
     }
     Ok(cameras)
 }
@@ -206,63 +212,82 @@ fn parsed<T: std::str::FromStr>(word: Option<&str>, what: &str, path: &Path, lin
     })
 }
 
-fn read_cameras_txt(path: &Path) -> Result<BTreeMap<u32, ColmapCamera>> {
+fn read_cameras_txt(path: &Path) -> Result<ColmapCameras> {
     let text = read_text(path)?;
     let mut cameras = BTreeMap::new();
     for (index, line) in text.lines().enumerate() {
         if line.trim().is_empty() || line.trim_start().starts_with('#') {
             continue;
         }
-        let place = Place::Line(path.into(), index + 1);
-        let mut words = line.split_whitespace();
-        let id = parsed(words.next(), "the number of a camera", path, index + 1)?;
-        let (model, count) = model_of_name(words.next().unwrap_or_default(), &place)?;
-        let width = parsed(words.next(), "a width", path, index + 1)?;
-        let height = parsed(words.next(), "a height", path, index + 1)?;
-        let parameters: Vec<f64> =
-            words.map(|word| parsed(Some(word), "a parameter", path, index + 1)).collect::<Result<_>>()?;
-        if parameters.len() != count {
-            return Err(Error::new(
-                ErrorKind::Malformed,
-                format!("the model {model} has {count} parameters, not {}", parameters.len()),
-            )
-            .at(place)
-            .remedy("export the model again"));
-        }
-        cameras.insert(id, ColmapCamera { model, size: (width, height), parameters, place });
+        let (id, rest) = line.trim_start().split_once(char::is_whitespace).unwrap_or((line, ""));
+        let id = parsed(Some(id), "the number of a camera", path, index + 1)?;
+        cameras.insert(id, camera_of_line(rest, path, index + 1));
     }
     Ok(cameras)
+}
+
+/// A camera of what stands behind its number.
+fn camera_of_line(text: &str, path: &Path, line: usize) -> Result<ColmapCamera> {
+    let place = Place::Line(path.into(), line);
+    let mut words = text.split_whitespace();
+    let (model, count) = model_of_name(words.next().unwrap_or_default(), &place)?;
+    let width = parsed(words.next(), "a width", path, line)?;
+    let height = parsed(words.next(), "a height", path, line)?;
+    let parameters: Vec<f64> =
+        words.map(|word| parsed(Some(word), "a parameter", path, line)).collect::<Result<_>>()?;
+    if parameters.len() != count {
+        return Err(Error::new(
+            ErrorKind::Malformed,
+            format!("the model {model} has {count} parameters, not {}", parameters.len()),
+        )
+        .at(place)
+        .remedy("export the model again"));
+    }
+    Ok(ColmapCamera { model, size: (width, height), parameters, place })
 }
 
 fn read_images_txt(path: &Path) -> Result<Vec<ColmapImage>> {
     let text = read_text(path)?;
     let mut images = Vec::new();
-    let mut lines = text.lines().enumerate();
+    let mut lines = text.lines().enumerate().peekable();
     while let Some((index, line)) = lines.next() {
         if line.trim().is_empty() || line.trim_start().starts_with('#') {
             continue;
         }
-        let mut pose = [0.0; 7];
-        let mut rest = line.trim_start();
-        let mut next = || {
-            let (word, after) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
-            rest = after.trim_start();
-            word
-        };
-        parsed::<u32>(Some(next()), "the number of an image", path, index + 1)?;
-        for value in &mut pose {
-            *value = parsed(Some(next()), "a number of a pose", path, index + 1)?;
-        }
-        let camera = parsed(Some(next()), "the number of a camera", path, index + 1)?;
-        let place = Place::Line(path.into(), index + 1);
-        let rotation = [pose[0], pose[1], pose[2], pose[3]];
-        let translation = DVec3::new(pose[4], pose[5], pose[6]);
-        // What is left is the name, spaces and all.
-        images.push(ColmapImage { rotation, translation, camera, name: rest.trim_end().to_owned(), place });
-        // The points of the image: a line that may be empty.
-        lines.next();
+        images.push(image_of_line(line, path, index + 1)?);
+        // The points of the image: a line that may be empty. Some programs leave it out.
+        lines.next_if(|(index, line)| is_of_points(line) || image_of_line(line, path, index + 1).is_err());
     }
     Ok(images)
+}
+
+/// Whether a line has nothing but points: x, y and the number of a point in space, as often as there are points.
+fn is_of_points(line: &str) -> bool {
+    let mut count = 0;
+    line.split_whitespace().all(|word| {
+        count += 1;
+        word.parse::<f64>().is_ok()
+    }) && count % 3 == 0
+}
+
+fn image_of_line(line: &str, path: &Path, number: usize) -> Result<ColmapImage> {
+    let mut pose = [0.0; 7];
+    let mut rest = line.trim_start();
+    let mut next = || {
+        let (word, after) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
+        rest = after.trim_start();
+        word
+    };
+    parsed::<u32>(Some(next()), "the number of an image", path, number)?;
+    for value in &mut pose {
+        *value = parsed(Some(next()), "a number of a pose", path, number)?;
+    }
+    let camera = parsed(Some(next()), "the number of a camera", path, number)?;
+    let place = Place::Line(path.into(), number);
+    let rotation = [pose[0], pose[1], pose[2], pose[3]];
+    let translation = DVec3::new(pose[4], pose[5], pose[6]);
+    // What is left is the name, spaces and all.
+    Ok(ColmapImage { rotation, translation, camera, name: rest.trim_end().to_owned(), place })
 }
 
 #[cfg(test)]

@@ -161,3 +161,35 @@ fn of_several_models_the_largest_is_read_and_told() {
     let told = scene.findings.iter().find(|finding| finding.code == "model-chosen").unwrap();
     assert!(told.message.contains("1 has 3 images") && told.message.contains("0 has 1"), "{told}");
 }
+
+#[test]
+fn lines_of_points_may_be_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("images.txt");
+    let names = |text: &str| -> Vec<String> {
+        std::fs::write(&path, text).unwrap();
+        read_images_txt(&path).unwrap().into_iter().map(|image| image.name).collect()
+    };
+    let image = |number: u32, name: &str| format!("{number} 1 0 0 0 0 0 {number} 1 {name}\n");
+    let none = image(1, "a.png") + &image(2, "b.png") + &image(3, "7 c.png");
+    assert_eq!(names(&none), ["a.png", "b.png", "7 c.png"]);
+    // Points at whole pixels look like an image up to its name, which would be a number.
+    let points = image(1, "a.png") + "1 2 3 4 5 6 7 8 9 10 11 12\n" + &image(2, "b") + "\n" + &image(3, "c");
+    assert_eq!(names(&points), ["a.png", "b", "c"]);
+}
+
+#[test]
+fn cameras_that_no_image_names_may_be_of_any_kind_and_numbers_must_be_finite() {
+    let folder = folder_with_photos(&PHOTOS);
+    let model = folder.path().join("sparse/0");
+    std::fs::write(model.join("images.txt"), IMAGES).unwrap();
+    let others = "98 EQUIRECTANGULAR 10 10 1 2\n99 SPHERE_X 10 10 1 2 3\n";
+    std::fs::write(model.join("cameras.txt"), format!("{CAMERAS}{others}")).unwrap();
+    assert_eq!(read(folder.path()).unwrap().views.len(), 3);
+    let used = CAMERAS.replace("2 FULL_OPENCV 40 30 50 50 20 15 0 0 0 0 0 0 0 0", "2 SPHERE_X 10 10 1 2 3");
+    std::fs::write(model.join("cameras.txt"), used).unwrap();
+    let error = read(folder.path()).unwrap_err();
+    assert!(error.kind() == ErrorKind::Unsupported && error.to_string().contains("SPHERE_X"), "{error}");
+    std::fs::write(model.join("cameras.txt"), CAMERAS.replace("0.1 -0.01", "nan 0")).unwrap();
+    assert_eq!(read(folder.path()).unwrap_err().kind(), ErrorKind::NonFinite);
+}
