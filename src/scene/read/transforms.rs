@@ -106,8 +106,8 @@ impl Transforms {
         let [k1, k2, k3, k4] = ["k1", "k2", "k3", "k4"].map(number);
         let tangential = [number("p1"), number("p2")];
         let polynomial = match name {
-            "PINHOLE" | "SIMPLE_PINHOLE" => Polynomial::default(),
-            "OPENCV" | "SIMPLE_RADIAL" | "RADIAL" | "PERSPECTIVE" => {
+            // Coefficients count whatever the model is called, as for nerfstudio and instant-ngp: see `told_of_pinholes`.
+            "PINHOLE" | "SIMPLE_PINHOLE" | "OPENCV" | "SIMPLE_RADIAL" | "RADIAL" | "PERSPECTIVE" => {
                 Polynomial { numerator: [k1, k2, k3, k4, 0.0, 0.0], tangential, ..Default::default() }
             }
             "OPENCV_FISHEYE" | "FISHEYE" => Polynomial {
@@ -175,6 +175,22 @@ impl Transforms {
     }
 }
 
+/// That frames are called pinholes and have distortion all the same.
+fn told_of_pinholes(file: &Transforms, posed: &[Posed]) -> Option<Finding> {
+    let is_called_pinhole = |frame: &Value| {
+        let model = frame.get("camera_model").or_else(|| file.json.get("camera_model")).and_then(Value::as_str);
+        model.is_some_and(|model| model.ends_with("PINHOLE"))
+    };
+    let frames = file.frames().iter().zip(posed);
+    let count = frames.filter(|(frame, own)| is_called_pinhole(frame) && !own.lens.is_pinhole()).count();
+    let message = format!("the camera model of {count} frames is a pinhole, yet they have distortion: it is undone");
+    (count > 0).then(|| {
+        Finding::new(Severity::Warning, "pinhole-with-distortion", message)
+            .at(Place::File(file.path.clone()))
+            .remedy("take k1, k2, p1 and p2 out of the file if its photos are undistorted already")
+    })
+}
+
 /// The folder of the scanned mesh of Stanford-ORB, `ground_truth/NAME/mesh_blender` beside the folder of all scenes.
 fn orb_mesh(folder: &Path) -> Option<PathBuf> {
     let whole = std::path::absolute(folder).ok()?;
@@ -208,9 +224,11 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
     files.insert(0, main);
     let mut posed = Vec::new();
     for file in &files {
+        let first = posed.len();
         for index in 0..file.frames().len() {
             posed.push(file.posed(index, &photos, &mut findings)?);
         }
+        findings.extend(told_of_pinholes(file, &posed[first..]));
     }
     let views = views_of(posed, &photos, &[folder.join("masks"), folder.join("mask")], &mut findings)?;
     let held_out: Vec<String> =

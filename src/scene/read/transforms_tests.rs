@@ -84,3 +84,20 @@ fn what_is_missing_is_named() {
     let masked = format!(r#","fl_x":9,"mask_path":"m.png","transform_matrix":{POSE}"#);
     assert_eq!(error_of(&frame(&masked)).kind(), ErrorKind::Missing);
 }
+
+#[test]
+fn distortion_of_what_is_called_a_pinhole_is_undone_and_told() {
+    let folder = folder_with_photos(&["a.png"]);
+    let json = format!(
+        r#"{{"camera_model":"PINHOLE","fl_x":50,"cx":20,"cy":15,"w":40,"h":30,"k1":0.1,
+        "frames":[{{"file_path":"a.png","transform_matrix":{POSE}}}]}}"#
+    );
+    let path = folder.path().join("transforms.json");
+    std::fs::write(&path, &json).unwrap();
+    let told = |scene: &SourceScene| scene.findings.iter().any(|finding| finding.code == "pinhole-with-distortion");
+    let scene = read(folder.path()).unwrap();
+    assert!(scene.views[0].lens.is_some() && told(&scene));
+    std::fs::write(&path, json.replace("0.1", "0")).unwrap();
+    let scene = read(folder.path()).unwrap();
+    assert!(scene.views[0].lens.is_none() && !told(&scene));
+}
