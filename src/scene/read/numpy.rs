@@ -1,9 +1,9 @@
-//! Arrays of numpy: `.npy` (format 1 to 3, little-endian floats and integers, C order) and archives of them, `.npz`.
+//! Arrays of numpy: `.npy` (format 1 to 3, little-endian floats and integers, in the order of C or of Fortran) and archives of
+//! them, `.npz`, of which only those that are asked for are read.
 
 use super::zip::Archive;
 use crate::error::{Error, ErrorKind, Place, Result};
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// An array of numbers.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,14 +28,26 @@ pub fn read(path: &Path) -> Result<Array> {
     parse(&std::fs::read(path).map_err(|source| Error::reading(path, source))?, path)
 }
 
-/// Reads the arrays of an archive, by their names without `.npy`.
-pub fn read_archive(path: &Path) -> Result<BTreeMap<String, Array>> {
-    let archive = Archive::open(path)?;
-    let names: Vec<String> = archive.names().filter(|name| name.ends_with(".npy")).map(str::to_owned).collect();
-    names
-        .into_iter()
-        .map(|name| Ok((name.trim_end_matches(".npy").to_owned(), parse(&archive.read(&name)?, &path.join(&name))?)))
-        .collect()
+/// An archive of arrays.
+pub struct Arrays {
+    path: PathBuf,
+    archive: Archive,
+}
+
+impl Arrays {
+    /// Opens an archive; no array is read yet.
+    pub fn open(path: &Path) -> Result<Self> {
+        Ok(Arrays { path: path.into(), archive: Archive::open(path)? })
+    }
+
+    /// An array by its name without `.npy`; `None` where there is none of the name.
+    pub fn get(&self, name: &str) -> Result<Option<Array>> {
+        let name = format!("{name}.npy");
+        if !self.archive.names().any(|own| own == name) {
+            return Ok(None);
+        }
+        parse(&self.archive.read(&name)?, &self.path.join(&name)).map(Some)
+    }
 }
 
 fn parse(bytes: &[u8], path: &Path) -> Result<Array> {
@@ -56,7 +68,7 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Array> {
     let header = String::from_utf8_lossy(header);
     let after = |key: &str| header.split_once(&format!("'{key}':")).map(|(_, rest)| rest.trim_start());
     let kind = after("descr").and_then(|rest| rest.strip_prefix('\'')?.split('\'').next()).unwrap_or_default();
-    let is_c_order = after("fortran_order").is_some_and(|rest| rest.starts_with("False"));
+    let is_fortran_order = after("fortran_order").is_some_and(|rest| rest.starts_with("True"));
     let shape = after("shape").and_then(|rest| rest.strip_prefix('(')?.split(')').next()).unwrap_or_default();
     let shape: Option<Vec<usize>> =
         shape.split(',').map(str::trim).filter(|word| !word.is_empty()).map(|word| word.parse().ok()).collect();
@@ -68,10 +80,8 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Array> {
         "<f4" | "<i4" => 4,
         _ => return Err(malformed(&format!("holds '{kind}', not little-endian floats or integers"))),
     };
-    let count = count.filter(|count| count.checked_mul(size) == Some(data.len()));
-    let is_ordered = is_c_order || shape.len() < 2;
-    if count.is_none() || !is_ordered {
-        return Err(malformed(if is_ordered { "is not as long as its shape says" } else { "is in Fortran order" }));
+    if count.and_then(|count| count.checked_mul(size)) != Some(data.len()) {
+        return Err(malformed("is not as long as its shape says"));
     }
     let value = |chunk: &[u8]| {
         let mut eight = [0; 8];
@@ -84,7 +94,25 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Array> {
             _ => f64::from(i32::from_le_bytes(four)),
         }
     };
-    Ok(Array { shape, values: data.chunks_exact(size).map(value).collect() })
+    let values: Vec<f64> = data.chunks_exact(size).map(value).collect();
+    let values = if is_fortran_order { with_last_fastest(&values, &shape) } else { values };
+    Ok(Array { shape, values })
+}
+
+/// The values of an array whose first dimension runs fastest, in the order in which the last one does.
+fn with_last_fastest(values: &[f64], shape: &[usize]) -> Vec<f64> {
+    let place = |mut index: usize| {
+        // From the last dimension to the first: the digits of the index, weighed by the lengths before them.
+        let mut stride: usize = shape.iter().product();
+        let mut place = 0;
+        for length in shape.iter().rev() {
+            stride /= length;
+            place += index % length * stride;
+            index /= length;
+        }
+        place
+    };
+    (0..values.len()).map(|index| values[place(index)]).collect()
 }
 
 /// An array of doubles as a file; for tests of the readers.
@@ -117,6 +145,12 @@ mod tests {
         let at = fortran.windows(5).position(|window| window == b"False").unwrap();
         let mut fortran = fortran;
         fortran[at..at + 5].copy_from_slice(b"True ");
-        assert_eq!(parse(&fortran, Path::new("a.npy")).unwrap_err().kind(), ErrorKind::Malformed);
+        // Columns of two: 1 2, 3 4, 5 6.5.
+        let array = parse(&fortran, Path::new("a.npy")).unwrap();
+        assert_eq!(array.values, [1.0, 3.0, 5.0, 2.0, 4.0, 6.5]);
+        let cube: Vec<f64> = (0..24).map(f64::from).collect();
+        let turned = with_last_fastest(&cube, &[2, 3, 4]);
+        // Element (1, 2, 3) is the last of both, (0, 1, 0) the third, (1, 0, 0) the second of Fortran's.
+        assert_eq!((turned[23], turned[4], turned[12]), (23.0, 2.0, 1.0));
     }
 }
