@@ -249,10 +249,18 @@ fn stl_is_read_in_both_forms() {
         binary.extend(triangle.iter().flatten().flat_map(|number| number.to_le_bytes()));
         binary.extend([0; 2]);
     }
-    for content in [ascii.as_bytes().to_vec(), ascii.replace('\n', "\r\n").into_bytes(), binary] {
+    let trailing = [binary.clone(), b"\n\n".to_vec()].concat();
+    let texts = [ascii.to_owned(), ascii.replace('\n', "\r\n"), ascii.to_uppercase()].map(String::into_bytes);
+    for content in texts.into_iter().chain([binary.clone(), trailing.clone()]) {
         let (mesh, _) = read("a.stl", content);
         assert_eq!((mesh.triangles.len(), mesh.positions.len(), area(&mesh)), (2, 4, 1.0));
     }
+    let told = |content: Vec<u8>| read("a.stl", content).1.iter().any(|finding| finding.code == "stl-trailing-bytes");
+    assert!(told(trailing) && !told(binary.clone()));
+    let (_keep, folder) = folder();
+    std::fs::write(folder.join("a.stl"), &binary[..binary.len() - 1]).unwrap();
+    let error = read_mesh(&folder.join("a.stl")).unwrap_err();
+    assert!(error.to_string().contains("cut short") || error.kind() == patina::ErrorKind::Malformed, "{error}");
 }
 
 /// A scene of the cases beside the repository, or `None` after a printed word.

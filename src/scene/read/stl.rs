@@ -22,9 +22,15 @@ pub fn read(path: &Path) -> Result<SourceMesh> {
     let bytes = std::fs::read(path).map_err(|source| Error::reading(path, source))?;
     let count = bytes.get(FRONT - 4..FRONT).map_or(0, |four| u32::from_le_bytes([four[0], four[1], four[2], four[3]]));
     let length = FRONT as u64 + FACET as u64 * u64::from(count);
-    let (corners, findings) = if bytes.len() >= FRONT && bytes.len() as u64 == length {
-        (of_binary(&bytes[FRONT..], path)?, Vec::new())
-    } else if bytes.trim_ascii_start().starts_with(b"solid") || bytes.starts_with(b"\xef\xbb\xbf") {
+    let start = bytes.trim_ascii_start();
+    let is_text = start.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
+    let trailing = (bytes.len() as u64).checked_sub(length).filter(|_| bytes.len() >= FRONT);
+    // A text has letters for a number of triangles, which stand for more than any file holds.
+    let (corners, findings) = if let Some(trailing) = trailing.filter(|more| *more == 0 || count > 0) {
+        let message = format!("{trailing} bytes behind the last of {count} triangles are passed over");
+        let told = Finding::new(Severity::Note, "stl-trailing-bytes", message).at(Place::Byte(path.into(), length));
+        (of_binary(&bytes[FRONT..length as usize], path)?, if trailing > 0 { vec![told] } else { Vec::new() })
+    } else if is_text || bytes.starts_with(b"\xef\xbb\xbf") {
         of_ascii(bytes, path)?
     } else {
         let message = format!("{count} triangles take {length} bytes, the file has {}", bytes.len());
