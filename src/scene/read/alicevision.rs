@@ -2,12 +2,13 @@
 //!
 //! Numbers are stored as strings. The nine numbers of a rotation are the columns of camera from world, so row by row they are
 //! camera to world; `center` is where the camera stands. The principal point is an offset from the middle in pixels (files before
-//! 2021: absolute, told by its size).
+//! 2021: absolute, told by its size). Views of a rig stand where its pose and their place in it put them. Of several files the
+//! first that holds poses is read: `cameraInit.sfm` has none.
 
 use super::blended_mvs::files_of;
 use super::camera_file::read_text;
 use super::colmap_lens::matrix;
-use super::photo_index::{PhotoIndex, Posed};
+use super::photo_index::{PhotoIndex, Posed, some_of};
 use super::source::{SourceCamera, SourceScene};
 use super::tool_folder::scene_of;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
@@ -17,16 +18,37 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The file of a folder, if it holds one.
-pub fn file_of(folder: &Path) -> Option<PathBuf> {
+/// The files of a folder that may be ones of cameras, the likelier first.
+fn files_in(folder: &Path) -> Vec<PathBuf> {
     let named = ["sfm.json", "cameras.json.sfm", "cameras.sfm"].map(|name| folder.join(name));
-    named.into_iter().find(|path| path.is_file()).or_else(|| files_of(folder, &["sfm"]).ok()?.into_iter().next())
+    let mut files: Vec<PathBuf> = named.into_iter().filter(|path| path.is_file()).collect();
+    let others = files_of(folder, &["sfm"]).unwrap_or_default();
+    files.extend(others.into_iter().filter(|path| !path.file_name().is_some_and(|name| name == "cameras.sfm")));
+    files.dedup();
+    files
 }
 
-/// A number, be it written as one or as a string.
+/// Whether a file holds poses.
+pub fn holds_poses(path: &Path) -> bool {
+    let json = read_text(path).ok().and_then(|text| serde_json::from_str::<Value>(&text).ok());
+    json.is_some_and(|json| json.get("poses").and_then(Value::as_array).is_some_and(|poses| !poses.is_empty()))
+}
+
+/// The file of a folder, if it holds one: the first with poses, or else the first.
+pub fn file_of(folder: &Path) -> Option<PathBuf> {
+    let files = files_in(folder);
+    let with_poses = if files.len() > 1 { files.iter().find(|path| holds_poses(path)) } else { None };
+    with_poses.or(files.first()).cloned()
+}
+
+/// A number, be it written as one or as a string; an empty string is none.
 fn number(value: &Value) -> Option<f64> {
-    let number = value.as_f64().or_else(|| value.as_str()?.trim().parse().ok())?;
-    number.is_finite().then_some(number)
+    match value.as_str().map(str::trim) {
+        Some("") => None,
+        // What is written but is no number is refused where it is used.
+        Some(text) => Some(text.parse().unwrap_or(f64::NAN)),
+        None => value.as_f64(),
+    }
 }
 
 fn numbers(value: &Value) -> Vec<f64> {
@@ -68,7 +90,14 @@ fn intrinsics_of(entry: &Value, place: &Place) -> Result<((usize, usize), DMat3,
         [x, y] => [*x, *y],
         _ => middle,
     };
-    let kind = entry.get("distortionType").or_else(|| entry.get("type")).and_then(Value::as_str).unwrap_or("pinhole");
+    let camera = entry.get("type").and_then(Value::as_str).unwrap_or("pinhole");
+    let distortion = entry.get("distortionType").and_then(Value::as_str);
+    if distortion.is_some() && camera != "pinhole" {
+        return Err(Error::new(ErrorKind::Unsupported, format!("a camera of the type {camera} is not supported"))
+            .at(place.clone())
+            .remedy("align with a pinhole camera, its distortion may be fisheye4, or export undistorted photos (PrepareDenseScene)"));
+    }
+    let kind = distortion.unwrap_or(camera);
     let k = entry.get("distortionParams").map(numbers).unwrap_or_default();
     let radial = |values: &[f64]| {
         let mut numerator = [0.0; 6];
@@ -97,6 +126,49 @@ fn intrinsics_of(entry: &Value, place: &Place) -> Result<((usize, usize), DMat3,
     Ok(((width as usize, height as usize), matrix(focal, centre), Lens::new(Model::Polynomial(polynomial))))
 }
 
+/// Rotation and centre of a pose.
+fn pose_of(pose: &Value, place: &Place) -> Result<(DMat3, DVec3)> {
+    let rotation: [f64; 9] = pose
+        .get("rotation")
+        .map(numbers)
+        .and_then(|values| values.try_into().ok())
+        .ok_or_else(|| malformed("the rotation is not nine numbers", place))?;
+    let centre: [f64; 3] = pose
+        .get("center")
+        .map(numbers)
+        .and_then(|values| values.try_into().ok())
+        .ok_or_else(|| malformed("the centre is not three numbers", place))?;
+    // Row by row camera to world: taken as columns it is camera from world.
+    Ok((DMat3::from_cols_array(&rotation), DVec3::from_array(centre)))
+}
+
+/// Whether a view says that its pose is that of its rig.
+fn is_dependent(view: &Value) -> bool {
+    view.get("isPoseIndependant").is_some_and(|value| value.as_bool() == Some(false) || value.as_str() == Some("false"))
+}
+
+/// Where the camera of a view is in its rig; `None` where that was not estimated.
+fn place_in_rig<'a>(rigs: &'a BTreeMap<String, Value>, rig: &str, view: &Value) -> Option<&'a Value> {
+    let index: usize = name(view.get("subPoseId"))?.parse().ok()?;
+    let own = rigs.get(rig)?.get("subPoses")?.get(index)?;
+    let is_known = own.get("status").and_then(Value::as_str) != Some("uninitialized");
+    own.get("pose").filter(|_| is_known)
+}
+
+/// That other files of cameras lie beside the one that is read.
+fn told_of_others(path: &Path) -> Option<Finding> {
+    let own = path.file_name().unwrap_or_default().to_string_lossy();
+    let files = files_in(path.parent().unwrap_or(Path::new("")));
+    let others = files.iter().filter_map(|file| file.file_name()).map(|name| name.to_string_lossy().into_owned());
+    let others: Vec<String> = others.filter(|name| *name != own).collect();
+    let message = format!("{own} is read, not {}", some_of(&others));
+    (!others.is_empty()).then(|| {
+        Finding::new(Severity::Note, "sfm-chosen", message)
+            .at(Place::File(path.into()))
+            .remedy("give the file in place of the folder to read another")
+    })
+}
+
 /// Lists an AliceVision scene and reads its cameras.
 pub fn read(path: &Path) -> Result<SourceScene> {
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -111,8 +183,13 @@ pub fn read(path: &Path) -> Result<SourceScene> {
     };
     let poses = by_id(list("poses"), "poseId");
     let intrinsics = by_id(list("intrinsics"), "intrinsicId");
-    let mut findings = Vec::new();
+    let rigs = by_id(list("rigs"), "rigId");
+    let mut findings: Vec<Finding> = told_of_others(path).into_iter().collect();
     let (mut posed, mut unposed) = (Vec::new(), 0usize);
+    // Where two views share a pose, it is that of their rig.
+    let mut sharing: BTreeMap<String, usize> = BTreeMap::new();
+    let pose_ids = list("views").iter().filter_map(|view| name(view.get("poseId")));
+    pose_ids.for_each(|id| *sharing.entry(id).or_default() += 1);
     for view in list("views") {
         let listed = view.get("path").and_then(Value::as_str).unwrap_or_default().to_owned();
         let place = Place::View(format!("{listed} of {}", path.display()));
@@ -122,20 +199,20 @@ pub fn read(path: &Path) -> Result<SourceScene> {
             unposed += 1;
             continue;
         };
-        let rotation: [f64; 9] = pose
-            .get("rotation")
-            .map(numbers)
-            .and_then(|values| values.try_into().ok())
-            .ok_or_else(|| malformed("the rotation is not nine numbers", &place))?;
-        let centre: [f64; 3] = pose
-            .get("center")
-            .map(numbers)
-            .and_then(|values| values.try_into().ok())
-            .ok_or_else(|| malformed("the centre is not three numbers", &place))?;
-        // Row by row camera to world: taken as columns it is camera from world.
-        let rotation = DMat3::from_cols_array(&rotation);
+        let (mut rotation, mut centre) = pose_of(pose, &place)?;
+        let is_shared = name(view.get("poseId")).and_then(|id| sharing.get(&id)).is_some_and(|count| *count > 1);
+        if let Some(rig) = name(view.get("rigId")).filter(|_| is_shared || is_dependent(view)) {
+            let Some(own) = place_in_rig(&rigs, &rig, view) else {
+                unposed += 1;
+                continue;
+            };
+            // Camera from world is camera from rig after rig from world (AliceVision, `SfMData::getPose`).
+            let (own_rotation, own_centre) = pose_of(own, &place)?;
+            centre += rotation.transpose() * own_centre;
+            rotation = own_rotation * rotation;
+        }
         let (size, intrinsics, lens) = intrinsics_of(entry, &place)?;
-        let translation = -(rotation * DVec3::from_array(centre));
+        let translation = -(rotation * centre);
         let (camera, mut noticed) = SourceCamera::new(intrinsics, rotation, translation, &place)?;
         findings.append(&mut noticed);
         posed.push(Posed { listed, camera, lens, size: Some(size), mask: None, place });
@@ -175,5 +252,63 @@ mod tests {
         let pinhole = read(&path).unwrap().views[0].camera.pinhole();
         assert_eq!(pinhole.focal_pixels.to_array(), [50.0, 50.0]);
         assert_eq!(pinhole.centre_pixels.to_array(), [21.0, 14.0], "an old file: absolute");
+    }
+
+    const RIG: &str = r#"{"views":[{"poseId":"1","intrinsicId":"5","path":"/far/a.png","rigId":"7","subPoseId":"0"},
+        {"poseId":"1","intrinsicId":"5","path":"/far/b.png","rigId":"7","subPoseId":"1"}],
+        "intrinsics":[{"intrinsicId":"5","width":"40","height":"30","focalLength":"45","sensorWidth":"36","type":"pinhole",
+        "distortionParams":["0.1","0","0"],"distortionType":"radialk3"}],
+        "poses":[{"poseId":"1","pose":{"transform":{"rotation":["0","1","0","-1","0","0","0","0","1"],"center":["1","2","3"]}}}],
+        "rigs":[{"rigId":"7","subPoses":[
+        {"status":"estimated","pose":{"rotation":["1","0","0","0","1","0","0","0","1"],"center":["0","0","0"]}},
+        {"status":"estimated","pose":{"rotation":["1","0","0","0","0","1","0","-1","0"],"center":["0.5","0","0"]}}]}]}"#;
+
+    fn folder_of_two() -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.png", "b.png"] {
+            file::write_png_srgb8(&folder.path().join(name), &Image::filled(40, 30, [9; 3])).unwrap();
+        }
+        folder
+    }
+
+    #[test]
+    fn views_of_a_rig_stand_where_pose_and_rig_put_them() {
+        let folder = folder_of_two();
+        let path = folder.path().join("sfm.json");
+        std::fs::write(&path, RIG).unwrap();
+        let scene = read(&path).unwrap();
+        let cameras = [0, 1].map(|index| scene.views[index].camera);
+        let centres = cameras.map(|camera| camera.rotation.transpose() * -camera.translation);
+        assert!((centres[0] - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-12);
+        // The rig's x axis is -y of the world; the second camera is half a unit along it and turned about it.
+        assert!((centres[1] - DVec3::new(1.0, 1.5, 3.0)).length() < 1e-12, "{}", centres[1]);
+        assert!((cameras[1].rotation.transpose() * DVec3::X - DVec3::NEG_Y).length() < 1e-12);
+        assert!((cameras[1].rotation * DVec3::Z).z.abs() < 1e-12);
+        let unknown = RIG.replacen("\"estimated\"", "\"uninitialized\"", 1);
+        std::fs::write(&path, unknown).unwrap();
+        let scene = read(&path).unwrap();
+        assert!(scene.views.len() == 1 && scene.findings.iter().any(|own| own.code == "camera-not-aligned"));
+    }
+
+    #[test]
+    fn cameras_of_other_types_are_refused_by_name_and_numbers_must_be_finite() {
+        let folder = folder_of_two();
+        let path = folder.path().join("sfm.json");
+        std::fs::write(&path, RIG.replace("\"pinhole\"", "\"equidistant\"")).unwrap();
+        let error = read(&path).unwrap_err();
+        assert!(error.kind() == ErrorKind::Unsupported && error.to_string().contains("equidistant"), "{error}");
+        std::fs::write(&path, RIG.replace("[\"0.1\"", "[\"nan\"")).unwrap();
+        assert_eq!(read(&path).unwrap_err().kind(), ErrorKind::NonFinite);
+    }
+
+    #[test]
+    fn of_several_files_the_one_with_poses_is_read() {
+        let folder = folder_of_two();
+        std::fs::write(folder.path().join("cameraInit.sfm"), RIG.replace("\"poses\"", "\"none\"")).unwrap();
+        std::fs::write(folder.path().join("sfm.sfm"), RIG).unwrap();
+        let path = file_of(folder.path()).unwrap();
+        assert_eq!(path, folder.path().join("sfm.sfm"));
+        let scene = read(&path).unwrap();
+        assert!(scene.findings[0].code == "sfm-chosen" && scene.findings[0].message.contains("cameraInit.sfm"));
     }
 }
