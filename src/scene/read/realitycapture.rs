@@ -2,7 +2,8 @@
 //!
 //! World to camera, OpenCV axes; `Position` is where the camera stands. The focal length is that of 35 mm film over the longer side,
 //! the principal point an offset from the middle in units of the longer side. Photos with `InTexturing="0"` were rejected for
-//! their colour by the user: they take no part. The order of the tangential pair is taken to be OpenCV's.
+//! their colour by the user: they take no part. The order of the tangential pair is taken to be OpenCV's. Which side
+//! `AspectRatio` and `Skew` stretch is told differently by different programs: other values than 1 and 0 are refused.
 
 use super::blended_mvs::files_of;
 use super::camera_file::read_text;
@@ -19,6 +20,9 @@ use std::path::{Path, PathBuf};
 
 /// Width of 35 mm film in millimetres.
 const FILM_MILLIMETRES: f64 = 36.0;
+
+/// Pixels whose sides differ by less than this share are square: it moves the edge of a photo by less than a pixel.
+const SQUARE: f64 = 1e-4;
 
 /// The folder of a scene that holds the side files: itself, or one of photos.
 pub fn folder_of(folder: &Path) -> Option<PathBuf> {
@@ -49,11 +53,9 @@ fn side_of(path: &Path) -> Result<Option<Side>> {
             attribute.or_else(|| node.text().filter(|_| node.tag_name().name() == name)).map(str::trim)
         })
     };
+    // What is written but is no number is refused where it is used.
     let numbers = |name: &str| -> Option<Vec<f64>> {
-        value(name)?
-            .split_whitespace()
-            .map(|word| word.parse().ok().filter(|number: &f64| number.is_finite()))
-            .collect()
+        Some(value(name)?.split_whitespace().map(|word| word.parse().unwrap_or(f64::NAN)).collect())
     };
     let number = |name: &str| numbers(name).and_then(|values| values.first().copied());
     let (Some(rotation), Some(position), Some(focal_film)) =
@@ -66,6 +68,13 @@ fn side_of(path: &Path) -> Result<Option<Side>> {
             .at(Place::File(path.into()))
             .remedy("export the metadata again"));
     };
+    for (name, usual) in [("AspectRatio", 1.0), ("Skew", 0.0)] {
+        if let Some(value) = number(name).filter(|value| !((value - usual).abs() <= SQUARE)) {
+            return Err(Error::new(ErrorKind::Unsupported, format!("{name} is {value}: the pixels are not square"))
+                .at(Place::File(path.into()))
+                .remedy("align with square pixels, or export undistorted photos with their XMP"));
+        }
+    }
     Ok(Some(Side {
         in_texturing: !matches!(value("InTexturing"), Some("0" | "false")),
         focal_film,
@@ -183,7 +192,17 @@ mod tests {
         assert!((camera.rotation * DVec3::Y - DVec3::X).length() < 1e-12, "row by row, world to camera");
         assert!((camera.rotation.transpose() * -camera.translation - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-12);
         assert!(scene.findings.iter().any(|finding| finding.code == "photo-rejected"));
-        std::fs::write(folder.path().join("a.xmp"), side(1).replace("brown4t2", "spiral")).unwrap();
-        assert_eq!(read(folder.path()).unwrap_err().kind(), ErrorKind::Unsupported);
+        for (from, to, kind) in [
+            ("brown4t2", "spiral", ErrorKind::Unsupported),
+            ("xcr:Version", "xcr:AspectRatio=\"1.1\" xcr:Version", ErrorKind::Unsupported),
+            ("xcr:Version", "xcr:Skew=\"0.01\" xcr:Version", ErrorKind::Unsupported),
+            (">0.1 0.02", ">nan 0.02", ErrorKind::NonFinite),
+        ] {
+            std::fs::write(folder.path().join("a.xmp"), side(1).replace(from, to)).unwrap();
+            assert_eq!(read(folder.path()).unwrap_err().kind(), kind, "{to}");
+        }
+        let square = side(1).replace("xcr:Version", "xcr:AspectRatio=\"1\" xcr:Skew=\"0\" xcr:Version");
+        std::fs::write(folder.path().join("a.xmp"), square).unwrap();
+        assert_eq!(read(folder.path()).unwrap().views.len(), 1);
     }
 }
