@@ -19,8 +19,9 @@ fn text_of<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
     node.children().find(|child| child.has_tag_name(name))?.text().map(str::trim)
 }
 
+/// A number of a child; one that is written but is none is not a number, which is refused where it is used.
 fn number_of(node: Node, name: &str) -> Option<f64> {
-    text_of(node, name)?.parse().ok().filter(|value: &f64| value.is_finite())
+    Some(text_of(node, name)?.parse().unwrap_or(f64::NAN))
 }
 
 fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {

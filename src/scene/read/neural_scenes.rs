@@ -10,7 +10,7 @@ use super::blended_mvs::files_of;
 use super::colmap_lens::matrix;
 use super::mesh_choice;
 use super::numpy;
-use super::photo_index::{PhotoIndex, Posed, views_of};
+use super::photo_index::{PhotoIndex, Posed, reduction_of, views_of};
 use super::source::{MeshFrame, SourceCamera, SourceScene};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::scene::lens::Lens;
@@ -33,7 +33,8 @@ pub fn llff_file(folder: &Path) -> Option<PathBuf> {
 /// The photos in the order of their names, as many as there are cameras.
 fn photos_in_order(folder: &Path, count: usize) -> Result<Vec<String>> {
     let folders = ["image", "images", "rgb"].map(|name| folder.join(name));
-    let images = folders.into_iter().find(|path| path.is_dir()).ok_or_else(|| {
+    let whole = folders.into_iter().find(|path| path.is_dir());
+    let images = whole.or_else(|| largest_of_smaller(folder)).ok_or_else(|| {
         Error::new(ErrorKind::Missing, "the folder of photos is not there")
             .at(Place::File(folder.into()))
             .remedy("put the photos into image/ or images/, in the order of the cameras")
@@ -45,6 +46,14 @@ fn photos_in_order(folder: &Path, count: usize) -> Result<Vec<String>> {
             .remedy("cameras go with photos by their order alone: give all photos and no others"));
     }
     Ok(files.iter().map(|path| path.strip_prefix(folder).unwrap_or(path).display().to_string()).collect())
+}
+
+/// Of the folders of photos made smaller, `images_4` and `images_8`, the one with the largest.
+fn largest_of_smaller(folder: &Path) -> Option<PathBuf> {
+    let entries = std::fs::read_dir(folder).ok()?;
+    let folders = entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.is_dir());
+    let rated = folders.filter_map(|path| Some((reduction_of(&path.file_name()?.to_string_lossy())?, path)));
+    rated.min().map(|(_, path)| path)
 }
 
 fn wrong(file: &Path, what: &str) -> Error {
@@ -62,11 +71,10 @@ fn finish(folder: &Path, posed: Vec<Posed>, frames: Vec<MeshFrame>) -> Result<So
 /// Lists a scene of IDR or NeuS and reads its cameras.
 pub fn read_neus(file: &Path) -> Result<SourceScene> {
     let folder = file.parent().unwrap_or(Path::new(""));
-    let arrays = numpy::read_archive(file)?;
+    let arrays = numpy::Arrays::open(file)?;
     let matrix_of = |name: String| -> Result<Option<DMat4>> {
-        let Some(array) = arrays.get(&name) else { return Ok(None) };
-        let values: [f64; 16] =
-            array.values.clone().try_into().map_err(|_| wrong(file, &format!("{name} is not 4 x 4")))?;
+        let Some(array) = arrays.get(&name)? else { return Ok(None) };
+        let values: [f64; 16] = array.values.try_into().map_err(|_| wrong(file, &format!("{name} is not 4 x 4")))?;
         Ok(Some(DMat4::from_cols_array(&values).transpose()))
     };
     let mut projections = Vec::new();
@@ -171,7 +179,9 @@ mod tests {
             let unit = DMat4::from_translation(DVec3::X) * DMat4::from_scale(DVec3::splat(3.0));
             let unit = numpy::written(&[4, 4], &unit.transpose().to_cols_array());
             let path = folder.path().join("cameras_sphere.npz");
-            std::fs::write(&path, packed(&[("world_mat_0.npy", &world), ("scale_mat_0.npy", &unit)])).unwrap();
+            let other = b"\x93NUMPY\x01\x00\x10\x00{'descr': '<U7'}\n";
+            let entries = [("world_mat_0.npy", &world[..]), ("scale_mat_0.npy", &unit[..]), ("names.npy", &other[..])];
+            std::fs::write(&path, packed(&entries)).unwrap();
             let scene = read_neus(&neus_file(folder.path()).unwrap()).unwrap();
             let camera = &scene.views[0].camera;
             let near = |a: DMat3, b: DMat3| (a - b).to_cols_array().iter().all(|value| value.abs() < 1e-9);
@@ -194,6 +204,16 @@ mod tests {
         let point = camera.rotation * DVec3::new(1.5, 3.0, 1.0) + camera.translation;
         assert!((point - DVec3::new(0.5, -1.0, 2.0)).length() < 1e-12, "{point}");
         assert_eq!(camera.pinhole().centre_pixels.to_array(), [20.0, 15.0]);
+        for name in ["images_10", "images_2"] {
+            std::fs::rename(folder.path().join("image"), folder.path().join(name)).unwrap();
+            assert!(read_llff(&path).unwrap().views[0].photo.parent().unwrap().ends_with(name));
+            std::fs::create_dir(folder.path().join("image")).unwrap();
+            for photo in ["a.png", "b.png"] {
+                let small = Image::filled(4, 3, [9; 3]);
+                file::write_png_srgb8(&folder.path().join("image").join(photo), &small).unwrap();
+            }
+            assert!(read_llff(&path).unwrap().views[0].photo.parent().unwrap().ends_with("image"));
+        }
         std::fs::write(&path, numpy::written(&[1, 17], &row)).unwrap();
         assert_eq!(read_llff(&path).unwrap_err().kind(), ErrorKind::InvalidScene, "two photos for one camera");
     }

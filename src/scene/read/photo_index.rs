@@ -1,13 +1,15 @@
 //! The photos that lie under a scene's folder, found by the names that cameras know them by.
 //!
 //! Projects are moved: paths in them lead to other machines. A photo is the file whose path agrees best from its end:
-//! first the whole listed path, then as many folders as possible, then the name without its extension.
+//! first the whole listed path, then as many folders as possible, then the name without its extension. Of folders with the
+//! same photos made smaller, `images_2` beside `images_4`, the one with the largest is meant.
 
-use super::mask_names::{Masks, PHOTO_EXTENSIONS, names_of_masks};
+use super::mask_names::{EXTENSIONS_NOT_READ, Masks, PHOTO_EXTENSIONS, names_of_masks};
 use super::source::{SourceCamera, SourceView};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::image::file;
 use crate::scene::lens::Lens;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// Folders that hold pictures of other kinds, by the beginnings of their names.
@@ -22,6 +24,8 @@ pub struct PhotoIndex {
     roots: Vec<PathBuf>,
     by_name: HashMap<String, Vec<PathBuf>>,
     by_stem: HashMap<String, Vec<PathBuf>>,
+    /// A file of each stem that is a photo of a kind that is not read.
+    not_read: HashMap<String, PathBuf>,
 }
 
 /// A camera as a project lists it.
@@ -48,22 +52,36 @@ fn lower_stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
+/// By how much the photos of a folder are made smaller, as its name says: 2 of `images_2`.
+pub fn reduction_of(folder: &str) -> Option<usize> {
+    const NAMES: [&str; 5] = ["images", "image", "photos", "rgb", "input"];
+    let (name, factor) = folder.rsplit_once('_')?;
+    let is_of_photos = NAMES.iter().any(|own| own.eq_ignore_ascii_case(name));
+    factor.parse().ok().filter(|factor| is_of_photos && *factor > 1)
+}
+
+/// The innermost folder of a photo that is named after how much its photos are made smaller, and that number.
+fn reduced(photo: &Path) -> Option<(&Path, usize)> {
+    let mut folders = photo.ancestors().skip(1);
+    folders.find_map(|folder| Some((folder, reduction_of(&folder.file_name()?.to_string_lossy())?)))
+}
+
 impl PhotoIndex {
     /// Looks under folders; what lies under the first of them is preferred.
     ///
     /// # Errors
     /// A folder that cannot be read.
     pub fn of_folders(roots: &[PathBuf]) -> Result<Self> {
-        let mut index = PhotoIndex { roots: roots.to_vec(), by_name: HashMap::new(), by_stem: HashMap::new() };
-        let mut files = Vec::new();
+        let mut found = Found::default();
         for root in roots.iter().filter(|root| root.is_dir()) {
-            collect(root, 0, &mut files)?;
+            collect(root, 0, &mut found)?;
         }
-        for path in files {
-            index.by_name.entry(lower(&path)).or_default().push(path.clone());
-            index.by_stem.entry(lower_stem(&path)).or_default().push(path);
+        let (mut by_name, mut by_stem) = (HashMap::new(), HashMap::new());
+        for path in found.files {
+            by_name.entry(lower(&path)).or_insert_with(Vec::new).push(path.clone());
+            by_stem.entry(lower_stem(&path)).or_insert_with(Vec::new).push(path);
         }
-        Ok(index)
+        Ok(PhotoIndex { roots: roots.to_vec(), by_name, by_stem, not_read: found.not_read })
     }
 
     /// The photo of a listed path; `None` when none or several fit equally well.
@@ -84,11 +102,13 @@ impl PhotoIndex {
             };
             let candidates = candidates?;
             let most = candidates.iter().map(|path| agreement(path)).max()?;
-            let mut fitting = candidates.iter().filter(|path| agreement(path) == most);
-            let first = fitting.next()?;
-            // Of two that fit alike, the one under an earlier root is meant: images before images_2.
+            let fitting: Vec<&PathBuf> = candidates.iter().filter(|path| agreement(path) == most).collect();
+            // Of two that fit alike, the one under an earlier root is meant, then the larger: images, images_2, images_4.
             let root_of = |path: &Path| self.roots.iter().position(|root| path.starts_with(root));
-            fitting.all(|other| root_of(other) > root_of(first)).then(|| first.clone())
+            let rank = |path: &Path| (root_of(path), reduced(self.below_root(path)).map_or(1, |(_, factor)| factor));
+            let best = fitting.iter().map(|path| rank(path)).min()?;
+            let mut first = fitting.into_iter().filter(|path| rank(path) == best);
+            first.next().filter(|_| first.next().is_none()).cloned()
         };
         best(self.by_name.get(&lower(relative)))
             .or_else(|| best(self.by_stem.get(&lower_stem(relative))))
@@ -121,24 +141,35 @@ impl PhotoIndex {
     }
 }
 
-fn collect(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<()> {
+/// What is found under folders.
+#[derive(Default)]
+struct Found {
+    /// Photos in the order they are found in; a folder may lie under two roots.
+    files: Vec<PathBuf>,
+    seen: HashSet<PathBuf>,
+    not_read: HashMap<String, PathBuf>,
+}
+
+fn collect(folder: &Path, depth: usize, found: &mut Found) -> Result<()> {
     let entries = std::fs::read_dir(folder).map_err(|source| Error::reading(folder, source))?;
     let mut paths: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
     paths.sort();
     for path in paths {
         let name = lower(&path);
-        if name.starts_with('.') || files.len() >= MOST_FILES {
+        if name.starts_with('.') || found.files.len() >= MOST_FILES {
             continue;
         }
         if path.is_dir() {
             if depth < DEEPEST && !NOT_PHOTOS.iter().any(|start| name.starts_with(start)) {
-                collect(&path, depth + 1, files)?;
+                collect(&path, depth + 1, found)?;
             }
-        } else if path.extension().is_some_and(|extension| {
-            PHOTO_EXTENSIONS.contains(&extension.to_string_lossy().to_ascii_lowercase().as_str())
-        }) && !files.contains(&path)
-        {
-            files.push(path);
+            continue;
+        }
+        let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        if EXTENSIONS_NOT_READ.contains(&extension.as_str()) {
+            found.not_read.entry(lower_stem(&path)).or_insert(path);
+        } else if PHOTO_EXTENSIONS.contains(&extension.as_str()) && found.seen.insert(path.clone()) {
+            found.files.push(path);
         }
     }
     Ok(())
@@ -159,6 +190,11 @@ pub fn views_of(
     let listed = posed.len();
     let (mut views, mut missing) = (Vec::new(), Vec::new());
     for own in posed {
+        if !own.lens.is_finite() {
+            return Err(Error::new(ErrorKind::NonFinite, "a number of the lens is not finite")
+                .at(own.place)
+                .remedy("calibrate or export the camera again"));
+        }
         let Some(photo) = photos.find(&own.listed) else {
             missing.push(own.listed);
             continue;
@@ -181,6 +217,17 @@ pub fn views_of(
             .at(Place::File(folder))
             .remedy("align the photos in the program that made the cameras, and export them again"));
     }
+    // A photo of a kind that is not read is here all the same: its error names the kind and the way out.
+    let not_read = |listed: &String| {
+        let listed = listed.replace('\\', "/");
+        let listed = Path::new(&listed);
+        photos.not_read.get(&lower_stem(listed)).or_else(|| photos.not_read.get(&lower(listed)))
+    };
+    if views.is_empty()
+        && let Some(photo) = missing.iter().find_map(not_read)
+    {
+        file::read_header(photo)?;
+    }
     if views.is_empty() {
         let example = missing.first().map(|name| format!(", such as {name}")).unwrap_or_default();
         return Err(Error::new(
@@ -191,6 +238,11 @@ pub fn views_of(
         .remedy("copy the photos into a folder images/ of the scene"));
     }
     if !missing.is_empty() {
+        let remedy = if missing.iter().any(|listed| not_read(listed).is_some()) {
+            "raw files and HEIC are not read: convert them to TIFF, PNG or JPEG, all alike"
+        } else {
+            "copy their photos as well to use them"
+        };
         findings.push(
             Finding::new(
                 Severity::Warning,
@@ -202,9 +254,10 @@ pub fn views_of(
                 ),
             )
             .at(Place::File(folder))
-            .remedy("copy their photos as well to use them"),
+            .remedy(remedy),
         );
     }
+    findings.extend(told_of_smaller(&views, photos));
     if let Some(folder) = masks_folder {
         // Those of photos that take no part were meant for somebody too.
         photos.by_name.values().flatten().for_each(|photo| drop(masks.of_photo(photos.below_root(photo))));
@@ -212,6 +265,26 @@ pub fn views_of(
     }
     name_views(&mut views);
     Ok(views)
+}
+
+/// That photos are taken from folders of smaller ones where those in full size are not there.
+fn told_of_smaller(views: &[SourceView], photos: &PhotoIndex) -> Option<Finding> {
+    let mut folders = BTreeSet::new();
+    for view in views {
+        let below = photos.below_root(&view.photo);
+        let Some((folder, _)) = reduced(below) else { continue };
+        let name = folder.to_string_lossy().into_owned();
+        let whole = name.rsplit_once('_').map_or("", |(whole, _)| whole);
+        if !photos.roots.iter().any(|root| root.join(whole).is_dir()) {
+            folders.insert(name);
+        }
+    }
+    let folders: Vec<String> = folders.into_iter().collect();
+    let message = format!("the photos in full size are not here: those of {} are read", some_of(&folders));
+    (!folders.is_empty()).then(|| {
+        Finding::new(Severity::Note, "photos-smaller", message)
+            .remedy("copy the folder of the photos in full size beside it for finer maps")
+    })
 }
 
 /// The first names of a list, and how many more there are.
@@ -265,11 +338,49 @@ mod tests {
         let index = PhotoIndex::of_folders(&[root.join("images")]).unwrap();
         assert_eq!(index.mask_beside(&root.join("images/b.png")), Some(root.join("images/b_mask.png")));
         assert_eq!(index.mask_beside(&root.join("images/left/0001.JPG")), None);
+        for file in ["images_4/d.png", "images_2/d.png", "images_8/e.png", "part_2/f.png", "part_3/f.png"] {
+            std::fs::create_dir_all(root.join(file).parent().unwrap()).unwrap();
+            std::fs::write(root.join(file), b"").unwrap();
+        }
+        let index = PhotoIndex::of_folders(&[root.join("images"), root.to_path_buf()]).unwrap();
+        let found = |listed: &str| index.find(listed).map(|path| path.strip_prefix(root).unwrap().to_path_buf());
+        assert_eq!(found("images/d.png").unwrap(), Path::new("images_2/d.png"), "the larger one");
+        assert_eq!(found("e.png").unwrap(), Path::new("images_8/e.png"));
+        assert_eq!(found("f.png"), None, "parts are not sizes");
         std::fs::create_dir(root.join("images/left_mask")).unwrap();
         std::fs::write(root.join("images/left_mask/0001.png"), b"").unwrap();
         let index = PhotoIndex::of_folders(&[root.join("images")]).unwrap();
         let mask = index.mask_beside(&root.join("images/left/0001.JPG"));
         assert_eq!(mask, Some(root.join("images/left_mask/0001.png")));
         assert_eq!(index.mask_beside(&root.join("images/right/0001.JPG")), None);
+    }
+
+    fn posed(listed: &str) -> Posed {
+        let identity = glam::DMat3::IDENTITY;
+        let camera = SourceCamera { intrinsics: identity, rotation: identity, translation: glam::DVec3::ZERO };
+        let lens = Lens::default();
+        Posed { listed: listed.into(), camera, lens, size: None, mask: None, place: Place::Nowhere }
+    }
+
+    #[test]
+    fn photos_of_kinds_that_are_not_read_are_named_with_the_way_out() {
+        let folder = tempfile::tempdir().unwrap();
+        // A TIFF with the tag of DNG's version.
+        let raw = b"II*\0\x08\0\0\0\x01\0\x12\xc6\x01\0\x04\0\0\0\x01\x04\0\0\0\0\0\0";
+        std::fs::write(folder.path().join("a.DNG"), raw).unwrap();
+        let index = PhotoIndex::of_folders(&[folder.path().into()]).unwrap();
+        for listed in ["a", "C:\\work\\a.jpg"] {
+            let error = views_of(vec![posed(listed)], &index, &[], &mut Vec::new()).unwrap_err();
+            assert!(error.kind() == ErrorKind::Unsupported && error.remedy_text().contains("develop"), "{error}");
+        }
+        let error = views_of(vec![posed("b")], &index, &[], &mut Vec::new()).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Missing);
+        std::fs::create_dir(folder.path().join("images_2")).unwrap();
+        std::fs::write(folder.path().join("images_2/b.png"), b"").unwrap();
+        let index = PhotoIndex::of_folders(&[folder.path().into()]).unwrap();
+        let mut findings = Vec::new();
+        views_of(vec![posed("a"), posed("b")], &index, &[], &mut findings).unwrap();
+        assert!(findings[0].code == "camera-without-photo" && findings[0].message.contains("a"));
+        assert!(findings[1].code == "photos-smaller" && findings[1].message.contains("images_2"));
     }
 }
