@@ -2,8 +2,8 @@
 
 use super::source::SourceScene;
 use super::{
-    alicevision, blended_mvs, bundler, colmap, exchange, manifest, metashape, neural_scenes, objects_with_lighting,
-    openmvs, opensfm, realitycapture, realitycapture_csv, transforms,
+    alicevision, blended_mvs, bundler, colmap, exchange, manifest, metashape, metashape_project, neural_scenes,
+    objects_with_lighting, openmvs, opensfm, realitycapture, realitycapture_csv, transforms,
 };
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::scene::settings::ReadSettings;
@@ -84,7 +84,7 @@ impl Format {
             Format::RealityCapture => {
                 "an .xmp file beside each photo, or a .csv of internal and external camera parameters"
             }
-            Format::Bundler => "bundle.out and list.txt",
+            Format::Bundler => "bundle.out and list.txt, or NAME.out and NAME.list.txt",
             Format::Neus => "cameras_sphere.npz or cameras.npz",
             Format::Llff => "poses_bounds.npy",
         }
@@ -106,9 +106,22 @@ impl Format {
             Format::AliceVision => alicevision::file_of(folder),
             Format::OpenMvs => openmvs::file_of(folder),
             Format::RealityCapture => realitycapture::folder_of(folder).or_else(|| realitycapture_csv::file_of(folder)),
-            Format::Bundler => bundler::files_of(folder).map(|(bundle, _)| bundle),
+            Format::Bundler => bundler::file_of(folder),
             Format::Neus => neural_scenes::neus_file(folder),
             Format::Llff => neural_scenes::llff_file(folder),
+        }
+    }
+}
+
+impl Format {
+    /// Whether what was found can be read, as far as a look inside tells: other programs use the same names, and parts are
+    /// left behind when folders are copied.
+    fn is_whole(self, folder: &Path, evidence: &Path) -> bool {
+        match self {
+            Format::Exchange => exchange::holds_cameras(folder),
+            Format::MetashapeProject => metashape_project::has_archive(evidence),
+            Format::AliceVision => alicevision::holds_poses(evidence),
+            _ => true,
         }
     }
 }
@@ -186,7 +199,7 @@ impl Located {
             Format::OpenMvs => openmvs::read(&self.evidence),
             Format::RealityCapture if self.evidence.is_file() => realitycapture_csv::read(&self.evidence),
             Format::RealityCapture => realitycapture::read(&self.folder),
-            Format::Bundler => bundler::read(&self.folder),
+            Format::Bundler => bundler::read(&self.evidence),
             Format::Neus => neural_scenes::read_neus(&self.evidence),
             Format::Llff => neural_scenes::read_llff(&self.evidence),
         }?;
@@ -201,7 +214,8 @@ impl Located {
     }
 }
 
-/// Finds out whether a scene is at a path, and of which kind, by the names of files and the first lines of XML.
+/// Finds out whether a scene is at a path, and of which kind, by the names of files and a look into those whose names other
+/// programs use too.
 ///
 /// # Errors
 /// `Missing` or `Unsupported`, with what a scene must hold as the remedy.
@@ -217,10 +231,11 @@ pub fn locate(path: &Path) -> Result<Located> {
             "sfm" => Format::AliceVision,
             "mvs" => Format::OpenMvs,
             "csv" => Format::RealityCapture,
+            "out" => Format::Bundler,
             _ => {
                 return Err(Error::new(
                     ErrorKind::Unsupported,
-                    "a scene is a folder, or a file scene.toml, .psx, .xml, .sfm, .mvs or .csv in it",
+                    "a scene is a folder, or a file scene.toml, .psx, .xml, .sfm, .mvs, .csv or .out in it",
                 )
                 .at(Place::File(path.into()))
                 .remedy("give the folder that holds the photos and the mesh"));
@@ -236,10 +251,13 @@ pub fn locate(path: &Path) -> Result<Located> {
     // Downloads nest a project in folders of the same name: walk down while there is nothing but one folder.
     let mut folder = path.to_path_buf();
     for _ in 0..4 {
-        let mut found = Format::ALL.iter().filter_map(|format| Some((*format, format.found_in(&folder)?)));
-        if let Some((format, evidence)) = found.next() {
-            let others = found.collect();
-            return Ok(Located { format, folder, evidence, others });
+        let found = Format::ALL.iter().filter_map(|format| Some((*format, format.found_in(&folder)?)));
+        let mut found: Vec<(Format, PathBuf)> = found.collect();
+        if !found.is_empty() {
+            // What is not whole is read where there is nothing else: its error says what it lacks.
+            let whole = found.iter().position(|(format, evidence)| format.is_whole(&folder, evidence));
+            let (format, evidence) = found.remove(whole.unwrap_or(0));
+            return Ok(Located { format, folder, evidence, others: found });
         }
         match only_subfolder(&folder)? {
             Some(inner) => folder = inner,
@@ -281,10 +299,39 @@ mod tests {
         let located = locate(root).unwrap();
         assert_eq!(located.format, Format::Transforms);
         assert_eq!(located.why(), "it holds transforms.json; not read as COLMAP, though it holds sparse/0");
-        std::fs::write(root.join("p.psx"), b"").unwrap();
+        std::fs::write(root.join("p.psx"), b"<document/>").unwrap();
+        let located = locate(root).unwrap();
+        assert_eq!(located.format, Format::Transforms, "a project without its files");
+        assert!(located.why().contains("not read as Metashape project, though it holds p.psx"), "{}", located.why());
+        std::fs::create_dir(root.join("p.files")).unwrap();
+        std::fs::write(root.join("p.files/project.zip"), b"").unwrap();
         assert_eq!(locate(root).unwrap().format, Format::MetashapeProject);
         std::fs::write(root.join("scene.toml"), b"").unwrap();
         assert_eq!(locate(root).unwrap().format, Format::Manifest);
         assert_eq!(locate(&root.join("p.psx")).unwrap().format, Format::MetashapeProject);
+        std::fs::write(root.join("head.out"), b"").unwrap();
+        assert_eq!(locate(&root.join("head.out")).unwrap().format, Format::Bundler);
+    }
+
+    #[test]
+    fn files_of_other_programs_and_without_their_parts_stand_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        std::fs::write(root.join("cameras.json"), br#"[{"id": 0, "img_name": "a", "fx": 1}]"#).unwrap();
+        assert_eq!(locate(root).unwrap().format, Format::Exchange, "there is nothing else");
+        for name in ["cameras.txt", "images.txt"] {
+            std::fs::write(root.join(name), b"").unwrap();
+        }
+        let located = locate(root).unwrap();
+        assert!(located.format == Format::Colmap && located.others[0].0 == Format::Exchange, "{located:?}");
+        std::fs::write(root.join("cameras.json"), br#"{"views": []}"#).unwrap();
+        assert_eq!(locate(root).unwrap().format, Format::Exchange);
+        std::fs::remove_file(root.join("cameras.json")).unwrap();
+        std::fs::remove_file(root.join("images.txt")).unwrap();
+        std::fs::write(root.join("cameraInit.sfm"), br#"{"views": []}"#).unwrap();
+        std::fs::write(root.join("poses_bounds.npy"), b"").unwrap();
+        assert_eq!(locate(root).unwrap().format, Format::Llff);
+        std::fs::write(root.join("sfm.sfm"), br#"{"poses": [{}]}"#).unwrap();
+        assert_eq!(locate(root).unwrap().evidence, root.join("sfm.sfm"));
     }
 }

@@ -25,6 +25,13 @@ pub fn is_folder_of_this_kind(folder: &Path) -> bool {
     folder.join("cameras.json").is_file()
 }
 
+/// Whether its cameras are a list of views, as those that this program writes; others write files of the name too.
+pub fn holds_cameras(folder: &Path) -> bool {
+    let text = text::read(&folder.join("cameras.json")).ok();
+    let json = text.and_then(|text| serde_json::from_str::<serde_json::Value>(&text).ok());
+    json.is_some_and(|json| json.get("views").is_some_and(serde_json::Value::is_array))
+}
+
 #[derive(serde::Deserialize, Default)]
 struct SceneJson {
     name: Option<String>,

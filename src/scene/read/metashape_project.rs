@@ -54,15 +54,25 @@ fn inside(base: &Path, written: &str, file: &Path) -> Result<PathBuf> {
     Ok(base.join(relative))
 }
 
-/// The chunks of a project, those whose archive is there.
-pub fn chunks(project: &Path) -> Result<Vec<Chunk>> {
+/// The archive of a project, whether it is there or not.
+fn archive_of(project: &Path) -> Result<PathBuf> {
     let text = read_text(project)?;
     let root = parse(&text, project)?;
     let stem = project.file_stem().unwrap_or_default().to_string_lossy();
-    let folder = project.parent().unwrap_or(Path::new(""));
     let path = root.root_element().attribute("path").unwrap_or("{projectname}.files/project.zip");
-    let archive = inside(folder, &path.replace("{projectname}", &stem), project)?;
+    inside(project.parent().unwrap_or(Path::new("")), &path.replace("{projectname}", &stem), project)
+}
+
+/// Whether the archive of a project is there.
+pub fn has_archive(project: &Path) -> bool {
+    archive_of(project).is_ok_and(|archive| archive.is_file())
+}
+
+/// The chunks of a project, those whose archive is there.
+pub fn chunks(project: &Path) -> Result<Vec<Chunk>> {
+    let archive = archive_of(project)?;
     if !archive.is_file() {
+        let stem = project.file_stem().unwrap_or_default().to_string_lossy();
         return Err(Error::new(
             ErrorKind::Missing,
             format!("the project's archive {} is not there", archive.display()),
@@ -70,7 +80,7 @@ pub fn chunks(project: &Path) -> Result<Vec<Chunk>> {
         .at(Place::File(project.into()))
         .remedy(format!("copy the folder {stem}.files along with the project")));
     }
-    let base = archive.parent().unwrap_or(folder);
+    let base = archive.parent().unwrap_or(Path::new(""));
     let text = document(&archive)?;
     let listing = parse(&text, &archive)?;
     let mut found = Vec::new();
