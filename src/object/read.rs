@@ -57,7 +57,9 @@ pub fn read_views(files: &ObjectFiles) -> Result<(Vec<ObjectView>, Vec<Finding>)
         let (mut photo, mut noticed) = ObjectPhoto::read(path)?;
         findings.append(&mut noticed);
         if let Some(mask) = files.masks.get(index) {
-            photo.apply_mask(&file::read_grey(mask)?, Place::File(mask.clone()))?;
+            let (values, told) = file::read_mask(mask)?;
+            findings.extend(told.map(|told| told.at(Place::File(mask.clone()))));
+            photo.apply_mask(&values, Place::File(mask.clone()))?;
         }
         photos.push(photo);
     }

@@ -48,6 +48,13 @@ impl Primaries {
         blue: DVec2::new(0.150, 0.060),
         white: D65,
     };
+    /// Adobe RGB (1998).
+    pub const ADOBE_RGB: Primaries = Primaries {
+        red: DVec2::new(0.64, 0.33),
+        green: DVec2::new(0.21, 0.71),
+        blue: DVec2::new(0.15, 0.06),
+        white: D65,
+    };
 
     /// XYZ of linear RGB, with the white at Y = 1 (SMPTE RP 177); `None` where the primaries span no space.
     fn xyz_from_rgb(&self) -> Option<DMat3> {
@@ -163,6 +170,13 @@ impl ColourSpace {
     /// One curve for all channels, and colours of Rec. 709.
     pub fn of_curve(curve: Curve) -> Self {
         ColourSpace { curves: [curve.clone(), curve.clone(), curve], rec709_from_rgb: None }
+    }
+
+    /// Adobe RGB (1998), whose power is 563/256.
+    pub fn adobe_rgb() -> Self {
+        let space = ColourSpace::of_curve(Curve::Gamma(563.0 / 256.0));
+        // Its primaries span a space: the fallback is never taken.
+        space.with_matrix(Primaries::ADOBE_RGB.rec709_from_rgb().unwrap_or(DMat3::IDENTITY))
     }
 
     /// Whether its bytes mean what they mean in sRGB.

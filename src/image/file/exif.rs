@@ -15,6 +15,9 @@ pub struct Exif {
     pub f_number: Option<f64>,
     /// Sensitivity.
     pub iso: Option<f64>,
+    /// Whether colours are those of Adobe RGB: not sRGB, and by the rule R03 (DCF 2.0, 4.4), or by the number some cameras
+    /// write for it.
+    pub is_adobe_rgb: bool,
 }
 
 impl Exif {
@@ -34,6 +37,12 @@ const EXIF_DIRECTORY: u16 = 0x8769;
 const EXPOSURE_TIME: u16 = 33_434;
 const F_NUMBER: u16 = 33_437;
 const SENSITIVITY: u16 = 34_855;
+const COLOUR_SPACE: u16 = 0xa001;
+const INTEROPERABILITY_DIRECTORY: u16 = 0xa005;
+const INTEROPERABILITY_INDEX: u16 = 1;
+/// Values of the tag of the colour space.
+const SRGB: f64 = 1.0;
+const ADOBE_RGB: f64 = 2.0;
 const DNG_VERSION: u16 = 50_706;
 const SUBFILE_TYPE: u16 = 254;
 const PHOTOMETRIC: u16 = 262;
@@ -57,6 +66,11 @@ pub fn read(bytes: &[u8]) -> Exif {
         exif.exposure_seconds = number(EXPOSURE_TIME);
         exif.f_number = number(F_NUMBER);
         exif.iso = number(SENSITIVITY);
+        let space = tiff.number(directory, COLOUR_SPACE, 0);
+        let rules = tiff.number(directory, INTEROPERABILITY_DIRECTORY, 0).map(|rules| rules as usize);
+        let letter = |index| tiff.number(rules?, INTEROPERABILITY_INDEX, index).map(|letter| letter as u8);
+        let is_third = [Some(b'R'), Some(b'0'), Some(b'3')] == [0, 1, 2].map(letter);
+        exif.is_adobe_rgb = space == Some(ADOBE_RGB) || (is_third && space != Some(SRGB));
     }
     exif
 }
@@ -121,7 +135,7 @@ impl<'a> Tiff<'a> {
         let entry = self.entries(directory).find(|&entry| self.u16(entry) == Some(tag))?;
         let kind = self.u16(entry + 2)?;
         let size = match kind {
-            1 | 7 => 1,
+            1 | 2 | 7 => 1,
             3 => 2,
             4 | 13 => 4,
             5 | 10 => 8,
@@ -135,7 +149,7 @@ impl<'a> Tiff<'a> {
         let place = if inside { entry + 8 } else { self.u32(entry + 8)? as usize };
         let place = place.checked_add(index.checked_mul(size)?)?;
         match kind {
-            1 | 7 => self.bytes.get(place).map(|&byte| f64::from(byte)),
+            1 | 2 | 7 => self.bytes.get(place).map(|&byte| f64::from(byte)),
             3 => self.u16(place).map(f64::from),
             4 | 13 => self.u32(place).map(f64::from),
             5 => Some(f64::from(self.u32(place)?) / f64::from(self.u32(place.checked_add(4)?)?)),
@@ -190,6 +204,32 @@ mod tests {
             assert!(!is_raw(&bytes));
         }
         assert_eq!(Exif::default().exposure_stops(), None);
+    }
+
+    /// An EXIF block whose colours are of a space by number and of a rule.
+    pub fn block_of_colours(space: u16, rule: &[u8; 4]) -> Vec<u8> {
+        let entry = |tag: u16, kind: u16, count: u32, value: [u8; 4]| {
+            [&tag.to_le_bytes()[..], &kind.to_le_bytes(), &count.to_le_bytes(), &value].concat()
+        };
+        let directory =
+            |entries: &[Vec<u8>]| [&(entries.len() as u16).to_le_bytes()[..], &entries.concat(), &[0; 4]].concat();
+        let space = [space.to_le_bytes(), [0, 0]].concat().try_into().unwrap();
+        let first = directory(&[entry(EXIF_DIRECTORY, 4, 1, 26u32.to_le_bytes())]);
+        let second = directory(&[
+            entry(COLOUR_SPACE, 3, 1, space),
+            entry(INTEROPERABILITY_DIRECTORY, 4, 1, 56u32.to_le_bytes()),
+        ]);
+        let third = directory(&[entry(INTEROPERABILITY_INDEX, 2, 4, *rule)]);
+        [b"II*\0\x08\0\0\0".to_vec(), first, second, third].concat()
+    }
+
+    #[test]
+    fn adobe_rgb_is_told_by_the_rule_or_by_its_number() {
+        for (space, rule, is_adobe) in
+            [(65_535, b"R03\0", true), (65_535, b"R98\0", false), (1, b"R98\0", false), (2, b"R98\0", true)]
+        {
+            assert_eq!(read(&block_of_colours(space, rule)).is_adobe_rgb, is_adobe, "{space}");
+        }
     }
 
     #[test]

@@ -6,7 +6,7 @@
 //! through [`crate::files`].
 //!
 //! [`read_photo`] is the whole of it: pixels, opacity, orientation, exposure, and what was done to them as findings.
-//! [`read_rgb`] and [`read_grey`] are for maps, masks and lights.
+//! [`read_rgb`] and [`read_grey`] are for maps and lights, [`read_mask`] for masks.
 //!
 //! What is not done here: turning pictures by their EXIF orientation (the camera decides: `scene::read`), and any
 //! judgement of values: a NaN in a file is a NaN in the image, and its reader decides. Raw files of cameras are refused.
@@ -18,6 +18,7 @@ mod format;
 mod guard;
 mod hdr;
 mod jpeg;
+mod mask;
 mod openexr;
 mod pfm;
 mod photo;
@@ -31,6 +32,7 @@ mod tiff;
 pub use format::Format;
 pub(crate) use guard::guarded;
 pub use guard::keep_decoders_quiet;
+pub use mask::{read_mask, read_mask_from};
 pub use photo::{Encoding, PhotoFile, PhotoOptions, PhotoPixels, swaps_sides, turned};
 pub use source::read_header;
 
@@ -74,7 +76,10 @@ fn photo_of(source: &Source, options: &PhotoOptions) -> Result<PhotoFile> {
             let (stored, exif) = raster::read(source)?;
             with_exif(stored.into_photo(source, options.encoding)?, exif)
         }
-        Format::Tiff => with_exif(tiff::read(source)?.into_photo(source, options.encoding)?, exif::read(&source.bytes)),
+        Format::Tiff => {
+            let exif = exif::read(&source.bytes);
+            with_exif(tiff::read(source)?.with_exif(&exif).into_photo(source, options.encoding)?, exif)
+        }
         Format::Exr => {
             let photo = openexr::read_photo(source, options.layer)?;
             if options.encoding != Encoding::Srgb {
@@ -102,11 +107,6 @@ pub fn read_rgb(path: &Path) -> Result<RgbImage> {
 /// its largest value, in [0, 1], without decoding from sRGB. Colour gives its luminance. Errors as [`read_rgb`].
 pub fn read_grey(path: &Path) -> Result<GreyImage> {
     grey_of(&Source::open(path)?)
-}
-
-/// One value a pixel of bytes that are at hand; `path` is what errors name. As [`read_grey`].
-pub fn read_grey_from(path: &Path, bytes: Vec<u8>) -> Result<GreyImage> {
-    grey_of(&Source::of_bytes(path, bytes)?)
 }
 
 fn grey_of(source: &Source) -> Result<GreyImage> {

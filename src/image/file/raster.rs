@@ -3,7 +3,7 @@
 use super::format::{Format, Source, malformed, too_large};
 use super::guard::guarded;
 use super::jpeg;
-use super::stored::{Samples, Stored, refused};
+use super::stored::{Declared, Samples, Stored, refused};
 use super::{exif, png};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use ::image::codecs::{jpeg::JpegDecoder, png::PngDecoder};
@@ -30,7 +30,7 @@ pub fn read(source: &Source) -> Result<(Stored, exif::Exif)> {
         findings = check_jpeg(source)?;
     }
     let decoded = decode(source, &source.bytes)?;
-    let declared = if is_jpeg { None } else { png::declared(&source.bytes) };
+    let declared = if is_jpeg { Declared::Nothing } else { png::declared(&source.bytes) };
     let Decoded { image, icc, exif } = decoded;
     let (width, height) = (image.width() as usize, image.height() as usize);
     let channels = usize::from(image.color().channel_count());
@@ -48,7 +48,10 @@ pub fn read(source: &Source) -> Result<(Stored, exif::Exif)> {
     };
     let stored =
         Stored { width, height, channels, samples, has_alpha, is_premultiplied: false, icc, declared, findings };
-    Ok((stored.checked(source)?, exif.map(|bytes| exif::read(&bytes)).unwrap_or_default()))
+    let exif = exif.map(|bytes| exif::read(&bytes)).unwrap_or_default();
+    // A PNG says by its own chunks what its colours are.
+    let stored = if is_jpeg { stored.with_exif(&exif) } else { stored };
+    Ok((stored.checked(source)?, exif))
 }
 
 /// What a decoder gives.

@@ -1,6 +1,7 @@
 //! Pixels as PNG, JPEG and TIFF hold them, before curves and matrices; and the way from there to linear Rec. 709.
 
 use super::colour::{ColourSpace, Curve};
+use super::exif::Exif;
 use super::format::{Format, Source};
 use super::photo::{Encoding, PhotoFile, PhotoPixels};
 use super::profile::{self, Profile};
@@ -41,6 +42,18 @@ impl Samples {
     }
 }
 
+/// What a file declares of its colours beside a profile.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Declared {
+    /// Nothing, or that they are sRGB.
+    #[default]
+    Nothing,
+    /// A colour space, and what names it, in words after "by".
+    Space(ColourSpace, &'static str),
+    /// What is not read, by its name.
+    NotRead(String),
+}
+
 /// What a decoder hands over.
 pub struct Stored {
     /// Width in pixels.
@@ -58,7 +71,7 @@ pub struct Stored {
     /// The embedded profile.
     pub icc: Option<Vec<u8>>,
     /// What the file declares without a profile.
-    pub declared: Option<ColourSpace>,
+    pub declared: Declared,
     /// What was noticed.
     pub findings: Vec<Finding>,
 }
@@ -77,6 +90,14 @@ impl Stored {
             ));
         }
         Ok(self)
+    }
+
+    /// With what EXIF says of the colours of integers, where the file itself says nothing.
+    pub fn with_exif(mut self, exif: &Exif) -> Self {
+        if exif.is_adobe_rgb && self.declared == Declared::Nothing && !matches!(self.samples, Samples::Floats(_)) {
+            self.declared = Declared::Space(ColourSpace::adobe_rgb(), "EXIF, which names Adobe RGB,");
+        }
+        self
     }
 
     fn pixel_count(&self) -> usize {
@@ -110,7 +131,7 @@ impl Stored {
     }
 
     /// Opacity, where there is any.
-    fn alpha(&self) -> Option<GreyImage> {
+    pub fn alpha(&self) -> Option<GreyImage> {
         let places = (self.has_alpha && matches!(self.channels, 2 | 4)).then(|| 0..self.pixel_count())?;
         let last = self.channels - 1;
         let values = places.map(|pixel| self.samples.share(pixel * self.channels + last)).collect();
@@ -246,6 +267,11 @@ fn interpretation(
         },
         None => space,
     };
+    if let (Declared::NotRead(what), None) = (&stored.declared, &curve) {
+        return Err(Error::new(ErrorKind::Unsupported, format!("the photo is encoded as {what}, which is not read"))
+            .at(Place::File(source.path.clone()))
+            .remedy("export it as sRGB, or linear with 16 bits or as OpenEXR; --encoding says what it is by hand"));
+    }
     let note = |code, message: String| Finding::new(Severity::Note, code, message);
     let found = stored.icc.as_deref().map(|bytes| {
         let read = super::guard::guarded(&source.path, || Ok(profile::read(bytes)));
@@ -295,15 +321,12 @@ fn interpretation(
             ColourSpace::of_curve(if is_float { Curve::Linear } else { Curve::Srgb })
         }
         None => match &stored.declared {
-            Some(space) => {
-                findings.push(note(
-                    "colour-converted",
-                    "colours are converted from the gamma and primaries of the file to linear Rec. 709".into(),
-                ));
+            Declared::Space(space, by) => {
+                findings.push(note("colour-converted", format!("colours are converted by {by} to linear Rec. 709")));
                 space.clone()
             }
-            None if is_float => ColourSpace::of_curve(Curve::Linear),
-            None => {
+            _ if is_float => ColourSpace::of_curve(Curve::Linear),
+            _ => {
                 // A PNG without a profile is one of sRGB by its standard; others may have lost theirs on the way.
                 if curve.is_none() && source.header.format != Format::Png {
                     findings.push(note("profile-missing", "no colour profile is embedded: taken for sRGB".into()));

@@ -4,7 +4,7 @@
 
 use super::format::{Source, implausible, malformed, too_large};
 use super::guard::guarded;
-use super::stored::{Samples, Stored, refused};
+use super::stored::{Declared, Samples, Stored, refused};
 use super::{exif, format};
 use crate::error::{Error, ErrorKind, Place, Result};
 use std::io::{BufRead, Cursor, Read, Seek};
@@ -129,7 +129,7 @@ fn decode(bytes: &[u8]) -> std::result::Result<(DecodingResult, Stored), TiffErr
         has_alpha: matches!(extra.first(), Some(1 | 2)),
         is_premultiplied: extra.first() == Some(&1),
         icc,
-        declared: None,
+        declared: Declared::Nothing,
         findings: Vec::new(),
     };
     Ok((samples, stored))

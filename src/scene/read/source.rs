@@ -25,7 +25,7 @@ pub struct SourceView {
     pub name: String,
     /// The photo's file.
     pub photo: PathBuf,
-    /// The mask's file: 255 (or 1) is object.
+    /// The mask's file: full scale is object, or 1 of 0 and 1, or what is opaque ([`file::read_mask`](crate::image::file::read_mask)).
     pub mask: Option<PathBuf>,
     /// The camera.
     pub camera: SourceCamera,
