@@ -161,6 +161,9 @@ impl<'a> Tiff<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::image::Image;
+    use crate::image::file::{self, PhotoOptions};
+    use std::path::Path;
 
     /// An EXIF block with an orientation and an exposure, in either byte order.
     fn block(little_endian: bool) -> Vec<u8> {
@@ -230,6 +233,22 @@ mod tests {
         {
             assert_eq!(read(&block_of_colours(space, rule)).is_adobe_rgb, is_adobe, "{space}");
         }
+    }
+
+    #[test]
+    fn a_jpeg_of_adobe_rgb_is_converted() {
+        let plain = file::encode_jpeg(&Image::filled(16, 16, [40, 200, 60]), 95).unwrap();
+        let linear = |rule: &[u8; 4]| {
+            let block = [b"Exif\0\0".to_vec(), block_of_colours(65_535, rule)].concat();
+            let length = (block.len() as u16 + 2).to_be_bytes();
+            let bytes = [&plain[..2], &[0xff, 0xe1], &length, &block, &plain[2..]].concat();
+            let photo = file::read_photo_from(Path::new("a.jpg"), bytes, &PhotoOptions::default()).unwrap();
+            (photo.findings.iter().any(|own| own.code == "colour-converted"), photo.into_linear()[(8, 8)])
+        };
+        let ((is_converted, adobe), (is_other_converted, srgb)) = (linear(b"R03\0"), linear(b"R98\0"));
+        assert!(is_converted && !is_other_converted);
+        // The green of Adobe RGB is purer than that of Rec. 709: its red lies below.
+        assert!(adobe.x < srgb.x - 0.01, "{adobe} {srgb}");
     }
 
     #[test]

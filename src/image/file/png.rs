@@ -105,7 +105,11 @@ fn numbers<const COUNT: usize>(bytes: &[u8]) -> Option<[f64; COUNT]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::ErrorKind;
+    use crate::image::Image;
+    use crate::image::file::{self, Encoding, PhotoOptions};
     use glam::Vec3;
+    use std::path::Path;
 
     fn with_chunk(name: &[u8], body: &[u8]) -> Vec<u8> {
         let mut bytes = b"\x89PNG\r\n\x1a\n".to_vec();
@@ -135,6 +139,29 @@ mod tests {
         let wide = space(b"cHRM", &wide);
         assert!(((wide.rec709_from_rgb.unwrap() * Vec3::X).x - 1.6605).abs() < 1e-3);
         assert_eq!(declared(b"\x89PNG\r\n\x1a\n\xff\xff\xff\xffgAMA"), Declared::Nothing);
+    }
+
+    /// The check sum of a chunk (PNG specification, annex D), bit by bit.
+    fn check_sum(bytes: &[u8]) -> u32 {
+        !bytes.iter().fold(!0u32, |sum, byte| {
+            (0..8).fold(sum ^ u32::from(*byte), |sum, _| if sum & 1 == 1 { 0xedb8_8320 ^ (sum >> 1) } else { sum >> 1 })
+        })
+    }
+
+    #[test]
+    fn a_photo_of_pq_is_refused_with_a_way_out_unless_its_curve_is_given() {
+        let plain = file::encode_png_srgb8(&Image::filled(4, 3, [90, 100, 110])).unwrap();
+        let body = [&b"cICP"[..], &[9, 16, 0, 1]].concat();
+        // Behind the header, which is the first chunk.
+        let bytes = [&plain[..33], &4u32.to_be_bytes(), &body, &check_sum(&body).to_be_bytes(), &plain[33..]].concat();
+        let read = |encoding| {
+            let options = PhotoOptions { encoding, ..Default::default() };
+            file::read_photo_from(Path::new("a.png"), bytes.clone(), &options)
+        };
+        let error = read(Encoding::Auto).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Unsupported);
+        assert!(error.to_string().contains("PQ") && error.remedy_text().contains("sRGB"), "{error}");
+        assert!(read(Encoding::Srgb).is_ok());
     }
 
     #[test]

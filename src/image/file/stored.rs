@@ -270,7 +270,7 @@ fn interpretation(
     if let (Declared::NotRead(what), None) = (&stored.declared, &curve) {
         return Err(Error::new(ErrorKind::Unsupported, format!("the photo is encoded as {what}, which is not read"))
             .at(Place::File(source.path.clone()))
-            .remedy("export it as sRGB, or linear with 16 bits or as OpenEXR; --encoding says what it is by hand"));
+            .remedy("export it as sRGB, or linear with 16 bits or as OpenEXR"));
     }
     let note = |code, message: String| Finding::new(Severity::Note, code, message);
     let found = stored.icc.as_deref().map(|bytes| {
