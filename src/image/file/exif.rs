@@ -18,6 +18,8 @@ pub struct Exif {
     /// Whether colours are those of Adobe RGB: not sRGB, and by the rule R03 (DCF 2.0, 4.4), or by the number some cameras
     /// write for it.
     pub is_adobe_rgb: bool,
+    /// Whether colours are said not to be sRGB, but not what they are.
+    pub is_uncalibrated: bool,
 }
 
 impl Exif {
@@ -43,6 +45,7 @@ const INTEROPERABILITY_INDEX: u16 = 1;
 /// Values of the tag of the colour space.
 const SRGB: f64 = 1.0;
 const ADOBE_RGB: f64 = 2.0;
+const UNCALIBRATED: f64 = 65_535.0;
 const DNG_VERSION: u16 = 50_706;
 const SUBFILE_TYPE: u16 = 254;
 const PHOTOMETRIC: u16 = 262;
@@ -71,6 +74,7 @@ pub fn read(bytes: &[u8]) -> Exif {
         let letter = |index| tiff.number(rules?, INTEROPERABILITY_INDEX, index).map(|letter| letter as u8);
         let is_third = [Some(b'R'), Some(b'0'), Some(b'3')] == [0, 1, 2].map(letter);
         exif.is_adobe_rgb = space == Some(ADOBE_RGB) || (is_third && space != Some(SRGB));
+        exif.is_uncalibrated = space == Some(UNCALIBRATED) && !exif.is_adobe_rgb;
     }
     exif
 }
@@ -243,10 +247,10 @@ mod tests {
             let length = (block.len() as u16 + 2).to_be_bytes();
             let bytes = [&plain[..2], &[0xff, 0xe1], &length, &block, &plain[2..]].concat();
             let photo = file::read_photo_from(Path::new("a.jpg"), bytes, &PhotoOptions::default()).unwrap();
-            (photo.findings.iter().any(|own| own.code == "colour-converted"), photo.into_linear()[(8, 8)])
+            (photo.findings[0].code, photo.into_linear()[(8, 8)])
         };
-        let ((is_converted, adobe), (is_other_converted, srgb)) = (linear(b"R03\0"), linear(b"R98\0"));
-        assert!(is_converted && !is_other_converted);
+        let ((told, adobe), (told_of_other, srgb)) = (linear(b"R03\0"), linear(b"R98\0"));
+        assert_eq!((told, told_of_other), ("colour-converted", "colour-uncalibrated"));
         // The green of Adobe RGB is purer than that of Rec. 709: its red lies below.
         assert!(adobe.x < srgb.x - 0.01, "{adobe} {srgb}");
     }

@@ -52,6 +52,8 @@ pub enum Declared {
     Space(ColourSpace, &'static str),
     /// What is not read, by its name.
     NotRead(String),
+    /// That they are not sRGB, but not what they are.
+    Uncalibrated,
 }
 
 /// What a decoder hands over.
@@ -94,8 +96,11 @@ impl Stored {
 
     /// With what EXIF says of the colours of integers, where the file itself says nothing.
     pub fn with_exif(mut self, exif: &Exif) -> Self {
-        if exif.is_adobe_rgb && self.declared == Declared::Nothing && !matches!(self.samples, Samples::Floats(_)) {
+        let may_say = self.declared == Declared::Nothing && !matches!(self.samples, Samples::Floats(_));
+        if exif.is_adobe_rgb && may_say {
             self.declared = Declared::Space(ColourSpace::adobe_rgb(), "EXIF, which names Adobe RGB,");
+        } else if exif.is_uncalibrated && may_say {
+            self.declared = Declared::Uncalibrated;
         }
         self
     }
@@ -326,6 +331,12 @@ fn interpretation(
                 space.clone()
             }
             _ if is_float => ColourSpace::of_curve(Curve::Linear),
+            Declared::Uncalibrated => {
+                let message = "EXIF says that colours are not sRGB, and no profile says what they are: taken for sRGB";
+                let remedy = "export the photos with their colour profile; cameras write so for Adobe RGB";
+                findings.push(Finding::new(Severity::Warning, "colour-uncalibrated", message).remedy(remedy));
+                ColourSpace::of_curve(Curve::Srgb)
+            }
             _ => {
                 // A PNG without a profile is one of sRGB by its standard; others may have lost theirs on the way.
                 if curve.is_none() && source.header.format != Format::Png {

@@ -226,7 +226,14 @@ pub fn views_of(
     if views.is_empty()
         && let Some(photo) = missing.iter().find_map(not_read)
     {
-        file::read_header(photo)?;
+        return Err(match file::read_header(photo) {
+            Err(error) if error.kind() == ErrorKind::Unsupported => error,
+            _ => Error::new(ErrorKind::Unsupported, "photos of this kind are not read")
+                .at(Place::File(photo.clone()))
+                .remedy(
+                    "develop raw files to linear 16-bit TIFF, convert others to TIFF, PNG or JPEG: all photos alike",
+                ),
+        });
     }
     if views.is_empty() {
         let example = missing.first().map(|name| format!(", such as {name}")).unwrap_or_default();

@@ -57,6 +57,10 @@ fn photos_of_kinds_that_are_not_read_are_named_with_the_way_out() {
         let error = views_of(vec![posed(listed)], &index, &[], &mut Vec::new()).unwrap_err();
         assert!(error.kind() == ErrorKind::Unsupported && error.remedy_text().contains("develop"), "{error}");
     }
+    std::fs::write(folder.path().join("c.nef"), b"II*\0").unwrap();
+    let index = PhotoIndex::of_folders(&[folder.path().into()]).unwrap();
+    let error = views_of(vec![posed("c")], &index, &[], &mut Vec::new()).unwrap_err();
+    assert!(error.kind() == ErrorKind::Unsupported && error.remedy_text().contains("develop"), "{error}");
     let error = views_of(vec![posed("b")], &index, &[], &mut Vec::new()).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Missing);
     std::fs::create_dir(folder.path().join("images_2")).unwrap();
