@@ -21,6 +21,8 @@ const POINTS_PER_VIEW: usize = 600;
 const NEIGHBOURS: usize = 6;
 /// A pair needs this many shared points.
 const FEWEST_SHARED: usize = 40;
+/// Of fewer views nothing is said.
+const FEWEST_VIEWS: usize = 3;
 /// Below this radiance a pixel is dark: its logarithm is noise.
 const DARK: f32 = 2e-3;
 /// Another order of the photos is believed when the correlation rises by so much, and by this share of what it lacks.
@@ -134,6 +136,16 @@ fn correlation(values: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
     (xx > least(mean_x) && yy > least(mean_y)).then(|| xy / (xx * yy).sqrt())
 }
 
+/// How the photos of a scene agree, the median over the views, in [-1, 1]; `None` where they share too little.
+pub(crate) fn measure(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>]) -> Option<f64> {
+    let pairs = neighbours::over_views(scene, |view| pairs_of(scene, bvh, probes, view));
+    let pictures = Pictures { views: &scene.views };
+    let trial = Trial { pictures: &pictures, pairs: &pairs, count: scene.views.len() };
+    let own: Vec<usize> = (0..scene.views.len()).collect();
+    let known: Vec<f64> = trial.of_views(&own).into_iter().flatten().collect();
+    (known.len() >= FEWEST_VIEWS).then(|| quantile(&known, 0.5))
+}
+
 /// Measures how the photos agree, and names those that do not belong to their cameras.
 pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Report) {
     let pairs = neighbours::over_views(scene, |view| pairs_of(scene, bvh, probes, view));
@@ -148,7 +160,7 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
         line.agreement = *agreement;
     }
     let known: Vec<f64> = agreement.iter().copied().flatten().collect();
-    if known.len() < 3 {
+    if known.len() < FEWEST_VIEWS {
         return;
     }
     let middle = quantile(&known, 0.5);

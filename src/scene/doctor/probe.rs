@@ -22,8 +22,13 @@ pub struct Probe {
 
 /// Probes of a view on every `step`-th row and column.
 pub fn probe_view(view: &View, bvh: &Bvh) -> Vec<Probe> {
+    probe_about(view, bvh, PROBES_PER_VIEW)
+}
+
+/// The same with about `wanted` probes.
+pub fn probe_about(view: &View, bvh: &Bvh, wanted: usize) -> Vec<Probe> {
     let (width, height) = (view.camera.width, view.camera.height);
-    let step = step_for(width * height);
+    let step = step_for(width * height, wanted);
     let mut probes = Vec::with_capacity((width / step + 1) * (height / step + 1));
     for row in (step / 2..height).step_by(step) {
         for column in (step / 2..width).step_by(step) {
@@ -33,8 +38,8 @@ pub fn probe_view(view: &View, bvh: &Bvh) -> Vec<Probe> {
     probes
 }
 
-fn step_for(pixels: usize) -> usize {
-    ((pixels as f64 / PROBES_PER_VIEW as f64).sqrt().floor() as usize).max(1)
+fn step_for(pixels: usize, wanted: usize) -> usize {
+    ((pixels as f64 / wanted as f64).sqrt().floor() as usize).max(1)
 }
 
 /// Centre of a pixel in the program's convention.

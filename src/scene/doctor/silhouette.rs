@@ -4,12 +4,26 @@ use super::probe::Probe;
 use super::{Report, names_of};
 use crate::error::{Finding, Severity};
 use crate::math::statistics::quantile;
-use crate::scene::{PixelState, Scene};
+use crate::scene::{PixelState, Scene, View};
 
 /// Below this overlap a mask is suspicious.
 const LOW_OVERLAP: f64 = 0.9;
 /// Below this median overlap the cameras are not those of the mesh.
 const FATAL_OVERLAP: f64 = 0.2;
+
+/// Intersection over union of a view's mask and the mesh's silhouette, on the probed pixels that say something.
+pub(crate) fn overlap(view: &View, probes: &[Probe]) -> f64 {
+    let (mut both, mut either) = (0usize, 0usize);
+    for probe in probes {
+        let state = view.states[(probe.row, probe.column)];
+        if state == PixelState::Ignored {
+            continue;
+        }
+        both += usize::from(state.is_surface() && probe.hit.is_some());
+        either += usize::from(state.is_surface() || probe.hit.is_some());
+    }
+    both as f64 / either.max(1) as f64
+}
 
 /// Intersection over union of mask and silhouette in each masked view, on the probed pixels.
 pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
@@ -19,16 +33,7 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
         if !view.has_mask() || probes.is_empty() {
             continue;
         }
-        let (mut both, mut either) = (0usize, 0usize);
-        for probe in probes {
-            let state = view.states[(probe.row, probe.column)];
-            if state == PixelState::Ignored {
-                continue;
-            }
-            both += usize::from(state.is_surface() && probe.hit.is_some());
-            either += usize::from(state.is_surface() || probe.hit.is_some());
-        }
-        let overlap = both as f64 / either.max(1) as f64;
+        let overlap = overlap(view, probes);
         line.mask_overlap = Some(overlap);
         overlaps.push(overlap);
         if overlap < LOW_OVERLAP {

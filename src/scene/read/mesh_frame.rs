@@ -1,128 +1,155 @@
-//! A mesh that stands in another frame than the cameras: noticed by what the cameras see of it, and put right by a transform
-//! that is known from the tools.
+//! A mesh that stands in another frame than the cameras: noticed by what photos and masks say of it, and put right by a
+//! transform that is known from the tools.
 
-use super::source::{MeshFrame, SourceView};
+use super::mesh_frame_rating::{InPixels, Rater, Rating, known};
+use super::source::{MeshFrame, SourceCamera};
 use super::source_mesh::SourceMesh;
 use crate::error::{Finding, Severity};
-use glam::{DMat3, DMat4, DVec3};
+use crate::scene::View;
+use glam::{DMat3, DMat4};
 
-/// Points of the mesh that are looked at.
-const POINTS: usize = 400;
 /// A frame in which this share of the views looks at the mesh fits, one in which less than the other does fails.
 const FITTING_SHARE: f64 = 0.8;
 const FAILING_SHARE: f64 = 0.5;
+/// Photos that agree by this and masks that overlap by this leave no doubt.
+const SOUND_AGREEMENT: f64 = 0.7;
+const SOUND_OVERLAP: f64 = 0.8;
+/// A frame in which photos agree by less than this is not taken for their agreement.
+const LEAST_AGREEMENT: f64 = 0.5;
+/// A frame is clearly better than another when agreement or overlap rises by so much, and the agreement by this share of what
+/// it lacks.
+const LEAST_GAIN: f64 = 0.15;
+const LEAST_GAIN_SHARE: f64 = 0.4;
+/// What one measure may lose where the other gains.
+const MOST_LOSS: f64 = 0.1;
 
-/// How the cameras see the mesh in a frame.
-#[derive(Clone, Copy, PartialEq)]
-struct Seen {
-    /// Share of the views that have some of it in their picture.
-    views: f64,
-    /// Share of its points that some view has in its picture.
-    points: f64,
+/// Whether nothing that was measured speaks against the frame, and something for it.
+fn is_sound(rating: &Rating) -> bool {
+    rating.views >= FAILING_SHARE
+        && (rating.agreement.is_some() || rating.overlap.is_some())
+        && rating.agreement.is_none_or(|agreement| agreement >= SOUND_AGREEMENT)
+        && rating.overlap.is_none_or(|overlap| overlap >= SOUND_OVERLAP)
 }
 
-fn seen(points: &[DVec3], views: &[SourceView], frame: &DMat4) -> Seen {
-    let mut is_seen = vec![false; points.len()];
-    let mut looking = 0usize;
-    for view in views {
-        let intrinsics = &view.camera.intrinsics;
-        let middle = (2.0 * intrinsics.z_axis.x, 2.0 * intrinsics.z_axis.y);
-        let (width, height) = view.size.map_or(middle, |(width, height)| (width as f64, height as f64));
-        let mut any = false;
-        for (point, is_seen) in points.iter().zip(&mut is_seen) {
-            let point = view.camera.rotation * frame.transform_point3(*point) + view.camera.translation;
-            let place = *intrinsics * (point / point.z);
-            if point.z > 0.0 && place.x >= 0.0 && place.y >= 0.0 && place.x < width && place.y < height {
-                *is_seen = true;
-                any = true;
-            }
-        }
-        looking += usize::from(any);
-    }
-    let count = is_seen.iter().filter(|seen| **seen).count();
-    Seen { views: looking as f64 / views.len().max(1) as f64, points: count as f64 / points.len().max(1) as f64 }
-}
-
-/// Transforms that tools leave between a mesh and its cameras.
-fn known() -> Vec<MeshFrame> {
-    let of = |name, x: DVec3, y: DVec3, z: DVec3| MeshFrame {
-        name,
-        source_from_mesh: DMat4::from_mat3(DMat3::from_cols(x, y, z)),
+/// Whether photos or masks say that one frame is clearly better than what there is.
+fn is_clearly_better(other: &Rating, own: &Rating) -> bool {
+    let loses = |other: Option<f64>, own: Option<f64>| other.zip(own).is_some_and(|(new, old)| new < old - MOST_LOSS);
+    let gains = |other: Option<f64>, own: Option<f64>, least: f64, share: f64| {
+        let old = own.unwrap_or(0.0).max(0.0);
+        other.is_some_and(|new| new >= least && new - old > LEAST_GAIN.max(share * (1.0 - old)))
     };
-    vec![
-        of("a turn from y up to z up", DVec3::X, DVec3::Z, DVec3::NEG_Y),
-        of("a turn from z up to y up", DVec3::X, DVec3::NEG_Z, DVec3::Y),
-        of("a turn from OpenGL's to OpenCV's axes", DVec3::X, DVec3::NEG_Y, DVec3::NEG_Z),
-    ]
+    let by_agreement = gains(other.agreement, own.agreement, LEAST_AGREEMENT, LEAST_GAIN_SHARE);
+    let by_overlap = gains(other.overlap, own.overlap, SOUND_OVERLAP, 0.0);
+    by_agreement && !loses(other.overlap, own.overlap) || by_overlap && !loses(other.agreement, own.agreement)
 }
 
-/// Looks at how much of the mesh the cameras see; where that is next to nothing and a known transform makes it much, the mesh
-/// is turned and the user told.
-pub fn put_right(mesh: &mut SourceMesh, views: &[SourceView], own: &[MeshFrame], findings: &mut Vec<Finding>) {
-    let corners = mesh.triangles.len() * 3;
-    if corners == 0 {
-        return;
+/// What frames are compared by: photos and masks where they say something, else what is in sight.
+fn merit(rating: &Rating) -> f64 {
+    rating.agreement.unwrap_or(0.0) + rating.overlap.unwrap_or(0.0) + 1e-3 * rating.views * rating.points
+}
+
+/// Rates the mesh as it is, and where that leaves a doubt in every known frame; takes one that is clearly better, and tells.
+/// Where photos and masks are silent, the mesh is moved only when next to nothing of it is in sight as it is.
+///
+/// `cameras` are of the source; `views`, whose cameras are not used, come back as they were.
+pub fn put_right(
+    mesh: &mut SourceMesh,
+    (cameras, views): (&[SourceCamera], Vec<View>),
+    in_pixels: &InPixels<'_>,
+    own: &[MeshFrame],
+    findings: &mut Vec<Finding>,
+) -> Vec<View> {
+    if mesh.triangles.is_empty() {
+        return views;
     }
-    let step = (corners / POINTS).max(1);
-    let points: Vec<DVec3> =
-        mesh.triangles.iter().flatten().step_by(step).map(|&corner| mesh.positions[corner as usize]).collect();
-    let as_it_is = seen(&points, views, &DMat4::IDENTITY);
-    if as_it_is.views >= FAILING_SHARE {
-        return;
+    let mut rater = Rater::new(mesh, cameras, views, in_pixels);
+    let as_it_is = rater.rate(&DMat4::IDENTITY);
+    if is_sound(&as_it_is) {
+        return rater.into_views();
     }
-    let mut frames = own.to_vec();
-    frames.extend(known());
-    let rated = frames.into_iter().map(|frame| (seen(&points, views, &frame.source_from_mesh), frame));
-    let mut rated: Vec<(Seen, MeshFrame)> = rated.filter(|(seen, _)| seen.views >= FITTING_SHARE).collect();
+    let frames = known(own);
+    let tried = frames.len();
+    let rate = |frame: MeshFrame| {
+        let in_sight = rater.by_sight(&frame.source_from_mesh).views >= FITTING_SHARE;
+        in_sight.then(|| (rater.rate(&frame.source_from_mesh), frame))
+    };
+    let mut rated: Vec<(Rating, MeshFrame)> = frames.into_iter().filter_map(rate).collect();
     // What the source knows comes first among equals: the sort is stable.
-    rated.sort_by(|a, b| (b.0.views * b.0.points).total_cmp(&(a.0.views * a.0.points)));
-    let percent = |share: f64| (100.0 * share).round();
-    match rated.first() {
-        Some((share, frame)) => {
-            let doubt = rated.get(1).map_or(String::new(), |(other, frame)| {
-                format!("; after {} it would be {} %: look at the outlines", frame.name, percent(other.views))
+    rated.sort_by(|a, b| merit(&b.0).total_cmp(&merit(&a.0)));
+    let is_lost = as_it_is.views < FAILING_SHARE;
+    let is_wanted = |(rating, _): &&(Rating, MeshFrame)| is_lost || is_clearly_better(rating, &as_it_is);
+    let wanted: Vec<&(Rating, MeshFrame)> = rated.iter().filter(is_wanted).collect();
+    match wanted.first() {
+        Some((rating, frame)) => {
+            let doubt = wanted.get(1).filter(|(other, _)| merit(other) > merit(rating) - MOST_LOSS);
+            let doubt = doubt.map_or(String::new(), |(other, frame)| {
+                format!("; after {} {other} as well: look at the outlines", frame.name)
             });
             findings.push(
                 Finding::new(
                     Severity::Warning,
                     "mesh-frame-changed",
-                    format!(
-                        "{} % of the views look at the mesh as it is, {} % after {}: the mesh is turned so{doubt}",
-                        percent(as_it_is.views),
-                        percent(share.views),
-                        frame.name
-                    ),
+                    format!("the mesh as it is: {as_it_is}; after {}: {rating}. It is moved so{doubt}", frame.name),
                 )
                 .remedy("export the mesh in the frame of the cameras if the outlines of `patina check -o` do not fit"),
             );
-            let turn = DMat3::from_mat4(frame.source_from_mesh);
-            let normal_turn = turn.inverse().transpose();
+            let linear = DMat3::from_mat4(frame.source_from_mesh);
+            let normal_turn = linear.inverse().transpose();
             mesh.positions.iter_mut().for_each(|point| *point = frame.source_from_mesh.transform_point3(*point));
             for normal in &mut mesh.normals {
                 *normal = (normal_turn * normal.as_dvec3()).normalize_or_zero().as_vec3();
             }
         }
-        None => findings.push(
+        None if is_lost => findings.push(
             Finding::new(
                 Severity::Warning,
                 "mesh-frame-unknown",
                 format!(
-                    "{} % of the views look at the mesh: it may be in another coordinate system than they are",
-                    percent(as_it_is.views)
+                    "{:.0} % of the views look at the mesh: it may be in another coordinate system than they are",
+                    100.0 * as_it_is.views
                 ),
             )
             .remedy("export mesh and cameras from the same project in the same coordinate system"),
         ),
+        None => findings.extend(told_of_trials(&as_it_is, &rated, tried, own)),
     }
+    rater.into_views()
+}
+
+/// What was tried in vain, where photos or masks do say that something is off.
+fn told_of_trials(
+    as_it_is: &Rating,
+    rated: &[(Rating, MeshFrame)],
+    tried: usize,
+    own: &[MeshFrame],
+) -> Option<Finding> {
+    let is_off = as_it_is.agreement.is_some_and(|agreement| agreement < LEAST_AGREEMENT)
+        || as_it_is.overlap.is_some_and(|overlap| overlap < SOUND_OVERLAP);
+    let names: Vec<&str> = own.iter().map(|frame| frame.name.as_str()).collect();
+    let own = if names.is_empty() { String::new() } else { format!(", {}", names.join(", ")) };
+    let best = rated.first().map_or(String::new(), |(rating, frame)| format!(", not after {}: {rating}", frame.name));
+    let message = format!(
+        "the mesh as it is: {as_it_is}. {tried} other frames were tried (axes turned, units of 100 and 1000{own}): in none of \
+         them it is clearly better{best}"
+    );
+    is_off.then(|| Finding::new(Severity::Note, "mesh-frames-tried", message))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Place;
-    use crate::scene::read::source::SourceCamera;
+    use crate::image::Image;
+    use crate::scene::{Camera, Photo, PixelState, WorldFromSource};
+    use crate::trace::Bvh;
+    use glam::{DVec3, Vec3};
 
-    fn ring() -> Vec<SourceView> {
+    const SIZE: (usize, usize) = (100, 100);
+
+    fn in_pixels(camera: &SourceCamera, _: usize) -> Camera {
+        camera.in_world(&WorldFromSource::default(), SIZE, 0.0)
+    }
+
+    fn ring() -> Vec<SourceCamera> {
         (0..8)
             .map(|index| {
                 let azimuth = 0.7 * f64::from(index);
@@ -130,23 +157,34 @@ mod tests {
                 let forward = (DVec3::new(0.0, 0.0, 5.0) - eye).normalize();
                 let right = forward.cross(DVec3::Z).normalize();
                 let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
-                let camera = SourceCamera {
+                SourceCamera {
                     intrinsics: super::super::colmap_lens::matrix([90.0; 2], [50.0, 50.0]),
                     rotation,
                     translation: -(rotation * eye),
-                };
-                let size = Some((100, 100));
-                SourceView {
-                    name: String::new(),
-                    photo: "a".into(),
-                    mask: None,
-                    camera,
-                    lens: None,
-                    size,
-                    place: Place::Nowhere,
                 }
             })
             .collect()
+    }
+
+    /// Photos by these cameras of grey nothing: they say nothing of a mesh.
+    fn grey(cameras: &[SourceCamera]) -> Vec<View> {
+        let view = |(index, camera): (usize, &SourceCamera)| View {
+            name: index.to_string(),
+            camera: in_pixels(camera, index),
+            photo: Photo::Srgb8(Image::filled(SIZE.0, SIZE.1, [90; 3])),
+            states: Image::filled(SIZE.0, SIZE.1, PixelState::Surface),
+            held_out: false,
+            exposure_prior_stops: None,
+        };
+        cameras.iter().enumerate().map(view).collect()
+    }
+
+    /// Moves it as it is found to stand.
+    fn put(mesh: &mut SourceMesh, views: &[View], own: &[MeshFrame]) -> Vec<Finding> {
+        let mut findings = Vec::new();
+        let back = put_right(mesh, (&ring(), views.to_vec()), &in_pixels, own, &mut findings);
+        assert_eq!(back.len(), views.len());
+        findings
     }
 
     fn mesh(centre: DVec3) -> SourceMesh {
@@ -161,21 +199,96 @@ mod tests {
 
     #[test]
     fn a_mesh_with_y_up_is_turned_to_cameras_with_z_up() {
-        let mut findings = Vec::new();
+        let views = grey(&ring());
         let mut fitting = mesh(DVec3::new(0.0, 0.0, 5.0));
         let before = fitting.positions.clone();
-        put_right(&mut fitting, &ring(), &[], &mut findings);
-        assert!(findings.is_empty() && fitting.positions == before, "what fits is left alone");
+        assert!(put(&mut fitting, &views, &[]).is_empty() && fitting.positions == before, "what fits is left alone");
         let mut turned = mesh(DVec3::new(0.0, 5.0, 0.0));
-        put_right(&mut turned, &ring(), &[], &mut findings);
-        assert_eq!(findings[0].code, "mesh-frame-changed");
+        assert_eq!(put(&mut turned, &views, &[])[0].code, "mesh-frame-changed");
         let (low, high) = turned.bounds().unwrap();
         assert!((0.5 * (low + high) - DVec3::new(0.0, 0.0, 5.0)).length() < 0.2);
         let mut lost = mesh(DVec3::new(900.0, 0.0, 0.0));
-        put_right(&mut lost, &ring(), &[], &mut findings);
-        assert_eq!(findings[1].code, "mesh-frame-unknown");
-        let own = MeshFrame { name: "own", source_from_mesh: DMat4::from_translation(DVec3::new(-900.0, 0.0, 5.0)) };
-        put_right(&mut lost, &ring(), &[own], &mut findings);
-        assert_eq!(findings[2].code, "mesh-frame-changed");
+        assert_eq!(put(&mut lost, &views, &[])[0].code, "mesh-frame-unknown");
+        let source_from_mesh = DMat4::from_translation(DVec3::new(-900.0, 0.0, 5.0));
+        let own = MeshFrame { name: "own".into(), source_from_mesh };
+        let findings = put(&mut lost, &views, &[own]);
+        assert!(
+            findings[0].code == "mesh-frame-changed" && findings[0].message.contains("after own"),
+            "{}",
+            findings[0]
+        );
+    }
+
+    /// An uneven ball about a place that all cameras look at, and photos of the pattern on it.
+    fn seen() -> (SourceMesh, Vec<View>) {
+        let centre = DVec3::new(0.0, 0.0, 5.0);
+        let mut ball = SourceMesh::default();
+        let (rings, sectors) = (16u32, 32u32);
+        for ring in 0..=rings {
+            for sector in 0..sectors {
+                let theta = std::f64::consts::PI * f64::from(ring) / f64::from(rings);
+                let phi = std::f64::consts::TAU * f64::from(sector) / f64::from(sectors);
+                let normal = DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
+                ball.positions.push(centre + normal * DVec3::new(1.5, 1.0, 0.8));
+                let [a, b] = [ring * sectors + sector, ring * sectors + (sector + 1) % sectors];
+                if ring < rings {
+                    ball.triangles.extend([[a, a + sectors, b], [b, a + sectors, b + sectors]]);
+                }
+            }
+        }
+        let positions: Vec<Vec3> = ball.positions.iter().map(|point| point.as_vec3()).collect();
+        let bvh = Bvh::build(&positions, &ball.triangles).unwrap();
+        let mut views = grey(&ring());
+        for view in &mut views {
+            let shade = |row: usize, column: usize| {
+                let ray = view.camera.ray_through(glam::Vec2::new(column as f32 + 0.5, row as f32 + 0.5));
+                let Some(hit) = bvh.closest_hit(&ray) else { return [40; 3] };
+                let place = ray.origin + hit.t * ray.direction;
+                let pattern = (5.0 * place.x).sin() * (4.0 * place.y + 1.0).cos() + (6.0 * place.z).sin();
+                [(120.0 + 45.0 * pattern) as u8; 3]
+            };
+            view.photo = Photo::Srgb8(Image::from_fn(SIZE.0, SIZE.1, shade));
+        }
+        (ball, views)
+    }
+
+    fn moved_by(mesh: &SourceMesh, mesh_from_source: DMat4) -> SourceMesh {
+        let positions = mesh.positions.iter().map(|point| mesh_from_source.transform_point3(*point)).collect();
+        SourceMesh { positions, ..mesh.clone() }
+    }
+
+    #[test]
+    fn photos_tell_the_frame_of_a_mesh_that_all_cameras_look_at() {
+        let (ball, views) = seen();
+        assert!(put(&mut ball.clone(), &views, &[]).is_empty(), "what fits is left alone");
+        let unit_sphere = DMat4::from_scale_rotation_translation(
+            DVec3::splat(0.7),
+            glam::DQuat::from_rotation_z(0.4),
+            DVec3::new(0.2, -0.3, 1.3),
+        );
+        let own = MeshFrame { name: "scale_mat".into(), source_from_mesh: unit_sphere.inverse() };
+        let units = |scale: f64| DMat4::from_scale(DVec3::splat(scale));
+        // Turned about the place that the cameras look at, all of it stays in sight.
+        let y_up = DMat4::from_mat3(DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y));
+        let cases = [
+            ("units by 0.01", units(100.0)),
+            ("units by 100", units(0.01)),
+            ("after scale_mat", unit_sphere),
+            ("from y up to z up and a change of units by 0.001", units(1000.0) * y_up),
+        ];
+        for (name, mesh_from_source) in cases {
+            let mut mesh = moved_by(&ball, mesh_from_source);
+            let findings = put(&mut mesh, &views, std::slice::from_ref(&own));
+            assert_eq!(findings.len(), 1, "{name}: {findings:?}");
+            assert_eq!(findings[0].code, "mesh-frame-changed");
+            assert!(findings[0].message.contains(name), "{name}: {}", findings[0]);
+            let off = mesh.positions.iter().zip(&ball.positions).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+            assert!(off < 1e-9, "{name}: off by {off}");
+        }
+        let mut larger = moved_by(&ball, DMat4::from_translation(DVec3::new(0.4, 0.5, 0.3)) * units(1.05));
+        let before = larger.positions.clone();
+        let findings = put(&mut larger, &views, &[]);
+        assert_eq!(findings[0].code, "mesh-frames-tried", "{findings:?}");
+        assert!(larger.positions == before && findings[0].message.contains("19 other frames"), "{}", findings[0]);
     }
 }

@@ -27,6 +27,7 @@ mod matte;
 mod mesh_choice;
 pub mod mesh_file;
 mod mesh_frame;
+mod mesh_frame_rating;
 pub mod metashape;
 mod metashape_cameras;
 mod metashape_project;
@@ -67,7 +68,7 @@ use crate::scene::doctor::pixel_centre;
 use crate::scene::settings::{BackgroundChoice, ColourEncoding, MaskUse, PixelCentre, ReadSettings, Up};
 use crate::scene::{Background, Scene, View, WorldFromSource};
 use photos::LoadedPhoto;
-use source::{SourceScene, SourceView};
+use source::{SourceCamera, SourceScene, SourceView};
 use std::path::Path;
 
 /// With fewer views than this none is held out: each is needed.
@@ -106,23 +107,16 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
             .remedy("name one with --mesh FILE, in the coordinate system of the cameras"));
     }
 
-    // The mesh, turned so that +y is up.
+    // The mesh.
     let mut source_mesh = mesh_file::read_pieces(&mesh)?;
     if source.flip_winding {
         source_mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
         source_mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
     }
-    if source.is_of_a_tool {
-        mesh_frame::put_right(&mut source_mesh, &views, &source.mesh_frames, &mut findings);
-    }
     let cameras: Vec<_> = views.iter().map(|view| view.camera).collect();
     let asked_up = if settings.up == Up::Auto { source.up } else { settings.up };
     let (up, mut noticed) = world::up_in_source(asked_up, &cameras)?;
     findings.append(&mut noticed);
-    let world_from_source = world::world_from_source(up, source_mesh.bounds_of_most());
-    let (mesh, mut noticed) = source_mesh.into_world(&world_from_source);
-    findings.append(&mut noticed);
-    mesh.validate()?;
 
     // The photos.
     let encoding = if settings.encoding == ColourEncoding::Auto { source.encoding } else { settings.encoding };
@@ -161,10 +155,30 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
         if settings.pixel_centre == PixelCentre::Auto { source.pixel_centre } else { settings.pixel_centre };
     let assumed_centre = if asked_centre == PixelCentre::Auto { source.default_pixel_centre } else { asked_centre };
     calibrated_size::fit(&mut views, &loaded, assumed_centre.shift_pixels(), &mut findings);
+    let file_sizes: Vec<(usize, usize)> = loaded.iter().map(|photo| photo.file_size).collect();
+    let camera_in = |world: &WorldFromSource, camera: &SourceCamera, view: usize| {
+        let camera = camera.in_world(world, file_sizes[view], assumed_centre.shift_pixels());
+        if settings.shrink == 1 { camera } else { camera.shrunk(settings.shrink) }
+    };
     let mut joined = Vec::with_capacity(views.len());
     for (view, photo) in views.iter().zip(loaded) {
-        joined.push(join(view, photo, &world_from_source, assumed_centre, settings.shrink, &mut findings));
+        joined.push(join(view, photo, &WorldFromSource::default(), assumed_centre, settings.shrink, &mut findings));
     }
+
+    // Both in one frame, turned so that +y is up.
+    if source.is_of_a_tool {
+        let in_source = |camera: &SourceCamera, view| camera_in(&WorldFromSource::default(), camera, view);
+        let cameras: Vec<SourceCamera> = views.iter().map(|view| view.camera).collect();
+        joined =
+            mesh_frame::put_right(&mut source_mesh, (&cameras, joined), &in_source, &source.mesh_frames, &mut findings);
+    }
+    let world_from_source = world::world_from_source(up, source_mesh.bounds_of_most());
+    for (index, (own, view)) in joined.iter_mut().zip(&views).enumerate() {
+        own.camera = camera_in(&world_from_source, &view.camera, index);
+    }
+    let (mesh, mut noticed) = source_mesh.into_world(&world_from_source);
+    findings.append(&mut noticed);
+    mesh.validate()?;
     hold_out(&mut joined, source.held_out.as_deref(), settings.hold_out_every, &mut findings)?;
 
     let mut scene = Scene {

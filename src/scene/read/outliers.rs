@@ -16,8 +16,10 @@ const NEAR_DISTANCES: f64 = 64.0;
 const SPIKE_DISTANCES: f64 = 512.0;
 /// Beyond so many nothing can belong to a photographed surface: a photo that shows it has all others in one pixel.
 const FAR_DISTANCES: f64 = 8192.0;
-/// Far vertices are outliers only while they are less than this share of all.
+/// Corners of spikes are outliers only while they are less than this share of all; a scene may have its horizon there.
 const LARGEST_SHARE: f64 = 0.01;
+/// The same for what nothing photographed can belong to: medians stand as long as most is near.
+const LARGEST_FAR_SHARE: f64 = 0.25;
 /// Fewer points than this have no outliers.
 const FEWEST_POINTS: usize = 16;
 
@@ -68,19 +70,34 @@ pub fn leave_out(mesh: &mut SourceMesh) {
     let Some((middle, distance)) = middle_of(&points).filter(|_| points.len() >= FEWEST_POINTS) else { return };
     let positions = &mesh.positions;
     let outwards = |vertex: u32| positions[vertex as usize].distance(middle) / distance;
-    let is_stray = |triangle: &[u32; 3]| {
+    let span = |triangle: &[u32; 3]| {
         let distances = triangle.map(outwards);
-        let (nearest, farthest) =
-            (distances.iter().copied().fold(f64::INFINITY, f64::min), distances.iter().copied().fold(0.0, f64::max));
+        (distances.iter().copied().fold(f64::INFINITY, f64::min), distances.iter().copied().fold(0.0, f64::max))
+    };
+    let is_far = |triangle: &[u32; 3]| span(triangle).1 > FAR_DISTANCES;
+    let is_far_or_spike = |triangle: &[u32; 3]| {
+        let (nearest, farthest) = span(triangle);
         farthest > FAR_DISTANCES || farthest > SPIKE_DISTANCES && nearest < NEAR_DISTANCES
     };
-    let mut far: Vec<usize> = (mesh.triangles.iter().filter(|triangle| is_stray(triangle)).flatten())
-        .filter(|&&vertex| outwards(vertex) > SPIKE_DISTANCES)
-        .map(|&vertex| vertex as usize)
-        .collect();
-    far.sort_unstable();
-    far.dedup();
-    if far.is_empty() || far.len() as f64 > (LARGEST_SHARE * points.len() as f64).max(1.0) {
+    let corners_of = |is_stray: &dyn Fn(&[u32; 3]) -> bool, limit: f64| {
+        let mut corners: Vec<usize> = (mesh.triangles.iter().filter(|triangle| is_stray(triangle)).flatten())
+            .filter(|&&vertex| outwards(vertex) > limit)
+            .map(|&vertex| vertex as usize)
+            .collect();
+        corners.sort_unstable();
+        corners.dedup();
+        corners
+    };
+    let few = |corners: &[usize], share: f64| corners.len() as f64 <= (share * points.len() as f64).max(1.0);
+    // Spikes go with what is far where both are few; where spikes are many, what is far goes alone.
+    let mut is_stray: &dyn Fn(&[u32; 3]) -> bool = &is_far_or_spike;
+    let mut far = corners_of(is_stray, SPIKE_DISTANCES);
+    let spikes = far.iter().filter(|&&vertex| outwards(vertex as u32) <= FAR_DISTANCES).count();
+    if spikes as f64 > (LARGEST_SHARE * points.len() as f64).max(1.0) {
+        is_stray = &is_far;
+        far = corners_of(is_stray, FAR_DISTANCES);
+    }
+    if far.is_empty() || !few(&far, LARGEST_FAR_SHARE) {
         return;
     }
     let before = mesh.triangles.len();
@@ -141,6 +158,29 @@ mod tests {
         mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
         leave_out(&mut mesh);
         assert!(mesh.findings.is_empty() && mesh.triangles.len() == whole + 2);
+    }
+
+    #[test]
+    fn many_far_vertices_go_as_one_does_and_a_wide_horizon_stays() {
+        let mut mesh = grid();
+        let whole = mesh.triangles.len();
+        for place in 0..40 {
+            let turn = f64::from(place);
+            mesh.positions[place as usize * 10] = 1e6 * DVec3::new(turn.sin(), turn.cos(), (2.0 * turn).sin());
+        }
+        leave_out(&mut mesh);
+        assert!(mesh.findings[0].message.contains("40 of 400 vertices lie far"), "{}", mesh.findings[0]);
+        let (low, high) = mesh.bounds().unwrap();
+        assert!(low.min_element() >= 0.0 && high.max_element() < 20.0 && mesh.triangles.len() < whole);
+
+        // A tenth of the vertices on a horizon that a photo may show.
+        let mut mesh = grid();
+        for place in 0..40 {
+            let turn = f64::from(place);
+            mesh.positions[place as usize * 10] = 5000.0 * DVec3::new(turn.sin(), 0.0, turn.cos());
+        }
+        leave_out(&mut mesh);
+        assert!(mesh.findings.is_empty() && mesh.triangles.len() == whole, "{:?}", mesh.findings);
     }
 
     #[test]

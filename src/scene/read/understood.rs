@@ -1,9 +1,11 @@
 //! What was made of a scene's files, on one page: for `patina check`.
 
 use super::locate;
+use super::outliers::bounds_of_most;
 use super::source::SourceView;
 use crate::error::Result;
-use crate::scene::{Background, ReadSettings, Scene};
+use crate::scene::{Background, Mesh, ReadSettings, Scene};
+use glam::Vec3;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -19,7 +21,7 @@ pub struct Understood {
     pub mesh: Vec<PathBuf>,
     /// Number of triangles.
     pub triangles: usize,
-    /// Diagonal of the mesh's bounding box.
+    /// Diagonal of the bounding box of what triangles use, without what lies far from all others.
     pub diagonal: f32,
     /// Number of views.
     pub views: usize,
@@ -57,6 +59,8 @@ pub enum Frames {
     Moved,
     /// Cameras look past the mesh, and no known transform helps.
     Doubtful,
+    /// Cameras look at the mesh, photos or masks do not fit it, and no known transform helps.
+    Unproven,
 }
 
 /// Says what was made of a scene that was read from `path` with `settings`.
@@ -74,9 +78,7 @@ pub fn understand(path: &Path, settings: &ReadSettings, scene: &Scene) -> Result
     for view in &scene.views {
         *sizes.entry((view.camera.width, view.camera.height)).or_default() += 1;
     }
-    let points = &scene.mesh.positions;
-    let first = points.first().copied().unwrap_or_default();
-    let (low, high) = points.iter().fold((first, first), |(low, high), point| (low.min(*point), high.max(*point)));
+    let (low, high) = extent(&scene.mesh);
     let middle = 0.5 * (low + high);
     let cameras = || scene.views.iter().map(|view| &view.camera);
     let world = &scene.world_from_source;
@@ -106,9 +108,19 @@ pub fn understand(path: &Path, settings: &ReadSettings, scene: &Scene) -> Result
         frames: match &scene.findings {
             findings if findings.iter().any(|finding| finding.code == "mesh-frame-changed") => Frames::Moved,
             findings if findings.iter().any(|finding| finding.code == "mesh-frame-unknown") => Frames::Doubtful,
+            findings if findings.iter().any(|finding| finding.code == "mesh-frames-tried") => Frames::Unproven,
             _ => Frames::Shared,
         },
     })
+}
+
+/// Lower and upper corner of the vertices that triangles use, without those far from the others.
+fn extent(mesh: &Mesh) -> (Vec3, Vec3) {
+    let mut used = vec![false; mesh.positions.len()];
+    mesh.triangles.iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
+    let points = mesh.positions.iter().zip(&used).filter(|(_, used)| **used).map(|(point, _)| point.as_dvec3());
+    let (low, high) = bounds_of_most(points.collect()).unwrap_or_default();
+    (low.as_vec3(), high.as_vec3())
 }
 
 impl fmt::Display for Understood {
@@ -140,6 +152,9 @@ impl fmt::Display for Understood {
                 "the mesh stood in another frame and was moved to the cameras: see mesh-frame-changed below"
             }
             Frames::Doubtful => "the mesh may stand in another frame than the cameras: see mesh-frame-unknown below",
+            Frames::Unproven => {
+                "photos or masks do not fit the mesh, in its own frame or in another that is known: see mesh-frames-tried below"
+            }
         };
         let held_out = match self.held_out {
             0 => "none held out for validation".to_owned(),
@@ -170,5 +185,27 @@ impl fmt::Display for Understood {
             "scale       the mesh is {:.4} across and cameras stand {near:.4} to {far:.4} from its middle, in units of the source",
             self.diagonal
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_extent_is_of_what_triangles_use_without_what_lies_far_off() {
+        let mut mesh = Mesh::default();
+        for index in 0..60u32 {
+            let turn = 0.7 * index as f32;
+            mesh.positions.push(Vec3::new(turn.cos(), turn.sin(), (1.3 * turn).sin()));
+            mesh.triangles.push([index, (index + 1) % 60, (index + 7) % 60]);
+        }
+        let bounds = extent(&mesh);
+        assert!(bounds.0.min_element() >= -1.0 && bounds.1.max_element() <= 1.0);
+        mesh.positions.push(Vec3::splat(1e20));
+        assert_eq!(extent(&mesh), bounds, "a vertex that no triangle uses");
+        mesh.triangles.push([0, 1, 60]);
+        assert_eq!(extent(&mesh), bounds, "a vertex far from all others");
+        assert_eq!(extent(&Mesh::default()), (Vec3::ZERO, Vec3::ZERO));
     }
 }
