@@ -151,7 +151,7 @@ impl Error {
             _ => ErrorKind::Unreadable,
         };
         let remedy = match kind {
-            ErrorKind::Missing => "check the path, or name the file in scene.toml",
+            ErrorKind::Missing => "check the path",
             ErrorKind::Malformed => "the file is cut short or damaged: copy it again",
             _ => "check that the file may be read",
         };

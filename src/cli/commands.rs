@@ -32,6 +32,20 @@ fn camera_scene(folder: &RunFolder, given: Option<&Path>, typed: &ReadOptions) -
     Ok((crate::scene::read(&path, &read)?, settings))
 }
 
+/// The same for a command without options for how a scene is read: no remedy names one.
+fn camera_scene_as_it_is(folder: &RunFolder, given: Option<&Path>) -> Result<(Scene, RunSettings)> {
+    let without_options = |error: Error| {
+        match error.remedy_text().contains(" --") {
+        true => error.with_remedy(
+            "scenes are read here as the fit read its own: change the scene, or use `patina render`, which takes the options of \
+             `patina fit`",
+        ),
+        false => error,
+    }
+    };
+    camera_scene(folder, given, &ReadOptions::default()).map_err(without_options)
+}
+
 /// Indices of the named views; `otherwise` chooses when none is named.
 fn chosen_views(scene: &Scene, names: &[String], otherwise: impl Fn(&Scene) -> Vec<usize>) -> Result<Vec<usize>> {
     if names.is_empty() {
@@ -80,7 +94,7 @@ fn tell_non_finite(picture: &Picture, name: &str, json: bool) {
 /// Renders a run under other lights.
 pub fn relight(options: &RelightOptions, json: bool) -> Result<()> {
     let folder = RunFolder::open(&options.run)?;
-    let (scene, settings) = camera_scene(&folder, options.cameras.as_deref(), &ReadOptions::default())?;
+    let (scene, settings) = camera_scene_as_it_is(&folder, options.cameras.as_deref())?;
     let result = folder.read_result()?;
     let (surface, own) = surface_of(&result)?;
     let output = options.output.clone().unwrap_or_else(|| folder.path().join("relight"));

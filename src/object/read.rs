@@ -75,7 +75,7 @@ pub fn read_views(files: &ObjectFiles) -> Result<(Vec<ObjectView>, Vec<Finding>)
         Some(mesh) => geometries_of_mesh(files, mesh, &photos, &mut findings)?,
     };
     let views = photos.into_iter().zip(geometries).map(|(photo, geometry)| ObjectView::new(photo, geometry));
-    Ok((views.collect::<Result<Vec<_>>>()?, findings))
+    Ok((views.collect::<Result<Vec<_>>>()?, crate::scene::read::repeated::joined(findings)))
 }
 
 /// Less of an outline on its circle than this is no ball's.

@@ -75,6 +75,11 @@ impl View {
 }
 
 impl Scene {
+    /// Whether it was read from a folder with a `scene.toml`, where conventions can be named.
+    pub fn has_manifest(&self) -> bool {
+        self.folder.as_ref().is_some_and(|folder| folder.join(read::manifest::FILE_NAME).is_file())
+    }
+
     /// Puts a linear picture in the place of a view's photo; every pixel becomes evidence, except those that are not
     /// finite.
     ///

@@ -27,14 +27,38 @@ fn options(names: &[&str]) -> BTreeSet<String> {
     known
 }
 
-/// Which commands print what is written in a file of the sources; all where several do.
-fn commands_of(path: &str) -> &'static [&'static [&'static str]] {
+/// Which commands print what is written in a file of the sources: each must know the option; `None` where the message itself
+/// must name the commands, since some of those that print it have no options of the kind.
+fn commands_of(path: &str) -> Option<&'static [&'static [&'static str]]> {
+    let is_below = |folders: &[&str]| folders.iter().any(|folder| path.starts_with(folder));
     match path {
-        // What a reader or the check says is printed by both.
-        path if path.starts_with("scene/read") || path.starts_with("scene/doctor") => &[&["check"], &["fit"]],
-        path if path.starts_with("atlas/") || path.starts_with("fit/") => &[&["fit"]],
-        _ => &[&[]],
+        // Pictures, meshes and lights are read by every command.
+        _ if is_below(&["image/", "light/", "math/", "files.rs", "error.rs"]) => None,
+        _ if is_below(&[
+            "scene/read/mesh_file",
+            "scene/read/obj",
+            "scene/read/ply",
+            "scene/read/gltf",
+            "scene/read/stl",
+        ]) =>
+        {
+            None
+        }
+        // What a reader or the check says is printed by all that read scenes; `relight` replaces remedies with options.
+        _ if is_below(&["scene/"]) => Some(&[&["check"], &["fit"], &["render"], &["compare"]]),
+        _ if is_below(&["object/"]) => Some(&[&["object"]]),
+        _ if is_below(&["export/", "job/export"]) => Some(&[&["export"]]),
+        _ if is_below(&["atlas/", "fit/", "job/known_maps", "job/budget"]) => Some(&[&["fit"]]),
+        _ => Some(&[&[]]),
     }
+}
+
+/// The commands that a message names as `patina NAME`, in a line or its neighbours: what is written as one string.
+fn commands_named_at(source: &str, line: usize) -> Vec<String> {
+    let near: Vec<&str> = source.lines().skip(line.saturating_sub(3)).take(5).collect();
+    let near = near.join(" ");
+    let after = near.split("`patina ").skip(1);
+    after.map(|rest| rest.chars().take_while(char::is_ascii_lowercase).collect()).collect()
 }
 
 /// Options named in the string literals of a source, with the line of each.
@@ -86,9 +110,17 @@ fn every_option_that_a_message_names_is_known_to_the_command_that_prints_it() {
         {
             continue;
         }
-        for (line, name) in named_in(&std::fs::read_to_string(&file).unwrap()) {
+        let source = std::fs::read_to_string(&file).unwrap();
+        for (line, name) in named_in(&source) {
             seen += 1;
-            for commands in commands_of(&path) {
+            let named = commands_named_at(&source, line);
+            let named: Vec<[&str; 1]> = named.iter().map(|name| [name.as_str()]).collect();
+            let named: Vec<&[&str]> = named.iter().map(|name| &name[..]).collect();
+            let known: Option<&[&[&str]]> = commands_of(&path);
+            if known.is_none() && named.is_empty() {
+                wrong.push(format!("{path}:{line}: --{name} is named without the commands that have it"));
+            }
+            for commands in known.unwrap_or(&named[..]) {
                 if !options(commands).contains(&name) {
                     wrong.push(format!("{path}:{line}: --{name} is no option of {commands:?}"));
                 }
@@ -97,6 +129,30 @@ fn every_option_that_a_message_names_is_known_to_the_command_that_prints_it() {
     }
     assert!(seen > 20, "{seen}: the search itself is broken");
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// A remedy that names scene.toml is of no use to folders that have none.
+#[test]
+fn only_what_is_said_of_a_scene_with_a_manifest_names_it() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    sources(&root, &mut files);
+    let mut seen = 0;
+    for file in files {
+        let path = file.strip_prefix(&root).unwrap().to_string_lossy().replace('\\', "/");
+        let source = std::fs::read_to_string(&file).unwrap();
+        let code = source.split("#[cfg(test)]").next().unwrap_or_default();
+        // Files that make one, list the kinds of scenes, or read one.
+        let others = ["lab/", "studio/", "scene/read/manifest.rs", "scene/read/detect.rs", "job/capture_folder.rs"];
+        if others.iter().any(|other| path.starts_with(other)) {
+            continue;
+        }
+        let is_said = |line: &&str| line.contains("in scene.toml") && !line.trim_start().starts_with("//");
+        let count = code.lines().filter(is_said).count();
+        seen += count;
+        assert!(count == 0 || code.contains("has_manifest()"), "{path} names scene.toml whatever the scene");
+    }
+    assert!(seen > 3, "{seen}: the search itself is broken");
 }
 
 #[test]

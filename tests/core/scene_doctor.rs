@@ -50,6 +50,40 @@ fn a_good_scene_has_no_findings_and_good_figures() {
 }
 
 #[test]
+fn remedies_are_for_the_scene_that_is_there() {
+    let remedy = |scene: &Scene, code: &str| {
+        check(scene).findings.into_iter().find(|finding| finding.code == code).unwrap().remedy
+    };
+    let mut scene = scene(8);
+    scene.views.iter_mut().for_each(|view| view.camera.centre_pixels += 0.5);
+    let off = |scene: &Scene| remedy(scene, "pixel-centre-off");
+    assert!(off(&scene).contains("--pixel-centre half"), "{}", off(&scene));
+    scene.views.iter_mut().for_each(|view| view.camera.centre_pixels -= 1.0);
+    assert!(off(&scene).contains("--pixel-centre integer"), "{}", off(&scene));
+
+    scene.mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+    let (_keep, folder) = folder();
+    scene.folder = Some(folder.clone());
+    assert!(!remedy(&scene, "mesh-inside-out").contains("scene.toml"));
+    write(&folder.join("scene.toml"), "");
+    assert!(remedy(&scene, "mesh-inside-out").contains("scene.toml"));
+}
+
+#[test]
+fn a_mesh_that_all_cameras_stand_within_may_be_too_large() {
+    let message = |scene: &Scene| {
+        let findings = check(scene).findings;
+        findings.into_iter().find(|finding| finding.code == "mesh-inside-out").unwrap().message
+    };
+    let mut scene = scene(4);
+    scene.mesh.positions.iter_mut().for_each(|point| *point *= 40.0);
+    assert!(message(&scene).contains("all cameras stand within it"), "{}", message(&scene));
+    scene.mesh.positions.iter_mut().for_each(|point| *point /= 40.0);
+    scene.mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+    assert!(!message(&scene).contains("stand within"), "{}", message(&scene));
+}
+
+#[test]
 fn photo_edges_tell_the_pixel_centre_without_masks() {
     let mut scene = scene(8);
     for view in &mut scene.views {

@@ -171,7 +171,7 @@ pub fn choose<'a>(layers: &'a [Layer], wanted: Option<&str>, path: &Path) -> Res
                     format!("{how_many} is named '{wanted}': there are {}", list()),
                 )
                 .at(Place::File(path.into()))
-                .remedy("give the name of one of them: --layer NAME"))
+                .remedy("give the name of one of them"))
             }
         };
     }
@@ -189,9 +189,13 @@ pub fn choose<'a>(layers: &'a [Layer], wanted: Option<&str>, path: &Path) -> Res
             format!("the names of the layers do not say which one is the radiance of the picture: {}", list()),
         )
         .at(Place::File(path.into()))
-        .remedy("name it: --layer NAME")),
+        .remedy(ONE_LAYER)),
     }
 }
+
+/// What helps whoever reads the picture: lights and pictures of single objects have no option for it.
+const ONE_LAYER: &str = "save the layer that is meant alone, as a picture of its own; for the photos of a scene, `patina check` and `patina fit` \
+                         take its name: --layer NAME";
 
 /// Tells which layer is read, where there was a choice or a name.
 pub fn told(layers: &[Layer], chosen: &Layer) -> Option<Finding> {
@@ -202,7 +206,7 @@ pub fn told(layers: &[Layer], chosen: &Layer) -> Option<Finding> {
     let others: Vec<String> = layers.iter().filter(|layer| *layer != chosen).take(8).map(name).collect();
     let beside = if others.is_empty() { String::new() } else { format!(", not {}", others.join(", ")) };
     let finding = Finding::new(Severity::Note, "exr-layer", format!("the layer '{}' is read{beside}", name(chosen)));
-    Some(if others.is_empty() { finding } else { finding.remedy("read another with --layer NAME") })
+    Some(if others.is_empty() { finding } else { finding.remedy(ONE_LAYER) })
 }
 
 /// Where a data window lies in the display window, and the size of the latter.
@@ -284,7 +288,7 @@ mod tests {
         assert_eq!(chosen(&of(&["albedo", "hero"]), None).unwrap(), "hero");
         for unclear in [of(&["albedo", "normal"]), of(&["albedo"]), of(&["left", "right"])] {
             let error = chosen(&unclear, None).unwrap_err();
-            assert!(error.remedy_text().contains("--layer"), "{error}");
+            assert_eq!(error.remedy_text(), ONE_LAYER);
         }
         let error = chosen(&blender, Some("glossy")).unwrap_err();
         assert!(error.message().contains("'ViewLayer.DiffCol'"), "{error}");

@@ -28,11 +28,14 @@ const DARK: f32 = 2e-3;
 /// Another order of the photos is believed when the correlation rises by so much, and by this share of what it lacks.
 const LEAST_GAIN: f64 = 0.1;
 const LEAST_GAIN_SHARE: f64 = 0.2;
-/// Where most views correlate by less than this and no other order helps, that itself is told.
+/// Where most views correlate by less than this, photos belong to other cameras or another mesh; where they do by less than
+/// [`JUDGED_ABOVE`], something of them is off.
 const HARDLY: f64 = 0.2;
+/// What captures have whose cameras and mesh fit.
+const USUAL: f64 = 0.7;
 /// Views that correlate by less than this with all others, where the others do, are named.
 const LOW: f64 = 0.35;
-/// Where most views correlate by less than this, nothing is said of single ones.
+/// Where most views correlate by less than this, that itself is told, and nothing is said of single ones.
 const JUDGED_ABOVE: f64 = 0.5;
 
 /// Two cameras and where each sees the points that both see, by index of the pixel.
@@ -182,15 +185,16 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
         ));
         return;
     }
-    if middle < HARDLY {
+    if middle < JUDGED_ABOVE {
+        let hardly = if middle < HARDLY { "barely" } else { "poorly" };
         let message = format!(
-            "photos barely correlate where the cameras say they show the same surface ({middle:.2}; 1 is a perfect match)"
+            "photos correlate {hardly} where the cameras say they show the same surface ({middle:.2}; 1 is a perfect match, \
+             captures that fit have {USUAL:.1} and more)"
         );
         report.findings.push(Finding::new(Severity::Warning, "photos-disagree", message).remedy(
-            "check that cameras, photos and mesh belong to the same capture; mirrors and glass have the same effect",
+            "look at the outlines over the photos (check -o FOLDER): the mesh may be larger, smaller or turned, photos may have \
+             been cropped, resized or given another's camera; mirrors, glass and moving light have the same effect",
         ));
-    }
-    if middle < JUDGED_ABOVE {
         return;
     }
     let bad: Vec<usize> =

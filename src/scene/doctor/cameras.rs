@@ -222,7 +222,11 @@ fn explain(scene: &Scene, asked: f64, report: &mut Report) {
                     100.0 * share
                 ),
             )
-            .remedy(*remedy),
+            .remedy(if scene.has_manifest() {
+                *remedy
+            } else {
+                "export the cameras again as OpenCV cameras (x right, y down, z forward), each matrix from world to camera"
+            }),
         );
     }
 }

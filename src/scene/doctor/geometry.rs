@@ -4,6 +4,7 @@ use super::Report;
 use super::probe::{Probe, surface_at};
 use crate::error::{Finding, Place, Severity};
 use crate::scene::{Mesh, Scene};
+use glam::Vec3;
 use std::collections::HashMap;
 
 /// Counts of the mesh.
@@ -129,18 +130,19 @@ fn check_sides(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
     let back_share = back as f64 / hits.max(1) as f64;
     let opposed_share = opposed as f64 / (hits - back).max(1) as f64;
     if back_share > 0.5 {
+        let inside =
+            if are_inside(scene) { ", or larger than it should be, since all cameras stand within it" } else { "" };
+        let flip = if scene.has_manifest() { "set flip_winding = true in scene.toml, or " } else { "" };
         report.findings.push(
             Finding::new(
                 Severity::Fatal,
                 "mesh-inside-out",
                 format!(
-                    "the cameras see {:.0} % back faces: the triangles are wound the wrong way",
+                    "the cameras see {:.0} % back faces: the triangles are wound the wrong way{inside}",
                     100.0 * back_share
                 ),
             )
-            .remedy(
-                "set flip_winding = true in scene.toml, or flip the faces in the mesh; a mirrored axis does the same",
-            ),
+            .remedy(format!("{flip}flip the faces in the mesh; a mirrored axis or other units do the same")),
         );
     } else if back_share > 0.02 {
         report.findings.push(
@@ -169,10 +171,22 @@ fn check_sides(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
     }
 }
 
+/// Whether all cameras stand within the box around the mesh.
+fn are_inside(scene: &Scene) -> bool {
+    let (low, high) = scene
+        .mesh
+        .triangles
+        .iter()
+        .flatten()
+        .map(|&vertex| scene.mesh.positions[vertex as usize])
+        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), point| (low.min(point), high.max(point)));
+    let is_inside = |point: Vec3| point.cmpge(low).all() && point.cmple(high).all();
+    scene.views.iter().all(|view| is_inside(view.camera.position_in_world()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec3;
 
     #[test]
     fn each_kind_of_bad_triangle_is_counted_once() {

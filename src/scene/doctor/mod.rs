@@ -47,6 +47,7 @@ pub use pixel_centre::CentreMeasurement;
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::math::parallel;
 use crate::scene::Scene;
+use crate::scene::read::repeated::joined;
 use crate::trace::Bvh;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -148,6 +149,7 @@ pub fn check_until(scene: &Scene, stop: &AtomicBool) -> Result<Report> {
                 ),
             );
             cameras::check(scene, &mut report);
+            report.findings = joined(report.findings);
             sort(&mut report.findings);
             Ok(report)
         }
@@ -163,6 +165,7 @@ fn check_with_until(scene: &Scene, bvh: &Bvh, stop: &AtomicBool) -> Result<Repor
     let stopped = || Error::new(ErrorKind::Stopped, "stopped while the scene was checked");
     let mut report = Report { findings: scene.findings.clone(), ..Default::default() };
     let usable = cameras::check(scene, &mut report);
+    report.findings = joined(report.findings);
     let probe = |view: usize| {
         let is_wanted = usable[view] && !stop.load(Ordering::Relaxed);
         if is_wanted { probe::probe_view(&scene.views[view], bvh) } else { Vec::new() }
@@ -176,7 +179,10 @@ fn check_with_until(scene: &Scene, bvh: &Bvh, stop: &AtomicBool) -> Result<Repor
     let questions: [&dyn Fn(&mut Report); 13] = [
         &|report| geometry::check(scene, &probes, report),
         &|report| normals::check(scene, report),
-        &|report| cameras::check_sight(scene, &probes, report),
+        &|report| {
+            cameras::check_sight(scene, &probes, report);
+            report.findings = joined(std::mem::take(&mut report.findings));
+        },
         &|report| silhouette::check(scene, &probes, report),
         &|report| pictures::check(scene, &probes, report),
         &|report| resolution::check(scene, &probes, report),

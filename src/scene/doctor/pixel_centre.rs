@@ -307,7 +307,11 @@ pub fn check(scene: &Scene, bvh: &Bvh, report: &mut Report) {
                     measurement.figures(0.0)
                 ),
             )
-            .remedy("give --pixel-centre auto, or the other convention"),
+            .remedy(if measurement.clearly_at(0.0) {
+                "give --pixel-centre integer: what the source says of its convention is not so"
+            } else {
+                "give --pixel-centre half: what was given or the source says of its convention is not so"
+            }),
         );
     }
 }

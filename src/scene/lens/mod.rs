@@ -67,6 +67,39 @@ impl Lens {
         (DVec2::new(u.value, v.value), [DVec2::from_array(u.by), DVec2::from_array(v.by)])
     }
 
+    /// How wide and how high a picture taken through it is, along the sides through the principal point, in radians: infinite
+    /// where that is more than 180 degrees and nothing falls on a side. A side beyond the radius where the model folds over
+    /// counts as far as that.
+    pub fn field_of_view_radians(&self, size: (usize, usize), pinhole: &Pinhole) -> DVec2 {
+        let valid = self.valid_radius();
+        let widest = if self.model.is_on_angles() { WIDEST_RADIANS } else { WIDEST_RADIANS.tan() };
+        let angle_to = |side: DVec2| {
+            let place = (side - pinhole.centre_pixels) / pinhole.focal_pixels;
+            let angle = |direction: DVec3| direction.z.clamp(-1.0, 1.0).acos();
+            match self.unproject(place, valid) {
+                Some(direction) => angle(direction),
+                // Folded over before.
+                None if valid < widest => {
+                    if self.model.is_on_angles() {
+                        valid
+                    } else {
+                        valid.atan()
+                    }
+                }
+                None if self.model.is_on_angles() => {
+                    self.unproject(place, std::f64::consts::PI).map_or(f64::INFINITY, angle)
+                }
+                None => f64::INFINITY,
+            }
+        };
+        let (width, height) = (size.0 as f64, size.1 as f64);
+        let centre = pinhole.centre_pixels;
+        DVec2::new(
+            angle_to(DVec2::new(0.0, centre.y)) + angle_to(DVec2::new(width, centre.y)),
+            angle_to(DVec2::new(centre.x, 0.0)) + angle_to(DVec2::new(centre.x, height)),
+        )
+    }
+
     /// Largest radius of the parameters of a direction up to which the model neither folds over nor leaves 180 degrees.
     pub fn valid_radius(&self) -> f64 {
         let radius_at = |step: usize| {
@@ -190,6 +223,31 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn the_field_of_view_is_that_of_the_photo_and_not_of_its_pinhole() {
+        let pinhole =
+            |focal: f64| Pinhole { focal_pixels: DVec2::splat(focal), centre_pixels: DVec2::new(91.0, 136.5) };
+        let degrees = |lens: &Lens, focal: f64| {
+            let angle = lens.field_of_view_radians((182, 273), &pinhole(focal));
+            [angle.x.to_degrees(), angle.y.to_degrees()]
+        };
+        let equidistant = Lens::new(Model::Polynomial(Polynomial { base: Base::Angle, ..Default::default() }));
+        let [wide, high] = degrees(&equidistant, 60.0);
+        assert!(
+            (wide - (182.0f64 / 60.0).to_degrees()).abs() < 1e-6
+                && (high - (273.0f64 / 60.0).to_degrees()).abs() < 1e-6
+        );
+        let [wide, _] = degrees(&Lens::default(), 91.0);
+        assert!((wide - 90.0).abs() < 1e-6, "{wide}");
+        // The division model has 180 degrees at the radius 1 / sqrt(-k).
+        let division = Lens::new(Model::Division { k: -1.0 });
+        let [wide, high] = degrees(&division, 100.0);
+        assert!(wide < 180.0 && high.is_infinite(), "{wide} {high}");
+        let folding = Polynomial { numerator: [-0.3, 0.0, 0.0, 0.0, 0.0, 0.0], ..Default::default() };
+        let [_, high] = degrees(&Lens::new(Model::Polynomial(folding)), 100.0);
+        assert!(high < 100.0, "what folds over is no wide picture: {high}");
     }
 
     #[test]

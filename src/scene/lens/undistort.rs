@@ -23,6 +23,25 @@ pub struct Undistorted {
     pub largest_shift_pixels: f64,
     /// Share of the pinhole's pixels that lie outside the photo, in [0, 1].
     pub share_outside: f64,
+    /// Share of the photo's pixels that lie outside the pinhole's picture, in [0, 1].
+    pub share_unused: f64,
+}
+
+/// Share of the photo, by a grid of its pixels, that falls outside a pinhole's picture of its size.
+fn share_unused((width, height): (usize, usize), lens: &Lens, pinhole: &Pinhole, valid_radius: f64) -> f64 {
+    /// Places along each side.
+    const GRID: usize = 32;
+    let place = |index: usize, side: usize| (index as f64 + 0.5) * side as f64 / GRID as f64;
+    let is_used = |index: &usize| {
+        let from = DVec2::new(place(index % GRID, width), place(index / GRID, height));
+        let on_plane = (from - pinhole.centre_pixels) / pinhole.focal_pixels;
+        lens.unproject(on_plane, valid_radius).filter(|direction| direction.z > 0.0).is_some_and(|direction| {
+            let kept = direction.truncate() / direction.z * pinhole.focal_pixels + pinhole.centre_pixels;
+            kept.x >= 0.0 && kept.y >= 0.0 && kept.x <= width as f64 && kept.y <= height as f64
+        })
+    };
+    let used = (0..GRID * GRID).filter(is_used).count();
+    1.0 - used as f64 / (GRID * GRID) as f64
 }
 
 /// Where a place of the pinhole's picture lies on the photo, in pixels; `None` beyond `valid_radius` of the lens.
@@ -67,6 +86,7 @@ pub fn undistort(
             resampled_states[(row, column)] = state;
         }
     }
+    done.share_unused = share_unused((width, height), lens, pinhole, valid_radius);
     done.share_outside = outside as f64 / (width * height).max(1) as f64;
     let halves = |image: &Image<Vec3>| {
         image.map(|pixel| pixel.min(Vec3::splat(f16::MAX.to_f32())).to_array().map(f16::from_f32))
@@ -191,6 +211,20 @@ mod tests {
         assert_eq!(done.share_outside, ignored as f64 / 8000.0);
         assert!(!seen.is_linear(), "it is a photograph of eight bits still");
         assert!((seen.radiance(40, 50) - photo.radiance(40, 50)).length() < 1e-3);
+    }
+
+    #[test]
+    fn what_the_pinhole_leaves_of_a_wide_photo_is_counted() {
+        let photo = Photo::Srgb8(Image::filled(100, 80, [120; 3]));
+        let states = Image::filled(100, 80, PixelState::Surface);
+        let share = |lens: &Lens, pinhole: &Pinhole| undistort(&photo, &states, lens, pinhole).2.share_unused;
+        let wide = Pinhole { focal_pixels: DVec2::splat(50.0), centre_pixels: DVec2::new(50.0, 40.0) };
+        let fisheye = Polynomial { base: crate::scene::lens::Base::Angle, ..Default::default() };
+        // On the axes the pinhole keeps atan(1) of 1 and atan(0.8) of 0.8 radians, in the corners less.
+        let kept = (1f64.atan() / 1.0) * (0.8f64.atan() / 0.8);
+        let unused = share(&Lens::new(Model::Polynomial(fisheye)), &wide);
+        assert!(unused > 1.0 - kept && unused < 1.2 - kept, "{unused}");
+        assert_eq!(share(&Lens::new(Model::Polynomial(Polynomial::default())), &wide), 0.0);
     }
 
     #[test]

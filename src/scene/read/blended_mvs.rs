@@ -85,7 +85,7 @@ fn find_mesh(folder: &Path) -> Result<(Vec<PathBuf>, Vec<Finding>)> {
                     "mesh files of several kinds lie side by side: OBJ is read before PLY, glTF and STL",
                 )
                 .at(Place::File(place.clone()))
-                .remedy("name the mesh in scene.toml to read another"),
+                .remedy("choose another with --mesh FILE"),
             );
         }
         let mesh = kinds.into_iter().find(|files| !files.is_empty()).unwrap_or_default();

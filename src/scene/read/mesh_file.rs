@@ -13,7 +13,7 @@ pub fn read_one(path: &Path) -> Result<SourceMesh> {
     if !path.is_file() {
         return Err(Error::new(ErrorKind::Missing, "there is no mesh file here")
             .at(Place::File(path.into()))
-            .remedy("check the path, or name the mesh in scene.toml"));
+            .remedy("check the path"));
     }
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     match extension.as_str() {

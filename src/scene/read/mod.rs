@@ -48,6 +48,7 @@ mod ply_header;
 pub mod polygon;
 mod realitycapture;
 mod realitycapture_csv;
+pub(crate) mod repeated;
 pub mod source;
 mod source_mesh;
 mod stl;
@@ -104,7 +105,7 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
     if mesh.is_empty() {
         return Err(Error::new(ErrorKind::Missing, "no mesh was found with the photos and cameras")
             .at(Place::File(folder))
-            .remedy("name one with --mesh FILE, in the coordinate system of the cameras"));
+            .remedy("put one into the folder, in the coordinate system of the cameras, or name it with --mesh FILE"));
     }
 
     // The mesh.
@@ -206,6 +207,7 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
         scene.views.iter_mut().for_each(|view| view.camera.centre_pixels += shift as f32);
         scene.findings.push(finding);
     }
+    scene.findings = repeated::joined(std::mem::take(&mut scene.findings));
     Ok(scene)
 }
 

@@ -19,6 +19,15 @@ pub fn as_the_camera_sees(photo: PhotoFile, view: &SourceView, shared: &mut Vec<
     let turns = match view.size {
         Some(size) if size == stored => false,
         Some(size) if size == swapped && can_turn => true,
+        Some(size) if size == swapped => {
+            let message = format!(
+                "the photo is {} x {} but its camera is for {} x {}: it was turned by 90 degrees, and no EXIF orientation says so",
+                stored.0, stored.1, size.0, size.1
+            );
+            return Err(Error::new(ErrorKind::InvalidScene, message)
+                .at(Place::File(view.photo.clone()))
+                .remedy("turn the photo by 90 degrees, to lie as it did when its camera was calibrated"));
+        }
         Some(size) => {
             let turned = if can_turn {
                 format!(" ({} x {} when turned by its EXIF orientation {tag})", swapped.0, swapped.1)
@@ -109,6 +118,9 @@ mod tests {
         assert_eq!(error.kind(), ErrorKind::InvalidScene);
         assert!(error.message().contains("6 x 4 (4 x 6") && error.message().contains("12 x 8"), "{error}");
         let error = as_the_camera_sees(photo(6, 4, 1), &view(Some((4, 6)), (2.0, 3.0)), &mut Vec::new()).unwrap_err();
-        assert!(error.message().contains("is 6 x 4 but"), "{error}");
+        assert!(
+            error.message().contains("is 6 x 4 but") && error.message().contains("turned by 90 degrees"),
+            "{error}"
+        );
     }
 }

@@ -7,7 +7,7 @@ use crate::error::{Finding, Place, Result, Severity};
 use crate::image::file::{self, Encoding, PhotoFile, PhotoOptions, PhotoPixels};
 use crate::image::{Image, RgbImage};
 use crate::math::parallel;
-use crate::scene::lens::{Undistorted, undistort};
+use crate::scene::lens::{Lens, Undistorted, undistort};
 use crate::scene::settings::{ColourEncoding, MaskUse, ReadSettings};
 use crate::scene::{Photo, PixelState};
 use glam::Vec3;
@@ -19,6 +19,9 @@ use std::path::PathBuf;
 pub const CLIPPED_BYTE: u8 = 254;
 /// Float photos of one scene that would need more than this are kept in half precision.
 const MOST_FLOAT_BYTES: usize = 1 << 30;
+/// Where more of a photo than this is not used, that is a warning.
+const MOST_UNUSED: f64 = 0.5;
+
 /// A decoded view, at the size after shrinking.
 pub struct LoadedPhoto {
     /// The photo.
@@ -80,14 +83,26 @@ pub fn told_of_lenses(loaded: &[LoadedPhoto]) -> Option<Finding> {
     let done: Vec<Undistorted> = loaded.iter().filter_map(|photo| photo.undistorted).collect();
     let shift = done.iter().map(|own| own.largest_shift_pixels).fold(0.0, f64::max);
     let outside = done.iter().map(|own| own.share_outside).fold(0.0, f64::max);
+    let unused = done.iter().map(|own| own.share_unused).fold(0.0, f64::max);
     let message = format!(
-        "the distortion of the lens is undone in {} of {} photos: pixels move by up to {shift:.1}, and up to {:.1} % of a photo \
-         lies outside what was taken and is not seen",
+        "the distortion of the lens is undone in {} of {} photos: pixels move by up to {shift:.1}, up to {:.1} % of a picture \
+         lies outside what was taken and is not seen, and up to {:.1} % of what was taken lies outside the picture and is not used",
         done.len(),
         loaded.len(),
-        100.0 * outside
+        100.0 * outside,
+        100.0 * unused
     );
-    (!done.is_empty()).then(|| Finding::new(Severity::Note, "lens-undone", message))
+    if done.is_empty() {
+        return None;
+    }
+    if unused <= MOST_UNUSED {
+        return Some(Finding::new(Severity::Note, "lens-undone", message));
+    }
+    Some(
+        Finding::new(Severity::Warning, "lens-undone", message).remedy(
+            "resample the photos to wider pinhole pictures with the tool that calibrated them, to use all of them",
+        ),
+    )
 }
 
 /// One finding of those that photos share, with the names of the photos.
@@ -185,6 +200,7 @@ fn load(
     let (photo, states) = match &view.lens {
         None => (photo, states),
         Some(lens) => {
+            refuse_more_than_half_a_sphere(view, lens, file_size)?;
             let (photo, states, done) = undistort(&photo, &states, lens, &view.camera.pinhole());
             undistorted = Some(done);
             (photo, states)
@@ -195,6 +211,27 @@ fn load(
         factor => shrink(&photo, &states, factor),
     };
     Ok(LoadedPhoto { photo, states, file_size, exposure_prior_stops: exposure_stops, undistorted, findings, shared })
+}
+
+/// A pinhole sees less than 180 degrees.
+fn refuse_more_than_half_a_sphere(view: &SourceView, lens: &Lens, size: (usize, usize)) -> Result<()> {
+    /// A whole hemisphere, and what a calibration is off by at the rim.
+    const WIDEST_DEGREES: f64 = 182.0;
+    let angle = lens.field_of_view_radians(size, &view.camera.pinhole());
+    let degrees = [angle.x.to_degrees(), angle.y.to_degrees()];
+    if degrees.iter().all(|degrees| *degrees <= WIDEST_DEGREES) {
+        return Ok(());
+    }
+    let named = |degrees: f64| if degrees.is_finite() { format!("{degrees:.0}") } else { "more than 180".to_owned() };
+    let message = format!(
+        "by its lens the photo is {} degrees wide and {} high: more than 180 are not read",
+        named(degrees[0]),
+        named(degrees[1])
+    );
+    Err(Error::new(ErrorKind::Unsupported, message).at(Place::File(view.photo.clone())).remedy(
+        "resample it to pinhole pictures with the tool that calibrated it, or crop it to less (a fisheye's circle to a square \
+         within) and correct its calibration",
+    ))
 }
 
 /// Sets the state of the pixels that a map marks; ignored pixels stay so.
