@@ -1,7 +1,7 @@
 //! A mesh that stands in another frame than the cameras: noticed by what photos and masks say of it, and put right by a
 //! transform that is known from the tools.
 
-use super::mesh_frame_rating::{InPixels, Rater, Rating, known};
+use super::mesh_frame_rating::{InPixels, Rater, Rating, Trial, known};
 use super::source::{MeshFrame, SourceCamera};
 use super::source_mesh::SourceMesh;
 use crate::error::{Finding, Severity};
@@ -69,16 +69,16 @@ pub fn put_right(
     }
     let frames = known(own);
     let tried = frames.len();
-    let rate = |frame: MeshFrame| {
+    let rate = |frame: Trial| {
         let in_sight = rater.by_sight(&frame.source_from_mesh).views >= FITTING_SHARE;
         in_sight.then(|| (rater.rate(&frame.source_from_mesh), frame))
     };
-    let mut rated: Vec<(Rating, MeshFrame)> = frames.into_iter().filter_map(rate).collect();
+    let mut rated: Vec<(Rating, Trial)> = frames.into_iter().filter_map(rate).collect();
     // What the source knows comes first among equals: the sort is stable.
     rated.sort_by(|a, b| merit(&b.0).total_cmp(&merit(&a.0)));
     let is_lost = as_it_is.views < FAILING_SHARE;
-    let is_wanted = |(rating, _): &&(Rating, MeshFrame)| is_lost || is_clearly_better(rating, &as_it_is);
-    let wanted: Vec<&(Rating, MeshFrame)> = rated.iter().filter(is_wanted).collect();
+    let is_wanted = |(rating, _): &&(Rating, Trial)| is_lost || is_clearly_better(rating, &as_it_is);
+    let wanted: Vec<&(Rating, Trial)> = rated.iter().filter(is_wanted).collect();
     match wanted.first() {
         Some((rating, frame)) => {
             let doubt = wanted.get(1).filter(|(other, _)| merit(other) > merit(rating) - MOST_LOSS);
@@ -117,15 +117,10 @@ pub fn put_right(
 }
 
 /// What was tried in vain, where photos or masks do say that something is off.
-fn told_of_trials(
-    as_it_is: &Rating,
-    rated: &[(Rating, MeshFrame)],
-    tried: usize,
-    own: &[MeshFrame],
-) -> Option<Finding> {
+fn told_of_trials(as_it_is: &Rating, rated: &[(Rating, Trial)], tried: usize, own: &[MeshFrame]) -> Option<Finding> {
     let is_off = as_it_is.agreement.is_some_and(|agreement| agreement < LEAST_AGREEMENT)
         || as_it_is.overlap.is_some_and(|overlap| overlap < SOUND_OVERLAP);
-    let names: Vec<&str> = own.iter().map(|frame| frame.name.as_str()).collect();
+    let names: Vec<&str> = own.iter().map(|frame| frame.name).collect();
     let own = if names.is_empty() { String::new() } else { format!(", {}", names.join(", ")) };
     let best = rated.first().map_or(String::new(), |(rating, frame)| format!(", not after {}: {rating}", frame.name));
     let message = format!(
@@ -210,7 +205,7 @@ mod tests {
         let mut lost = mesh(DVec3::new(900.0, 0.0, 0.0));
         assert_eq!(put(&mut lost, &views, &[])[0].code, "mesh-frame-unknown");
         let source_from_mesh = DMat4::from_translation(DVec3::new(-900.0, 0.0, 5.0));
-        let own = MeshFrame { name: "own".into(), source_from_mesh };
+        let own = MeshFrame { name: "own", source_from_mesh };
         let findings = put(&mut lost, &views, &[own]);
         assert!(
             findings[0].code == "mesh-frame-changed" && findings[0].message.contains("after own"),
@@ -266,7 +261,7 @@ mod tests {
             glam::DQuat::from_rotation_z(0.4),
             DVec3::new(0.2, -0.3, 1.3),
         );
-        let own = MeshFrame { name: "scale_mat".into(), source_from_mesh: unit_sphere.inverse() };
+        let own = MeshFrame { name: "scale_mat", source_from_mesh: unit_sphere.inverse() };
         let units = |scale: f64| DMat4::from_scale(DVec3::splat(scale));
         // Turned about the place that the cameras look at, all of it stays in sight.
         let y_up = DMat4::from_mat3(DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y));

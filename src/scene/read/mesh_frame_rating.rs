@@ -151,28 +151,41 @@ fn moved(camera: &SourceCamera, frame: &DMat4, middle: DVec3) -> SourceCamera {
     }
 }
 
+/// A frame that is tried.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trial {
+    /// What takes it to the frame of the cameras, in words after "after".
+    pub name: String,
+    /// `source_from_mesh`, a similarity.
+    pub source_from_mesh: DMat4,
+}
+
+impl Trial {
+    fn new(name: impl Into<String>, source_from_mesh: DMat4) -> Self {
+        Trial { name: name.into(), source_from_mesh }
+    }
+}
+
 /// Transforms that tools leave between a mesh and its cameras: axes exchanged, lengths in other units, what the source knows,
 /// and an exchange of axes before any of these. What the source knows comes first.
-pub fn known(own: &[MeshFrame]) -> Vec<MeshFrame> {
-    let turn = |name: &str, x: DVec3, y: DVec3, z: DVec3| MeshFrame {
-        name: name.into(),
-        source_from_mesh: DMat4::from_mat3(DMat3::from_cols(x, y, z)),
-    };
+pub fn known(own: &[MeshFrame]) -> Vec<Trial> {
+    let turn = |name: &str, x, y, z| Trial::new(name, DMat4::from_mat3(DMat3::from_cols(x, y, z)));
     let turns = [
         turn("a turn from y up to z up", DVec3::X, DVec3::Z, DVec3::NEG_Y),
         turn("a turn from z up to y up", DVec3::X, DVec3::NEG_Z, DVec3::Y),
         turn("a turn from OpenGL's to OpenCV's axes", DVec3::X, DVec3::NEG_Y, DVec3::NEG_Z),
     ];
-    let units = [0.001, 0.01, 100.0, 1000.0].map(|scale| MeshFrame {
-        name: format!("a change of units by {scale}"),
-        source_from_mesh: DMat4::from_scale(DVec3::splat(scale)),
+    let units = [0.001, 0.01, 100.0, 1000.0].map(|scale| {
+        let frame = DMat4::from_scale(DVec3::splat(scale));
+        Trial::new(format!("a change of units by {scale}"), frame)
     });
-    let usable = |frame: &&MeshFrame| frame.source_from_mesh.determinant().abs() > 0.0;
-    let single: Vec<MeshFrame> = own.iter().filter(usable).chain(&units).cloned().collect();
+    let own = own.iter().filter(|frame| frame.source_from_mesh.determinant().abs() > 0.0);
+    let own = own.map(|frame| Trial::new(frame.name, frame.source_from_mesh));
+    let single: Vec<Trial> = own.chain(units).collect();
     let both = single.iter().flat_map(|second| {
-        turns.iter().map(move |first| MeshFrame {
-            name: format!("{} and {}", first.name, second.name),
-            source_from_mesh: second.source_from_mesh * first.source_from_mesh,
+        turns.iter().map(move |first| {
+            let name = format!("{} and {}", first.name, second.name);
+            Trial::new(name, second.source_from_mesh * first.source_from_mesh)
         })
     });
     single.iter().chain(&turns).cloned().chain(both).collect()

@@ -43,7 +43,7 @@ fn finish(folder: &Path, cameras: Cameras, photos: &PhotoIndex, mut findings: Ve
     if let Some(world_from_chunk) = cameras.transform {
         // A mesh may be exported in the chunk's frame or in the world's.
         let source_from_mesh = world_from_chunk.inverse();
-        scene.mesh_frames.push(MeshFrame { name: "the transform of the chunk".into(), source_from_mesh });
+        scene.mesh_frames.push(MeshFrame { name: "the transform of the chunk", source_from_mesh });
     }
     scene.findings = findings;
     Ok(scene)

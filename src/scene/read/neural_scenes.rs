@@ -99,7 +99,7 @@ pub fn read_neus(file: &Path) -> Result<SourceScene> {
     }
     let scale = matrix_of("scale_mat_0".into())?.filter(|scale| scale.determinant().abs() > 1e-18);
     let frames =
-        scale.map(|source_from_mesh| MeshFrame { name: "scale_mat, out of the unit sphere".into(), source_from_mesh });
+        scale.map(|source_from_mesh| MeshFrame { name: "scale_mat, out of the unit sphere", source_from_mesh });
     finish(folder, posed, frames.into_iter().collect())
 }
 

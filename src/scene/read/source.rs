@@ -78,7 +78,7 @@ pub struct SourceScene {
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshFrame {
     /// What takes it to the frame of the cameras, in words after "after".
-    pub name: String,
+    pub name: &'static str,
     /// `source_from_mesh`, a similarity.
     pub source_from_mesh: DMat4,
 }

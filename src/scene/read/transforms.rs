@@ -254,7 +254,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
             "applied-transform-undone",
             "the file turned its cameras by applied_transform: this is undone, the mesh is taken to be in the frame before it",
         ));
-        scene.mesh_frames.push(MeshFrame { name: "applied_transform".into(), source_from_mesh: applied.inverse() });
+        scene.mesh_frames.push(MeshFrame { name: "applied_transform", source_from_mesh: applied.inverse() });
     }
     scene.findings = findings;
     Ok(scene)
