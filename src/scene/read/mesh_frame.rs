@@ -122,10 +122,10 @@ fn told_of_trials(as_it_is: &Rating, rated: &[(Rating, Trial)], tried: usize, ow
         || as_it_is.overlap.is_some_and(|overlap| overlap < SOUND_OVERLAP);
     let names: Vec<&str> = own.iter().map(|frame| frame.name).collect();
     let own = if names.is_empty() { String::new() } else { format!(", {}", names.join(", ")) };
-    let best = rated.first().map_or(String::new(), |(rating, frame)| format!(", not after {}: {rating}", frame.name));
+    let best = rated.first().map_or(String::new(), |(rating, frame)| format!("; after {}: {rating}", frame.name));
     let message = format!(
-        "the mesh as it is: {as_it_is}. {tried} other frames were tried (axes turned, units of 100 and 1000{own}): in none of \
-         them it is clearly better{best}"
+        "the mesh as it is: {as_it_is}{best}. Of {tried} other frames that were tried (axes turned, units of 100 and 1000{own}) \
+         none is clearly better"
     );
     is_off.then(|| Finding::new(Severity::Note, "mesh-frames-tried", message))
 }
@@ -284,6 +284,6 @@ mod tests {
         let before = larger.positions.clone();
         let findings = put(&mut larger, &views, &[]);
         assert_eq!(findings[0].code, "mesh-frames-tried", "{findings:?}");
-        assert!(larger.positions == before && findings[0].message.contains("19 other frames"), "{}", findings[0]);
+        assert!(larger.positions == before && findings[0].message.contains("Of 19 other frames"), "{}", findings[0]);
     }
 }
