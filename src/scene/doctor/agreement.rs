@@ -185,6 +185,9 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
         ));
         return;
     }
+    if middle < JUDGED_ABOVE && middle >= HARDLY && masks_tell(report) {
+        return;
+    }
     if middle < JUDGED_ABOVE {
         let hardly = if middle < HARDLY { "barely" } else { "poorly" };
         let message = format!(
@@ -248,6 +251,14 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
                 .remedy("check that these photos belong to their cameras, or exclude the views"),
         );
     }
+}
+
+/// Whether masks say already that the mesh is not the object: then photos cannot agree through it.
+fn masks_tell(report: &Report) -> bool {
+    /// Below this median overlap of masks and outline.
+    const ANOTHER: f64 = 0.5;
+    let overlaps: Vec<f64> = report.views.iter().filter_map(|view| view.mask_overlap).collect();
+    !overlaps.is_empty() && quantile(&overlaps, 0.5) < ANOTHER
 }
 
 struct Trial<'a> {

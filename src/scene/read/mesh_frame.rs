@@ -239,7 +239,7 @@ mod tests {
                 let ray = view.camera.ray_through(glam::Vec2::new(column as f32 + 0.5, row as f32 + 0.5));
                 let Some(hit) = bvh.closest_hit(&ray) else { return [40; 3] };
                 let place = ray.origin + hit.t * ray.direction;
-                let pattern = (5.0 * place.x).sin() * (4.0 * place.y + 1.0).cos() + (6.0 * place.z).sin();
+                let pattern = (9.0 * place.x).sin() * (8.0 * place.y + 1.0).cos() + (10.0 * place.z).sin();
                 [(120.0 + 45.0 * pattern) as u8; 3]
             };
             view.photo = Photo::Srgb8(Image::from_fn(SIZE.0, SIZE.1, shade));
@@ -257,9 +257,9 @@ mod tests {
         let (ball, views) = seen();
         assert!(put(&mut ball.clone(), &views, &[]).is_empty(), "what fits is left alone");
         let unit_sphere = DMat4::from_scale_rotation_translation(
-            DVec3::splat(0.7),
-            glam::DQuat::from_rotation_z(0.4),
-            DVec3::new(0.2, -0.3, 1.3),
+            DVec3::splat(0.6),
+            glam::DQuat::from_rotation_z(1.2),
+            DVec3::new(0.5, -0.4, 1.6),
         );
         let own = MeshFrame { name: "scale_mat", source_from_mesh: unit_sphere.inverse() };
         let units = |scale: f64| DMat4::from_scale(DVec3::splat(scale));
