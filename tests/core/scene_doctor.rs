@@ -113,13 +113,19 @@ fn mirrored_flipped_and_broken_cameras_are_named() {
     let report = assert_finding(&mirrored, "camera-mirrored", Severity::Fatal);
     assert!(report.findings[0].place.contains("00000002"));
 
-    let mut opengl = scene(4);
+    // Conventions are said in scene.toml, where there is one.
+    let (_keep, folder) = folder();
+    write(&folder.join("scene.toml"), "");
+    let mut opengl = Scene { folder: Some(folder.clone()), ..scene(4) };
     opengl.views.iter_mut().for_each(|view| view.camera = turned(&view.camera, Vec3::new(1.0, -1.0, -1.0)));
     let report = assert_finding(&opengl, "camera-convention", Severity::Warning);
     assert!(report.findings.iter().any(|finding| finding.remedy.contains("opengl")), "{:#?}", report.findings);
     assert_eq!(severity_of(&report, "views-see-nothing"), Some(Severity::Fatal));
+    opengl.folder = None;
+    let report = assert_finding(&opengl, "camera-convention", Severity::Warning);
+    assert!(report.findings.iter().all(|finding| !finding.remedy.contains("scene.toml")), "{:#?}", report.findings);
 
-    let mut inverted = scene(4);
+    let mut inverted = Scene { folder: Some(folder), ..scene(4) };
     for view in &mut inverted.views {
         let camera = view.camera;
         view.camera.rotation_camera_from_world = camera.rotation_camera_from_world.transpose();
