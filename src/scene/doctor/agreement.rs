@@ -185,7 +185,7 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
         ));
         return;
     }
-    if middle < JUDGED_ABOVE && middle >= HARDLY && masks_tell(report) {
+    if (HARDLY..JUDGED_ABOVE).contains(&middle) && masks_tell(report) {
         return;
     }
     if middle < JUDGED_ABOVE {
