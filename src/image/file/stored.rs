@@ -44,6 +44,7 @@ impl Samples {
 
 /// What a file declares of its colours beside a profile.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "there is one for each file that is open")]
 pub enum Declared {
     /// Nothing, or that they are sRGB.
     #[default]

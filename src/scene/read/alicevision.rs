@@ -23,8 +23,8 @@ fn files_in(folder: &Path) -> Vec<PathBuf> {
     let named = ["sfm.json", "cameras.json.sfm", "cameras.sfm"].map(|name| folder.join(name));
     let mut files: Vec<PathBuf> = named.into_iter().filter(|path| path.is_file()).collect();
     let others = files_of(folder, &["sfm"]).unwrap_or_default();
-    files.extend(others.into_iter().filter(|path| !path.file_name().is_some_and(|name| name == "cameras.sfm")));
-    files.dedup();
+    let others: Vec<PathBuf> = others.into_iter().filter(|path| !files.contains(path)).collect();
+    files.extend(others);
     files
 }
 
