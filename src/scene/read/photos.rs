@@ -3,7 +3,7 @@
 use super::source::SourceView;
 use super::zip::Archive;
 use super::{masks, orientation};
-use crate::error::{Finding, Place, Result, Severity};
+use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::file::{self, Encoding, PhotoFile, PhotoOptions, PhotoPixels};
 use crate::image::{Image, RgbImage};
 use crate::math::parallel;
