@@ -18,7 +18,9 @@ pub fn of_files(views: &[SourceView]) -> Result<Vec<(usize, usize)>> {
 
 /// By how much a size is larger than another of the same shape; `None` for another shape.
 fn scale_of(size: (usize, usize), claimed: (usize, usize)) -> Option<f64> {
-    let mean = ((size.0 * size.1) as f64 / (claimed.0 * claimed.1) as f64).sqrt();
+    // As a damaged calibration claims them, sides have products beyond a whole number's range.
+    let area = |(width, height): (usize, usize)| width as f64 * height as f64;
+    let mean = (area(size) / area(claimed)).sqrt();
     let off = [(size.0, claimed.0), (size.1, claimed.1)].map(|(own, side)| (own as f64 - side as f64 * mean).abs());
     (off[0].max(off[1]) <= ROUNDING_PIXELS).then_some(mean)
 }
