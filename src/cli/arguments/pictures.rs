@@ -32,8 +32,8 @@ fn hits(text: &str) -> Result<usize, String> {
 /// An angle by which a background is blurred, in degrees.
 fn blur(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
-        Ok(degrees) if (0.0..=90.0).contains(&degrees) => Ok(degrees),
-        _ => Err("give degrees from 0 to 90".into()),
+        Ok(degrees) if degrees == 0.0 || (5.0..=90.0).contains(&degrees) => Ok(degrees),
+        _ => Err("give degrees from 5 to 90, or 0 for a sharp one".into()),
     }
 }
 

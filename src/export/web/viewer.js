@@ -9,6 +9,10 @@
     note.textContent = "This browser has no WebGL 2: the surface cannot be shown.";
     return;
   }
+  if (typeof DecompressionStream === "undefined") {
+    note.textContent = "This browser is too old: it cannot unpack what the page holds (Chrome 80, Firefox 113, Safari 16.4 or later can).";
+    return;
+  }
   // What is deflated in the document, wherever it stands, as bytes.
   const unpacked = async (value) => {
     if (value === null || typeof value !== "object") return value;

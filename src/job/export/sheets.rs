@@ -64,7 +64,7 @@ Roughness is the square root of the GGX width. Texture coordinates of the OBJ po
 environment.*    linear; left border -z, +z in the centre";
 
 pub(super) const WEB_FILES: &str = "\
-index.html       opens in any browser with WebGL 2, without a network; holds mesh, maps and environments
+index.html       opens in browsers of 2023 and later, without a network; holds mesh, maps and environments
                  diffuse and F0 with the sRGB curve, microfacet width a = sqrt(r), eight bits each
                  drag turns, wheel zooms, Ctrl and drag moves, Shift and drag turns the light
                  index.html#light=1&rotation=90&exposure=0.5&backdrop=0&view=0&wipe=1 opens it so";

@@ -35,12 +35,6 @@ fn is_bundle(path: &Path) -> bool {
     file.and_then(|file| file.take(64).read_to_end(&mut start)).is_ok() && start.starts_with(b"# Bundle file")
 }
 
-/// The folder of the scene: the file's, or the one above where that is `bundle/`.
-fn folder_of(bundle: &Path) -> &Path {
-    let own = bundle.parent().unwrap_or(Path::new(""));
-    if own.ends_with("bundle") { own.parent().unwrap_or(own) } else { own }
-}
-
 /// The list of photos of a file of cameras: `NAME.list.txt` of `NAME.out` (Metashape) or `NAME.bundle.out` (COLMAP), or one
 /// of the usual names.
 fn list_of(bundle: &Path) -> Option<PathBuf> {
@@ -49,16 +43,16 @@ fn list_of(bundle: &Path) -> Option<PathBuf> {
     let stems = [stem.strip_suffix(".bundle").unwrap_or(stem), stem, &name];
     let names = stems.map(|stem| format!("{stem}.list.txt")).into_iter().chain(LISTS.map(str::to_owned));
     let own = bundle.parent().unwrap_or(Path::new(""));
-    let folders = [own.to_path_buf(), folder_of(bundle).to_path_buf(), own.join("bundle")];
+    let above = if own.ends_with("bundle") { own.parent().unwrap_or(own) } else { own };
+    let folders = [own.to_path_buf(), above.to_path_buf(), own.join("bundle")];
     names.flat_map(|name| folders.clone().map(|folder| folder.join(&name))).find(|path| path.is_file())
 }
 
-/// Lists a Bundler scene of a file of cameras and reads them.
+/// Lists a Bundler scene of a file of cameras in or below `folder` and reads them.
 ///
 /// # Errors
 /// `Missing` without the list of its photos, `Malformed` with the line, `InvalidScene` for a list of other photos.
-pub fn read(bundle: &Path) -> Result<SourceScene> {
-    let folder = folder_of(bundle);
+pub fn read(bundle: &Path, folder: &Path) -> Result<SourceScene> {
     let list = list_of(bundle).ok_or_else(|| {
         Error::new(ErrorKind::Missing, "the list of its photos is not there")
             .at(Place::File(bundle.into()))
@@ -143,7 +137,7 @@ mod tests {
         let bundle = "# Bundle file v0.3\n2 0\n50 0.1 -0.02\n1 0 0\n0 1 0\n0 0 1\n0.5 0.25 -4\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n";
         std::fs::write(folder.path().join("bundle.out"), bundle).unwrap();
         std::fs::write(folder.path().join("list.txt"), "dir/a.png 0 50\ndir/b.png\n").unwrap();
-        let scene = read(&file_of(folder.path()).unwrap()).unwrap();
+        let scene = read(&file_of(folder.path()).unwrap(), folder.path()).unwrap();
         let (camera, lens) = (&scene.views[0].camera, scene.views[0].lens.as_ref().unwrap());
         // P = X + t; p = -P / P.z; from the middle, y up.
         let point = DVec3::new(0.7, 0.3, 1.0);
@@ -156,7 +150,7 @@ mod tests {
         assert!((place + pinhole.centre_pixels - expected).length() < 1e-9);
         assert!(scene.findings.iter().any(|finding| finding.code == "camera-not-aligned"));
         std::fs::write(folder.path().join("bundle.out"), &bundle[..60]).unwrap();
-        assert!(matches!(read(&folder.path().join("bundle.out")).unwrap_err().place(), Place::Line(..)));
+        assert!(matches!(read(&folder.path().join("bundle.out"), folder.path()).unwrap_err().place(), Place::Line(..)));
     }
 
     #[test]
@@ -179,7 +173,7 @@ mod tests {
             std::fs::write(root.join("log.out"), "nothing of the kind").unwrap();
             let path = file_of(root).unwrap();
             assert_eq!(path, root.join(cameras));
-            let scene = read(&path).unwrap();
+            let scene = read(&path, root).unwrap();
             assert_eq!((scene.views.len(), scene.folder.as_path()), (1, root), "{cameras}");
         }
     }

@@ -199,7 +199,7 @@ impl Located {
             Format::OpenMvs => openmvs::read(&self.evidence),
             Format::RealityCapture if self.evidence.is_file() => realitycapture_csv::read(&self.evidence),
             Format::RealityCapture => realitycapture::read(&self.folder),
-            Format::Bundler => bundler::read(&self.evidence),
+            Format::Bundler => bundler::read(&self.evidence, &self.folder),
             Format::Neus => neural_scenes::read_neus(&self.evidence),
             Format::Llff => neural_scenes::read_llff(&self.evidence),
         }?;

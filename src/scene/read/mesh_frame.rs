@@ -16,6 +16,8 @@ const SOUND_AGREEMENT: f64 = 0.7;
 const SOUND_OVERLAP: f64 = 0.8;
 /// A frame in which photos agree by less than this is not taken for their agreement.
 const LEAST_AGREEMENT: f64 = 0.5;
+/// A frame in which masks overlap by less does not bring back a mesh that is out of sight.
+const LEAST_OVERLAP: f64 = 0.3;
 /// A frame is clearly better than another when agreement or overlap rises by so much, and the agreement by this share of what
 /// it lacks.
 const LEAST_GAIN: f64 = 0.15;
@@ -33,7 +35,9 @@ fn is_sound(rating: &Rating) -> bool {
 
 /// Whether photos or masks say that one frame is clearly better than what there is.
 fn is_clearly_better(other: &Rating, own: &Rating) -> bool {
-    let loses = |other: Option<f64>, own: Option<f64>| other.zip(own).is_some_and(|(new, old)| new < old - MOST_LOSS);
+    // What was measured and is no more is lost.
+    let loses =
+        |other: Option<f64>, own: Option<f64>| own.is_some_and(|old| other.is_none_or(|new| new < old - MOST_LOSS));
     let gains = |other: Option<f64>, own: Option<f64>, least: f64, share: f64| {
         let old = own.unwrap_or(0.0).max(0.0);
         other.is_some_and(|new| new >= least && new - old > LEAST_GAIN.max(share * (1.0 - old)))
@@ -41,6 +45,15 @@ fn is_clearly_better(other: &Rating, own: &Rating) -> bool {
     let by_agreement = gains(other.agreement, own.agreement, LEAST_AGREEMENT, LEAST_GAIN_SHARE);
     let by_overlap = gains(other.overlap, own.overlap, SOUND_OVERLAP, 0.0);
     by_agreement && !loses(other.overlap, own.overlap) || by_overlap && !loses(other.agreement, own.agreement)
+}
+
+/// Whether a mesh that is out of sight as it is may stand in this frame: what was measured speaks for it, or nothing was and it
+/// is not by its size alone that it is seen.
+fn is_credible((rating, frame): &(Rating, Trial)) -> bool {
+    let is_measured = rating.agreement.is_some() || rating.overlap.is_some();
+    rating.agreement.is_none_or(|agreement| agreement >= LEAST_AGREEMENT)
+        && rating.overlap.is_none_or(|overlap| overlap >= LEAST_OVERLAP)
+        && (is_measured || !frame.changes_units)
 }
 
 /// What frames are compared by: photos and masks where they say something, else what is in sight.
@@ -77,7 +90,10 @@ pub fn put_right(
     // What the source knows comes first among equals: the sort is stable.
     rated.sort_by(|a, b| merit(&b.0).total_cmp(&merit(&a.0)));
     let is_lost = as_it_is.views < FAILING_SHARE;
-    let is_wanted = |(rating, _): &&(Rating, Trial)| is_lost || is_clearly_better(rating, &as_it_is);
+    let is_wanted = |own: &&(Rating, Trial)| match is_lost {
+        true => is_credible(own),
+        false => is_clearly_better(&own.0, &as_it_is),
+    };
     let wanted: Vec<&(Rating, Trial)> = rated.iter().filter(is_wanted).collect();
     match wanted.first() {
         Some((rating, frame)) => {
@@ -204,6 +220,19 @@ mod tests {
         assert!((0.5 * (low + high) - DVec3::new(0.0, 0.0, 5.0)).length() < 0.2);
         let mut lost = mesh(DVec3::new(900.0, 0.0, 0.0));
         assert_eq!(put(&mut lost, &views, &[])[0].code, "mesh-frame-unknown");
+        // A thousandth of it would be in the sight of cameras that stand around the origin.
+        let about_origin: Vec<SourceCamera> = ring()
+            .into_iter()
+            .map(|camera| SourceCamera {
+                translation: camera.translation + camera.rotation * DVec3::new(0.0, 0.0, 5.0),
+                ..camera
+            })
+            .collect();
+        let mut findings = Vec::new();
+        let mut beside = mesh(DVec3::new(40.0, 3.0, 0.0));
+        let before = beside.positions.clone();
+        put_right(&mut beside, (&about_origin, grey(&about_origin)), &in_pixels, &[], &mut findings);
+        assert_eq!((findings[0].code, beside.positions == before), ("mesh-frame-unknown", true), "{}", findings[0]);
         let source_from_mesh = DMat4::from_translation(DVec3::new(-900.0, 0.0, 5.0));
         let own = MeshFrame { name: "own", source_from_mesh };
         let findings = put(&mut lost, &views, &[own]);

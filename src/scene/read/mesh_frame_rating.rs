@@ -158,11 +158,13 @@ pub struct Trial {
     pub name: String,
     /// `source_from_mesh`, a similarity.
     pub source_from_mesh: DMat4,
+    /// Whether it takes lengths for those of another unit: small enough, any mesh is in the sight of all cameras.
+    pub changes_units: bool,
 }
 
 impl Trial {
     fn new(name: impl Into<String>, source_from_mesh: DMat4) -> Self {
-        Trial { name: name.into(), source_from_mesh }
+        Trial { name: name.into(), source_from_mesh, changes_units: false }
     }
 }
 
@@ -177,7 +179,7 @@ pub fn known(own: &[MeshFrame]) -> Vec<Trial> {
     ];
     let units = [0.001, 0.01, 100.0, 1000.0].map(|scale| {
         let frame = DMat4::from_scale(DVec3::splat(scale));
-        Trial::new(format!("a change of units by {scale}"), frame)
+        Trial { changes_units: true, ..Trial::new(format!("a change of units by {scale}"), frame) }
     });
     let own = own.iter().filter(|frame| frame.source_from_mesh.determinant().abs() > 0.0);
     let own = own.map(|frame| Trial::new(frame.name, frame.source_from_mesh));
@@ -185,7 +187,7 @@ pub fn known(own: &[MeshFrame]) -> Vec<Trial> {
     let both = single.iter().flat_map(|second| {
         turns.iter().map(move |first| {
             let name = format!("{} and {}", first.name, second.name);
-            Trial::new(name, second.source_from_mesh * first.source_from_mesh)
+            Trial { name, source_from_mesh: second.source_from_mesh * first.source_from_mesh, ..second.clone() }
         })
     });
     single.iter().chain(&turns).cloned().chain(both).collect()

@@ -52,18 +52,28 @@ fn lower_stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
+/// The number of a folder of photos: 2 of `images_2`.
+fn number_of(folder: &str) -> Option<usize> {
+    const NAMES: [&str; 5] = ["images", "image", "photos", "rgb", "input"];
+    let (name, number) = folder.rsplit_once('_')?;
+    let is_of_photos = NAMES.iter().any(|own| own.eq_ignore_ascii_case(name));
+    number.parse().ok().filter(|_| is_of_photos)
+}
+
 /// By how much the photos of a folder are made smaller, as its name says: 2 of `images_2`.
 pub fn reduction_of(folder: &str) -> Option<usize> {
-    const NAMES: [&str; 5] = ["images", "image", "photos", "rgb", "input"];
-    let (name, factor) = folder.rsplit_once('_')?;
-    let is_of_photos = NAMES.iter().any(|own| own.eq_ignore_ascii_case(name));
-    factor.parse().ok().filter(|factor| is_of_photos && *factor > 1)
+    number_of(folder).filter(|factor| *factor > 1 && factor.is_power_of_two())
+}
+
+/// The innermost folder of a photo that is numbered, and that number.
+fn numbered(photo: &Path) -> Option<(&Path, usize)> {
+    let mut folders = photo.ancestors().skip(1);
+    folders.find_map(|folder| Some((folder, number_of(&folder.file_name()?.to_string_lossy())?)))
 }
 
 /// The innermost folder of a photo that is named after how much its photos are made smaller, and that number.
 fn reduced(photo: &Path) -> Option<(&Path, usize)> {
-    let mut folders = photo.ancestors().skip(1);
-    folders.find_map(|folder| Some((folder, reduction_of(&folder.file_name()?.to_string_lossy())?)))
+    numbered(photo).filter(|(_, factor)| *factor > 1 && factor.is_power_of_two())
 }
 
 impl PhotoIndex {
@@ -104,6 +114,12 @@ impl PhotoIndex {
             let most = candidates.iter().map(|path| agreement(path)).max()?;
             let fitting: Vec<&PathBuf> = candidates.iter().filter(|path| agreement(path) == most).collect();
             // Of two that fit alike, the one under an earlier root is meant, then the larger: images, images_2, images_4.
+            // Folders that are numbered from one, or by threes, are several cameras or times.
+            let is_other =
+                |path: &&PathBuf| numbered(self.below_root(path)).is_some() && reduced(self.below_root(path)).is_none();
+            if fitting.len() > 1 && fitting.iter().any(is_other) {
+                return None;
+            }
             let root_of = |path: &Path| self.roots.iter().position(|root| path.starts_with(root));
             let rank = |path: &Path| (root_of(path), reduced(self.below_root(path)).map_or(1, |(_, factor)| factor));
             let best = fitting.iter().map(|path| rank(path)).min()?;

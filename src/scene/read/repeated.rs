@@ -32,13 +32,14 @@ fn is_same(one: &Finding, other: &Finding) -> bool {
     key(one) == key(other) && one.remedy == other.remedy && !name_of(&one.target).is_empty()
 }
 
-/// The view or the file, without what lies within it.
+/// The view, or the file and the line where there is one, without what else lies within it.
 fn name_of(place: &Place) -> String {
     match place {
         Place::View(view) | Place::Pixel { view, .. } => view.clone(),
-        Place::File(path) | Place::Line(path, _) | Place::Byte(path, _) => {
-            path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+        Place::Line(path, line) => {
+            format!("{} line {line}", path.file_name().unwrap_or_default().to_string_lossy())
         }
+        Place::File(path) | Place::Byte(path, _) => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         _ => String::new(),
     }
 }
@@ -67,7 +68,7 @@ mod tests {
             [
                 "note [photo-negative] view 000, pixel row 1 column 2: 0 pixels are negative; likewise in 8 more: 001, 002, \
                  003, 004, 005, 006 and 2 more",
-                "note [depth] a/x.txt, line 12: not used; likewise in 1 more: y.txt",
+                "note [depth] a/x.txt, line 12: not used; likewise in 1 more: y.txt line 12",
                 "warning [held-out-unknown]: no view p",
                 "warning [held-out-unknown]: no view q",
             ]
