@@ -62,7 +62,7 @@ fn number_of(folder: &str) -> Option<usize> {
 
 /// By how much the photos of a folder are made smaller, as its name says: 2 of `images_2`.
 pub fn reduction_of(folder: &str) -> Option<usize> {
-    number_of(folder).filter(|factor| *factor > 1 && factor.is_power_of_two())
+    number_of(folder).filter(|factor| *factor > 1)
 }
 
 /// The innermost folder of a photo that is numbered, and that number.
@@ -73,7 +73,7 @@ fn numbered(photo: &Path) -> Option<(&Path, usize)> {
 
 /// The innermost folder of a photo that is named after how much its photos are made smaller, and that number.
 fn reduced(photo: &Path) -> Option<(&Path, usize)> {
-    numbered(photo).filter(|(_, factor)| *factor > 1 && factor.is_power_of_two())
+    numbered(photo).filter(|(_, factor)| *factor > 1)
 }
 
 impl PhotoIndex {
@@ -114,7 +114,7 @@ impl PhotoIndex {
             let most = candidates.iter().map(|path| agreement(path)).max()?;
             let fitting: Vec<&PathBuf> = candidates.iter().filter(|path| agreement(path) == most).collect();
             // Of two that fit alike, the one under an earlier root is meant, then the larger: images, images_2, images_4.
-            // Folders that are numbered from one, or by threes, are several cameras or times.
+            // Folders that are numbered from nought or one are those of several cameras or times.
             let is_other =
                 |path: &&PathBuf| numbered(self.below_root(path)).is_some() && reduced(self.below_root(path)).is_none();
             if fitting.len() > 1 && fitting.iter().any(is_other) {
