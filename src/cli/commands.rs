@@ -34,14 +34,11 @@ fn camera_scene(folder: &RunFolder, given: Option<&Path>, typed: &ReadOptions) -
 
 /// The same for a command without options for how a scene is read: no remedy names one.
 fn camera_scene_as_it_is(folder: &RunFolder, given: Option<&Path>) -> Result<(Scene, RunSettings)> {
-    let without_options = |error: Error| {
-        match error.remedy_text().contains(" --") {
-        true => error.with_remedy(
-            "scenes are read here as the fit read its own: change the scene, or use `patina render`, which takes the options of \
-             `patina fit`",
-        ),
+    const AS_IT_IS: &str = "scenes are read here as the fit read its own: change the scene, or use `patina render`, which takes the \
+                            options of `patina fit`";
+    let without_options = |error: Error| match error.remedy_text().contains(" --") {
+        true => error.with_remedy(AS_IT_IS),
         false => error,
-    }
     };
     camera_scene(folder, given, &ReadOptions::default()).map_err(without_options)
 }

@@ -114,12 +114,6 @@ pub fn surface_point_of_triangle(surface: &Surface, triangle: usize, weights: Ve
     exists.then(|| surface.point(&Hit { t: 0.0, triangle: triangle as u32, u: weights.x, v: weights.y }))
 }
 
-/// Row and column of the texel that holds a texture coordinate (v up), on a map of `width x height`.
-pub fn texel_of_uv(uv: Vec2, width: usize, height: usize) -> (usize, usize) {
-    let along = |place: f32, count: usize| ((place * count as f32) as usize).min(count.saturating_sub(1));
-    (along(1.0 - uv.y, height), along(uv.x, width))
-}
-
 /// Texture coordinate (v up) of the centre of a texel.
 pub fn uv_of_texel(row: usize, column: usize, width: usize, height: usize) -> Vec2 {
     Vec2::new((column as f32 + 0.5) / width as f32, 1.0 - (row as f32 + 0.5) / height as f32)

@@ -4,8 +4,9 @@
 //! over the pixel, so a point beside an edge is compared like with like. Rows come from views that see the point by
 //! [`seen_at`]; a pixel's own state says whether it is evidence.
 
-use super::cursor::{seen_at, texel_of_uv};
+use super::cursor::seen_at;
 use crate::light::environment::brightest_direction;
+use crate::material::texels::texel_of_uv;
 use crate::math::parallel;
 use crate::render::picture::PictureSettings;
 use crate::render::progressive::PictureTracer;

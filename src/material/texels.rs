@@ -236,6 +236,12 @@ impl<R: Real> TexelPyramid<R> {
     }
 }
 
+/// Row and column of the texel that holds a texture coordinate (v up), on a map of `width x height`.
+pub fn texel_of_uv(uv: Vec2, width: usize, height: usize) -> (usize, usize) {
+    let along = |place: f32, count: usize| ((place * count as f32) as usize).min(count.saturating_sub(1));
+    (along(1.0 - uv.y, height), along(uv.x, width))
+}
+
 /// Base texels of maps as files hold them.
 pub fn texels_from_maps(maps: &MaterialMaps) -> Vec<Material<f32>> {
     let pixels = maps.diffuse.pixels().iter().zip(maps.specular.pixels()).zip(maps.roughness.pixels());

@@ -162,8 +162,7 @@ pub fn render_regions(
 ) -> Picture {
     let environment = parameters.environment();
     let light = EnvironmentSampler::new(&environment);
-    let is_blurred = settings.background_visible && settings.background_blur_degrees > 0.0;
-    let out_of_focus = is_blurred.then(|| environment.out_of_focus(settings.background_blur_degrees));
+    let out_of_focus = settings.out_of_focus(&environment);
     let tracer = RegionTracer { surface, parameters, regions, light: &light, out_of_focus, settings };
     let rays = CameraRays::fresh(surface, camera, settings.filter, settings.samples);
     picture_of_groups(

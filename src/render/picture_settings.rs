@@ -1,6 +1,7 @@
 //! What can be chosen of a picture.
 
 use super::first_hits::PixelFilter;
+use crate::light::Environment;
 
 /// How a picture is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,6 +27,14 @@ pub struct PictureSettings {
     pub ground: Option<f32>,
     /// Seed of the random numbers.
     pub seed: u64,
+}
+
+impl PictureSettings {
+    /// What shows behind the surface in place of the environment; `None` where that is the environment itself, or nothing.
+    pub fn out_of_focus(&self, environment: &Environment) -> Option<Environment> {
+        let is_blurred = self.background_visible && self.background_blur_degrees > 0.0;
+        is_blurred.then(|| environment.out_of_focus(self.background_blur_degrees))
+    }
 }
 
 impl Default for PictureSettings {

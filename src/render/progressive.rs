@@ -42,8 +42,7 @@ impl<'a> PictureTracer<'a> {
     pub fn new(surface: &'a Surface, parameters: &'a Parameters<f32>, settings: PictureSettings) -> Self {
         let environment = parameters.environment();
         let sampler = EnvironmentSampler::new(&environment);
-        let is_blurred = settings.background_visible && settings.background_blur_degrees > 0.0;
-        let out_of_focus = is_blurred.then(|| environment.out_of_focus(settings.background_blur_degrees));
+        let out_of_focus = settings.out_of_focus(&environment);
         let environment = settings.ground.is_some().then_some(environment);
         PictureTracer { surface, parameters, sampler, environment, out_of_focus, settings }
     }

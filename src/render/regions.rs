@@ -2,6 +2,7 @@
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::image::{GreyImage, Image};
+use crate::material::texels::texel_of_uv;
 use crate::math::frame::Frame;
 use crate::measured::coordinates::HalfDifference;
 use crate::measured::model::ReflectanceModel;
@@ -133,9 +134,7 @@ impl Regions {
 
     /// The material at a texture coordinate, by the nearest texel; `None` where the maps hold.
     pub fn at(&self, uv: Vec2) -> Option<&MeasuredMaterial> {
-        let (width, height) = (self.labels.width(), self.labels.height());
-        let place = |value: f32, count: usize| ((value * count as f32).max(0.0) as usize).min(count - 1);
-        let label = self.labels[(place(1.0 - uv.y, height), place(uv.x, width))];
+        let label = self.labels[texel_of_uv(uv, self.labels.width(), self.labels.height())];
         self.materials.get(usize::from(label).checked_sub(1)?)
     }
 

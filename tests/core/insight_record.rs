@@ -6,11 +6,11 @@ use super::common::*;
 use glam::{Vec2, Vec3};
 use patina::image::Image;
 use patina::insight::cursor::{
-    UvIndex, place_in_view, point_of_pixel, seen_at, surface_point_of_triangle, surface_point_of_uv, texel_of_uv,
-    uv_of_texel,
+    UvIndex, place_in_view, point_of_pixel, seen_at, surface_point_of_triangle, surface_point_of_uv, uv_of_texel,
 };
 use patina::insight::record::{RecordSettings, texel_record};
 use patina::job::pictures::parameters;
+use patina::material::texels::texel_of_uv;
 use patina::render::Surface;
 use patina::render::picture::PictureSettings;
 use patina::scene::demo::{DemoSettings, build};

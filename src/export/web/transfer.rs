@@ -6,6 +6,7 @@
 use crate::error::Result;
 use crate::image::RgbImage;
 use crate::light::Environment;
+use crate::material::texels::texel_of_uv;
 use crate::math::frame::{Frame, sample_cosine_hemisphere};
 use crate::math::parallel;
 use crate::math::sphere::{direction_of_texel, solid_angle_of_texel};
@@ -141,7 +142,7 @@ impl<'a> Gatherer<'a> {
                 continue;
             }
             let uv: Vec2 = there().map(|(corner, weight)| weight * self.mesh.uvs[corner]).sum();
-            let albedo = self.diffuse_at(uv).to_array();
+            let albedo = self.diffuse[texel_of_uv(uv, self.diffuse.width(), self.diffuse.height())].to_array();
             for (corner, weight) in there().filter(|(corner, _)| *corner < all.len()) {
                 let own = &all[corner];
                 for (channel, sums) in sums.iter_mut().enumerate() {
@@ -154,13 +155,6 @@ impl<'a> Gatherer<'a> {
             }
         }
         sums
-    }
-
-    /// Diffuse reflectance of the texel at these texture coordinates.
-    fn diffuse_at(&self, uv: Vec2) -> Vec3 {
-        let (width, height) = (self.diffuse.width(), self.diffuse.height());
-        let place = |share: f32, count: usize| ((share * count as f32).max(0.0) as usize).min(count - 1);
-        self.diffuse[(place(1.0 - uv.y, height), place(uv.x, width))]
     }
 }
 

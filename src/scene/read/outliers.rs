@@ -88,16 +88,16 @@ pub fn leave_out(mesh: &mut SourceMesh) {
         corners.dedup();
         corners
     };
-    let few = |corners: &[usize], share: f64| corners.len() as f64 <= (share * points.len() as f64).max(1.0);
+    let are_few = |count: usize, share: f64| count as f64 <= (share * points.len() as f64).max(1.0);
     // Spikes go with what is far where both are few; where spikes are many, what is far goes alone.
     let mut is_stray: &dyn Fn(&[u32; 3]) -> bool = &is_far_or_spike;
     let mut far = corners_of(is_stray, SPIKE_DISTANCES);
     let spikes = far.iter().filter(|&&vertex| outwards(vertex as u32) <= FAR_DISTANCES).count();
-    if spikes as f64 > (LARGEST_SHARE * points.len() as f64).max(1.0) {
+    if !are_few(spikes, LARGEST_SHARE) {
         is_stray = &is_far;
         far = corners_of(is_stray, FAR_DISTANCES);
     }
-    if far.is_empty() || !few(&far, LARGEST_FAR_SHARE) {
+    if far.is_empty() || !are_few(far.len(), LARGEST_FAR_SHARE) {
         return;
     }
     let before = mesh.triangles.len();

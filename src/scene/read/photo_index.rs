@@ -115,9 +115,9 @@ impl PhotoIndex {
             let fitting: Vec<&PathBuf> = candidates.iter().filter(|path| agreement(path) == most).collect();
             // Of two that fit alike, the one under an earlier root is meant, then the larger: images, images_2, images_4.
             // Folders that are numbered from nought or one are those of several cameras or times.
-            let is_other =
-                |path: &&PathBuf| numbered(self.below_root(path)).is_some() && reduced(self.below_root(path)).is_none();
-            if fitting.len() > 1 && fitting.iter().any(is_other) {
+            let is_of_several =
+                |path: &&PathBuf| numbered(self.below_root(path)).is_some_and(|(_, number)| number <= 1);
+            if fitting.len() > 1 && fitting.iter().any(is_of_several) {
                 return None;
             }
             let root_of = |path: &Path| self.roots.iter().position(|root| path.starts_with(root));
