@@ -269,14 +269,6 @@ impl Asset {
         let has_metals = self.has_lobe && brightest() * 1000 > self.maps.specular.pixels().len();
         has_metals.then(|| self.metal_split(DielectricRange::UpTo(LARGEST_SPECULAR)))
     }
-
-    /// A quantile of the luminance of F0, in [0, 1].
-    pub fn f0_quantile(&self, quantile: f64) -> f32 {
-        let step = (self.maps.specular.pixels().len() / 65_536).max(1);
-        let sampled = self.maps.specular.pixels().iter().step_by(step);
-        let values: Vec<f64> = sampled.map(|&f0| f64::from(crate::math::luminance(f0))).collect();
-        crate::math::statistics::quantile(&values, quantile) as f32
-    }
 }
 
 /// The share that is no metal: the smaller root of `d u^2 - (F0 + diffuse) u + diffuse = 0`, for `F0 > d`.

@@ -2,17 +2,17 @@
 //!
 //! The material is a `UsdPreviewSurface` with a variant set `workflow`. `specular` takes diffuse reflectance, F0 and
 //! roughness as they are; but few importers know that workflow, and Blender reads its colour as a factor of F0. So
-//! `metalness` is chosen at first: one F0 for what is no metal, metalness for the rest. Readers of that workflow pass over a
-//! specular colour; Blender multiplies F0 of what is no metal by it, so it holds what one F0 and metalness leave wrong.
+//! `metalness` is chosen at first, and says what the [`gltf`](super::gltf) says: base colour, metalness where the surface has
+//! metals, and F0 of what is none as a colour over that of [`LOW_IOR`]. Readers that pass over that colour in this workflow,
+//! as its text asks, show the index alone: they do better with `specular`.
 //! Texture coordinates point up, as in Patina; the dome light's left border looks along -z, as in Patina.
 
-use super::asset::{Asset, DielectricRange, GRAZING_OF_HALF_VECTORS, LARGEST_SPECULAR, MetalSplit, ior_of};
+use super::asset::{Asset, GRAZING_OF_HALF_VECTORS, LOW_IOR, MetalSplit};
 use super::environment_file::smooth;
 use super::texture::{Curve, Texture};
 use crate::error::{Error, ErrorKind, Result};
 use crate::files::{write_atomically, write_bytes};
 use crate::image::file::write_exr_rgb;
-use crate::image::{Image, RgbImage};
 use glam::Vec3;
 use std::fmt::Write as _;
 use std::io::Write;
@@ -26,20 +26,24 @@ use std::path::Path;
 pub fn write(asset: &Asset, folder: &Path, sixteen_bits: bool) -> Result<(f64, Option<MetalSplit>)> {
     let png = |texture: Texture, curve: Curve| texture.png(curve, sixteen_bits);
     let mut files = vec![("textures/diffuse.png", png(Texture::Rgb(&asset.maps.diffuse), Curve::Srgb)?)];
-    let split = asset.has_lobe.then(|| asset.metal_split(DielectricRange::UpTo(LARGEST_SPECULAR)));
-    // Of all that is no metal, for readers that pass over its colour; low, since Cycles takes from diffuse light by the
-    // index of refraction alone.
-    let one_f0 = asset.f0_quantile(0.5).clamp(LARGEST_SPECULAR / LARGEST_TINT, HIGHEST_F0);
-    let mut held_share = 0.0;
-    if let Some(split) = &split {
-        let (base_colour, held) =
-            split.base_colour_under_fresnel(GRAZING_OF_HALF_VECTORS, Some(&asset.perceptual_roughness()));
+    let metals = asset.metals();
+    let (mut held_share, mut lobe) = (0.0, None);
+    if asset.has_lobe {
+        let roughness = asset.perceptual_roughness();
+        let (base_colour, held) = match &metals {
+            Some(split) => split.base_colour_under_fresnel(GRAZING_OF_HALF_VECTORS, Some(&roughness)),
+            None => asset.diffuse_under_fresnel(GRAZING_OF_HALF_VECTORS),
+        };
         held_share = held;
+        let dielectric = asset.dielectric_beside(metals.as_ref());
+        lobe = Some(Metalness { has_metals: metals.is_some(), tint_scale: dielectric.factor_over(LOW_IOR) });
         files.push(("textures/base_color.png", png(Texture::Rgb(&base_colour), Curve::Srgb)?));
-        files.push(("textures/metallic.png", png(Texture::Grey(&split.metallic), Curve::Linear)?));
-        files.push(("textures/tint.png", png(Texture::Rgb(&tint(asset, split, one_f0)), Curve::Srgb)?));
+        if let Some(split) = &metals {
+            files.push(("textures/metallic.png", png(Texture::Grey(&split.metallic), Curve::Linear)?));
+        }
+        files.push(("textures/tint.png", png(Texture::Rgb(&dielectric.colour), Curve::Srgb)?));
         files.push(("textures/specular.png", png(Texture::Rgb(&asset.maps.specular), Curve::Srgb)?));
-        files.push(("textures/roughness.png", png(Texture::Grey(&asset.perceptual_roughness()), Curve::Linear)?));
+        files.push(("textures/roughness.png", png(Texture::Grey(&roughness), Curve::Linear)?));
     }
     for (name, bytes) in &files {
         write_bytes(&folder.join(name), bytes)?;
@@ -50,36 +54,26 @@ pub fn write(asset: &Asset, folder: &Path, sixteen_bits: bool) -> Result<(f64, O
         let path = folder.join(name);
         files.push((name, std::fs::read(&path).map_err(|source| Error::reading(&path, source))?));
     }
-    let stage = stage(asset, split.as_ref().map(|_| ior_of(one_f0))).into_bytes();
+    let stage = stage(asset, lobe).into_bytes();
     let name = format!("{}.usda", asset.name);
     write_bytes(&folder.join(&name), &stage)?;
     let mut members: Vec<(&str, &[u8])> = vec![(&name, &stage)];
     members.extend(files.iter().map(|(name, bytes)| (*name, bytes.as_slice())));
     package(&folder.join(format!("{}.usdz", asset.name)), &members)?;
-    Ok((held_share, split))
+    Ok((held_share, metals))
 }
 
-/// The highest F0 that an index of refraction is chosen for.
-const HIGHEST_F0: f32 = 0.03;
-/// The largest factor of F0 that a tint holds; the texture is over it.
-const LARGEST_TINT: f32 = 4.0;
-
-/// By what `one_f0`, that of what is no metal, is multiplied so that, with the metal's share, it is the fitted one; over its largest.
-/// Where all is metal it is 1: a renderer that tints metals too would dim them towards grazing angles.
-fn tint(asset: &Asset, split: &MetalSplit, one_f0: f32) -> RgbImage {
-    let texels = asset.maps.specular.pixels().iter().zip(split.base_colour.pixels()).zip(split.metallic.pixels());
-    let pixels = texels
-        .map(|((f0, base), &metal)| {
-            let share = (1.0 - metal).max(1e-3);
-            let wanted = (*f0 - *base * metal) / (share * one_f0);
-            Vec3::ONE.lerp(wanted.clamp(Vec3::ZERO, Vec3::splat(LARGEST_TINT)), 1.0 - metal) / LARGEST_TINT
-        })
-        .collect();
-    Image::from_pixels(split.metallic.width(), split.metallic.height(), pixels)
+/// What the metalness workflow holds where there is a lobe.
+#[derive(Clone, Copy)]
+struct Metalness {
+    /// Whether there is a map of the share of metal; else there is none.
+    has_metals: bool,
+    /// What the texture of the tint is multiplied by.
+    tint_scale: f32,
 }
 
-/// The stage as text; `ior` is the index of refraction of what is no metal, `None` without a lobe.
-fn stage(asset: &Asset, ior: Option<f64>) -> String {
+/// The stage as text; `lobe` is `None` without one.
+fn stage(asset: &Asset, lobe: Option<Metalness>) -> String {
     let name = &asset.name;
     let mesh = &asset.mesh;
     let mut text = format!(
@@ -111,7 +105,7 @@ fn stage(asset: &Asset, ior: Option<f64>) -> String {
         "        uniform token subdivisionScheme = \"none\"\n    }\n".into(),
     ];
     text.push_str(&lines.join("\n"));
-    text.push_str(&material(&asset.name, ior));
+    text.push_str(&material(&asset.name, lobe));
     if asset.light.is_some() {
         text.push_str(
             "\n    def DomeLight \"environment\"\n    {\n        float inputs:intensity = 1\n        \
@@ -123,9 +117,9 @@ fn stage(asset: &Asset, ior: Option<f64>) -> String {
     text
 }
 
-fn material(name: &str, ior: Option<f64>) -> String {
+fn material(name: &str, lobe: Option<Metalness>) -> String {
     let path = format!("/{name}/material");
-    let variants = match ior {
+    let variants = match lobe {
         Some(_) => {
             "\n        prepend variantSets = \"workflow\"\n        variants = {\n            string workflow = \"metalness\"\n        }\n    "
         }
@@ -136,7 +130,7 @@ fn material(name: &str, ior: Option<f64>) -> String {
         "\n    def Material \"material\"{variants}\n    {{\n        token outputs:surface.connect = <{path}/surface.outputs:surface>\n\n        \
          def Shader \"surface\"\n        {{\n            uniform token info:id = \"UsdPreviewSurface\"\n"
     );
-    match ior {
+    match lobe {
         // What differs between the workflows stands in their variants.
         Some(_) => {
             let _ = writeln!(text, "            float inputs:roughness.connect = <{path}/roughness.outputs:r>");
@@ -155,7 +149,7 @@ fn material(name: &str, ior: Option<f64>) -> String {
          def Shader \"coordinates\"\n        {\n            uniform token info:id = \"UsdPrimvarReader_float2\"\n            \
          string inputs:varname = \"st\"\n            float2 outputs:result\n        }\n",
     );
-    let Some(ior) = ior else {
+    let Some(lobe) = lobe else {
         return text + &texture(&path, "diffuse", Kind::Colour, "        ") + "    }\n";
     };
     text += &texture(&path, "roughness", Kind::Value, "        ");
@@ -164,18 +158,22 @@ fn material(name: &str, ior: Option<f64>) -> String {
         let lines: String = lines.iter().map(|line| format!("{deep}    {line}\n")).collect();
         format!("{deep}over \"surface\"\n{deep}{{\n{lines}{deep}}}\n")
     };
-    let metalness = over(&[
+    let mut metalness = over(&[
         format!("color3f inputs:diffuseColor.connect = <{path}/base_color.outputs:rgb>"),
-        format!("float inputs:ior = {ior:.4}"),
-        format!("float inputs:metallic.connect = <{path}/metallic.outputs:r>"),
+        format!("float inputs:ior = {LOW_IOR}"),
+        match lobe.has_metals {
+            true => format!("float inputs:metallic.connect = <{path}/metallic.outputs:r>"),
+            false => "float inputs:metallic = 0".into(),
+        },
         format!("color3f inputs:specularColor.connect = <{path}/tint.outputs:rgb>"),
         "int inputs:useSpecularWorkflow = 0".into(),
-    ]) + &texture(&path, "base_color", Kind::Colour, deep)
-        + &texture(&path, "metallic", Kind::Value, deep)
-        + &texture(&path, "tint", Kind::Scaled(LARGEST_TINT), deep);
+    ]) + &texture(&path, "base_color", Kind::Colour, deep);
+    if lobe.has_metals {
+        metalness += &texture(&path, "metallic", Kind::Value, deep);
+    }
+    metalness += &texture(&path, "tint", Kind::Scaled(lobe.tint_scale), deep);
     let specular = over(&[
         format!("color3f inputs:diffuseColor.connect = <{path}/diffuse.outputs:rgb>"),
-        format!("float inputs:ior = {ior:.4}"),
         format!("color3f inputs:specularColor.connect = <{path}/specular.outputs:rgb>"),
         "int inputs:useSpecularWorkflow = 1".into(),
     ]) + &texture(&path, "diffuse", Kind::Colour, deep)
@@ -286,9 +284,14 @@ mod tests {
     #[test]
     fn the_stage_names_every_texture_and_balances_its_braces() {
         let folder = tempfile::tempdir().unwrap();
-        for has_lobe in [true, false] {
-            let asset = small_asset(has_lobe);
-            let text = stage(&asset, has_lobe.then_some(1.5));
+        for (name, has_lobe, has_metals) in [("bare", false, false), ("paint", true, false), ("metal", true, true)] {
+            let mut asset = small_asset(has_lobe);
+            if has_metals {
+                asset.maps.specular.pixels_mut()[..40].fill(Vec3::new(0.9, 0.7, 0.3));
+            }
+            let place = folder.path().join(name);
+            assert_eq!(write(&asset, &place, true).unwrap().1.is_some(), has_metals);
+            let text = std::fs::read_to_string(place.join("a_run.usda")).unwrap();
             assert_eq!(text.matches('{').count(), text.matches('}').count());
             assert_eq!(text.matches('(').count(), text.matches(')').count());
             assert!(text.contains("point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]"));
@@ -296,36 +299,13 @@ mod tests {
             assert!(text.contains("int inputs:useSpecularWorkflow = 1"));
             assert_eq!(text.contains("specularColor.connect"), has_lobe);
             assert_eq!(text.contains("string workflow = \"metalness\""), has_lobe);
+            assert_eq!(text.contains("inputs:metallic = 0"), has_lobe && !has_metals);
             assert_eq!(text.matches("def Shader \"diffuse\"").count(), 1);
             assert_eq!(text.contains("specularColor = (0, 0, 0)"), !has_lobe);
-            let place = folder.path().join(format!("{has_lobe}"));
-            assert_eq!(write(&asset, &place, true).unwrap().1.is_some(), has_lobe);
             for reference in text.split('@').skip(1).step_by(2) {
                 assert!(place.join(reference).is_file(), "{reference}");
             }
         }
-    }
-
-    #[test]
-    fn a_tint_makes_up_for_what_one_f0_and_metalness_leave_wrong() {
-        let mut asset = small_asset(true);
-        // A coloured F0 over blue paint, of which a base colour can say but one.
-        asset.maps.diffuse.pixels_mut().fill(Vec3::new(0.1, 0.2, 0.6));
-        asset.maps.specular.pixels_mut().fill(Vec3::new(0.09, 0.05, 0.04));
-        let split = asset.metal_split(DielectricRange::Always(0.04));
-        let wrong = |tint: Vec3, texel: usize| {
-            let (base, metal) = (split.base_colour.pixels()[texel], split.metallic.pixels()[texel]);
-            let found = base * metal + tint * split.dielectric_f0 * (1.0 - metal);
-            (found - asset.maps.specular.pixels()[texel]).length()
-        };
-        let tint = tint(&asset, &split, 0.04).pixels()[40] * LARGEST_TINT;
-        // The share of metal is left untinted.
-        assert!(wrong(tint, 40) < 0.4 * wrong(Vec3::ONE, 40), "{} {}", wrong(tint, 40), wrong(Vec3::ONE, 40));
-        // A metal keeps its rise towards grazing angles.
-        asset.maps.diffuse.pixels_mut().fill(Vec3::ZERO);
-        asset.maps.specular.pixels_mut().fill(Vec3::new(0.9, 0.7, 0.3));
-        let metal = super::tint(&asset, &asset.metal_split(DielectricRange::Always(0.04)), 0.04);
-        assert!((metal.pixels()[40] * LARGEST_TINT - Vec3::ONE).length() < 0.01);
     }
 
     #[test]
@@ -340,7 +320,7 @@ mod tests {
         let end = bytes.len() - 22;
         assert_eq!(&bytes[end..end + 4], b"PK\x05\x06");
         let (count, mut entry) = (word(end + 10), long(end + 16));
-        assert_eq!((entry + long(end + 12), count), (end, 8));
+        assert_eq!((entry + long(end + 12), count), (end, 7));
         for _ in 0..count {
             assert_eq!(&bytes[entry..entry + 4], b"PK\x01\x02");
             let (size, name_length, local) = (long(entry + 24), word(entry + 28), long(entry + 42));

@@ -97,9 +97,9 @@ impl Format {
 }
 
 const GGX: &str = "the Blinn-Phong lobe becomes the nearest GGX lobe";
-const OF_METALNESS: &str = "base colour and metalness stand for the specular map in the variant that is chosen at first, where readers that pass over a specular colour \
-    have one F0 for all that is no metal; the variant \
-    `specular` holds the maps as fitted, for importers that know that workflow";
+const OF_METALNESS: &str = "the variant that is chosen at first says F0 as a colour over that of an index of refraction of 1.3, and metalness where there \
+    are metals; readers that pass over this colour show 0.017 for all that is no metal; the variant `specular` holds the maps \
+    as fitted, for importers that know that workflow";
 const WEB_SHOWS: &str = "the page shows the fitted lobe by maps blurred beforehand: no sharp shadows but those of the sun, soft ones and light \
      between surfaces by what each vertex gets of the light in nine spherical harmonics";
 
@@ -366,12 +366,9 @@ fn write_format(format: Format, asset: &Asset, folder: &Path, textures: TextureF
             ("glTF 2.0", GLB_FILES, with_metals(lobe, glb.held_share, glb.metals.as_ref()))
         }
         Format::Usd => {
-            let (held_share, split) = usd::write(asset, folder, sixteen_bits)?;
-            let losses = match &split {
-                Some(split) => lobe.and_held(held_share).and_split(split).and(OF_METALNESS),
-                None => lobe,
-            };
-            ("USD", USD_FILES, losses)
+            let (held_share, metals) = usd::write(asset, folder, sixteen_bits)?;
+            let losses = with_metals(lobe, held_share, metals.as_ref());
+            ("USD", USD_FILES, if asset.has_lobe { losses.and(OF_METALNESS) } else { losses })
         }
         Format::Mitsuba => {
             mitsuba::write(asset, folder)?;
