@@ -236,6 +236,10 @@ pub struct Finding {
     pub target: Place,
     /// What the user can do; may be empty.
     pub remedy: String,
+    /// How much there is of it, in the unit of its message: pixels, a share, a distance. Of several that become one line the
+    /// one with the most is told. 0 where nothing is measured.
+    #[serde(skip)]
+    pub extent: f64,
 }
 
 impl Finding {
@@ -248,6 +252,7 @@ impl Finding {
             place: String::new(),
             target: Place::Nowhere,
             remedy: String::new(),
+            extent: 0.0,
         }
     }
 
@@ -261,6 +266,12 @@ impl Finding {
     /// The same finding with a remedy.
     pub fn remedy(mut self, remedy: impl Into<String>) -> Self {
         self.remedy = remedy.into();
+        self
+    }
+
+    /// The same finding with how much there is of it: of several that become one line the one with the most is told.
+    pub fn extent(mut self, extent: f64) -> Self {
+        self.extent = extent;
         self
     }
 }

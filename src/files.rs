@@ -6,6 +6,21 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+/// The folder that a file lies in: of a bare name the current one, `.`, which can be listed where an empty path cannot.
+pub fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// The name of a folder, also of one that its path does not name: `.`, `..`, an empty path. Empty for a root.
+pub fn name_of_folder(folder: &Path) -> String {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let whole = match folder.file_name() {
+        Some(_) => folder.to_path_buf(),
+        None => std::fs::canonicalize(folder).unwrap_or_default(),
+    };
+    whole.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
 /// Writes a file under a temporary name beside its place, flushes it to the disk and renames it.
 ///
 /// Whatever was at `path` before stays until the new file is complete: a full disk or a killed process loses nothing.
@@ -99,5 +114,21 @@ mod tests {
         assert!(error.is_err());
         assert_eq!(std::fs::read(&path).unwrap(), b"old");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "the temporary file is gone");
+    }
+
+    #[test]
+    fn a_bare_name_lies_in_the_current_folder_which_has_a_name() {
+        for (file, folder) in [("a.sfm", "."), ("./a.sfm", "."), ("x/a.sfm", "x"), ("/a.sfm", "/"), ("../a.sfm", "..")]
+        {
+            assert_eq!(folder_of(Path::new(file)), Path::new(folder), "{file}");
+        }
+        let current = std::env::current_dir().unwrap();
+        let name = |folder: &Path| folder.file_name().unwrap().to_string_lossy().into_owned();
+        for path in ["", ".", "./."] {
+            assert_eq!(name_of_folder(Path::new(path)), name(&current), "{path}");
+        }
+        assert_eq!(name_of_folder(Path::new("..")), name(current.parent().unwrap()));
+        assert_eq!(name_of_folder(Path::new("far/away")), "away");
+        assert!(std::fs::read_dir(folder_of(Path::new("Cargo.toml"))).is_ok());
     }
 }

@@ -26,21 +26,12 @@ fn camera_scene(folder: &RunFolder, given: Option<&Path>, typed: &ReadOptions) -
     if path.as_os_str().is_empty() {
         let seed = settings.fit.seed;
         let demo = crate::scene::demo::build(&crate::scene::demo::DemoSettings { seed, ..Default::default() })?;
-        return Ok((demo.scene, settings));
+        let (mut scene, factor) = (demo.scene, typed.settings().shrink.max(1));
+        scene.views.iter_mut().for_each(|view| view.camera = view.camera.shrunk(factor));
+        return Ok((scene, settings));
     }
     let read = typed.over(settings.read.clone());
     Ok((crate::scene::read(&path, &read)?, settings))
-}
-
-/// The same for a command without options for how a scene is read: no remedy names one.
-fn camera_scene_as_it_is(folder: &RunFolder, given: Option<&Path>) -> Result<(Scene, RunSettings)> {
-    const AS_IT_IS: &str = "scenes are read here as the fit read its own: change the scene, or use `patina render`, which takes the \
-                            options of `patina fit`";
-    let without_options = |error: Error| match error.remedy_text().contains(" --") {
-        true => error.with_remedy(AS_IT_IS),
-        false => error,
-    };
-    camera_scene(folder, given, &ReadOptions::default()).map_err(without_options)
 }
 
 /// Indices of the named views; `otherwise` chooses when none is named.
@@ -91,7 +82,7 @@ fn tell_non_finite(picture: &Picture, name: &str, json: bool) {
 /// Renders a run under other lights.
 pub fn relight(options: &RelightOptions, json: bool) -> Result<()> {
     let folder = RunFolder::open(&options.run)?;
-    let (scene, settings) = camera_scene_as_it_is(&folder, options.cameras.as_deref())?;
+    let (scene, settings) = camera_scene(&folder, options.cameras.as_deref(), &options.read)?;
     let result = folder.read_result()?;
     let (surface, own) = surface_of(&result)?;
     let output = options.output.clone().unwrap_or_else(|| folder.path().join("relight"));
@@ -125,7 +116,7 @@ pub fn relight(options: &RelightOptions, json: bool) -> Result<()> {
                 return Err(Error::new(ErrorKind::InvalidScene, "the scene has no view for the camera to start from")
                     .remedy("name a scene with cameras: --cameras SCENE"));
             };
-            let start = scene.views[first].camera.shrunk(options.shrink.max(1));
+            let start = scene.views[first].camera;
             let lit = Parameters::new(own.texels.clone(), &light);
             let folder = output.join(format!("turntable_{stem}"));
             let (turn, exposure, picture) = (&options.turntable, options.exposure, &picture_settings);
@@ -136,7 +127,7 @@ pub fn relight(options: &RelightOptions, json: bool) -> Result<()> {
             continue;
         }
         for &view in &views {
-            let camera = scene.views[view].camera.shrunk(options.shrink.max(1));
+            let camera = scene.views[view].camera;
             let stop = AtomicBool::new(false);
             let picture = match &regions {
                 Some(regions) => {
@@ -155,6 +146,21 @@ pub fn relight(options: &RelightOptions, json: bool) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// That a background is to be blurred where none is drawn.
+fn blur_without_effect(degrees: f32, background: Background, is_lit: bool) -> Option<Finding> {
+    let why = match (background, is_lit) {
+        _ if degrees == 0.0 => return None,
+        (Background::Environment, true) => return None,
+        (Background::Environment, false) => "no layer is lit",
+        (Background::Black, _) => "the scene has no background",
+    };
+    let message = format!("{why}: --background-blur has no effect");
+    Some(Finding::new(Severity::Warning, "blur-without-effect", message).remedy(match background {
+        Background::Environment => "leave it out, or add --aov shaded",
+        Background::Black => "leave it out, or show the environment with --scene-background environment",
+    }))
 }
 
 /// Renders pictures and layers of a run, or of the truth of an exchange folder.
@@ -188,12 +194,13 @@ pub fn render(options: &RenderOptions, json: bool) -> Result<()> {
         seed: options.seed,
         ..Default::default()
     };
+    let is_lit = options.aov.iter().any(|layer| matches!(layer, Layer::Shaded | Layer::Variance));
+    tell_findings(blur_without_effect(options.background_blur, scene.background, is_lit).as_slice(), json);
     for view in chosen_views(&scene, &options.views, |scene| (0..scene.views.len()).collect())? {
         let camera = &scene.views[view].camera;
         let name = &scene.views[view].name;
         let path = |layer: &str| output.join(format!("{name}_{layer}.exr"));
-        let needs_light = options.aov.iter().any(|layer| matches!(layer, Layer::Shaded | Layer::Variance));
-        let shaded = needs_light
+        let shaded = is_lit
             .then(|| render_picture(&surface, camera, &own, view as u32, &picture_settings, &AtomicBool::new(false)));
         if let Some(picture) = &shaded {
             tell_non_finite(picture, name, json);
@@ -305,4 +312,19 @@ pub fn compare(options: &CompareOptions, json: bool) -> Result<()> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_blur_of_no_background_is_told() {
+        let told =
+            |degrees, background, is_lit| blur_without_effect(degrees, background, is_lit).map(|own| own.message);
+        assert_eq!(told(20.0, Background::Environment, true), None);
+        assert_eq!(told(0.0, Background::Black, false), None);
+        assert!(told(20.0, Background::Black, true).is_some_and(|message| message.contains("--background-blur")));
+        assert!(told(20.0, Background::Environment, false).is_some_and(|message| message.contains("no layer")));
+    }
 }

@@ -5,6 +5,7 @@ use super::summary::summarise;
 use crate::error::{Error, ErrorKind, Result};
 use crate::export::RunFolder;
 use crate::export::run_folder::new_run_folder;
+use crate::files::{folder_of, name_of_folder};
 use crate::fit::{FitSettings, Method};
 use crate::job::advance::{Advance, FIRST_RATIO};
 use crate::job::open::{self, OpenStage, Tell};
@@ -79,9 +80,8 @@ fn within(seconds: Option<f64>) -> JobOptions {
 /// Where a run goes that no folder was named for: `runs/SCENE-1`, `runs/SCENE-2`, ... where the program was started.
 fn usual_run_folder(scene: &Path) -> PathBuf {
     // A manifest is known by the folder it lies in.
-    let named = if scene.is_file() { scene.parent().unwrap_or(scene) } else { scene };
-    let name = named.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    new_run_folder(Path::new("runs"), &name)
+    let named = if scene.is_file() { folder_of(scene) } else { scene };
+    new_run_folder(Path::new("runs"), &name_of_folder(named))
 }
 
 /// Settings that are asked for, before they are resolved for a scene.

@@ -9,6 +9,7 @@ use crate::error::{Finding, Place, Severity};
 use crate::fit::ViewUse;
 use crate::insight::report::images::ViewPictures;
 use crate::math::statistics::{Moments, quantile};
+use crate::scene::doctor::worst_first;
 
 /// Where the middle training photo is explained by less than this, the fit as a whole is not to be believed.
 const LEAST_MIDDLE: f64 = 0.5;
@@ -37,14 +38,16 @@ pub(super) fn finding(views: &[ScoredView]) -> Option<Finding> {
              or the surface is outside the model, such as a mirror or glass",
         ));
     }
-    let bad: Vec<&str> = shares.iter().filter(|(share, _)| *share < LEAST_OF_ONE).map(|(_, name)| *name).collect();
+    let bad = shares.iter().filter(|(share, _)| *share < LEAST_OF_ONE).map(|&(share, name)| (-share, name)).collect();
+    let (worst, bad) = worst_first(bad)?;
     let &first = bad.first()?;
     let listed = bad.iter().take(SHOWN).copied().collect::<Vec<_>>().join(", ");
     let more = if bad.len() > SHOWN { format!(" and {} more", bad.len() - SHOWN) } else { String::new() };
     let message = format!(
-        "the fit does not explain {} training photos (it reproduces {percent:.0} % of the variation of the \
-         median one): {listed}{more}",
-        bad.len()
+        "the fit does not explain {} training photos (it reproduces {:.0} % of the variation of the first and {percent:.0} % \
+         of that of the median one): {listed}{more}",
+        bad.len(),
+        (-100.0 * worst).max(0.0)
     );
     Some(
         Finding::new(Severity::Warning, "photos-not-explained", message)

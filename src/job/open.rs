@@ -13,6 +13,7 @@ pub use super::stages::{OpenStage, Tell};
 pub use super::view::{OpenedRun, view_run};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::export::RunFolder;
+use crate::files::folder_of;
 use crate::fit::{Fitter, KnownMaps, Method, checkpoint};
 use crate::light::Environment;
 use std::path::Path;
@@ -39,18 +40,18 @@ pub fn kind_of(path: &Path) -> Result<PathKind> {
         return Ok(PathKind::Run);
     }
     // Of a run folder, settings.toml is no manifest.
-    let in_run = path.is_file() && path.parent().is_some_and(is_run);
+    let in_run = path.is_file() && is_run(folder_of(path));
     if !in_run {
         let missing = match crate::scene::read::locate(path) {
             Ok(_) => return Ok(PathKind::Scene),
             Err(error) => error,
         };
-        let in_scene = path.is_file() && path.parent().is_some_and(|folder| crate::scene::read::locate(folder).is_ok());
+        let in_scene = path.is_file() && crate::scene::read::locate(folder_of(path)).is_ok();
         if !in_scene {
             return Err(missing);
         }
     }
-    let folder = path.parent().unwrap_or(path);
+    let folder = folder_of(path);
     Err(Error::new(ErrorKind::Unsupported, "this is a single file of a run or a scene")
         .at(Place::File(path.into()))
         .remedy(format!("open its folder: {}", folder.display())))

@@ -5,7 +5,7 @@ use super::observations::ObjectView;
 use super::outline::{OutlineCircle, circle_of};
 use super::photo::ObjectPhoto;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
-use crate::image::file;
+use crate::image::file::{self, MaskFile, MaskValues, MaskWay};
 use crate::scene::read::source::SourceCamera;
 use crate::scene::read::world::{up_in_source, world_from_source};
 use crate::scene::read::{camera_file, mesh_file};
@@ -52,12 +52,15 @@ pub fn read_views(files: &ObjectFiles) -> Result<(Vec<ObjectView>, Vec<Finding>)
         return Err(wrong("normals", message).remedy("give one a photo, in the same order"));
     }
     let mut findings = Vec::new();
+    let masks = files.masks.iter().map(|path| MaskFile::open(path)).collect::<Result<Vec<_>>>()?;
+    let way = MaskWay::of_set(masks.iter().map(MaskFile::facts));
+    let mut masks = files.masks.iter().zip(masks);
     let mut photos = Vec::new();
-    for (index, path) in files.photos.iter().enumerate() {
+    for path in &files.photos {
         let (mut photo, mut noticed) = ObjectPhoto::read(path)?;
         findings.append(&mut noticed);
-        if let Some(mask) = files.masks.get(index) {
-            let (values, told) = file::read_mask(mask)?;
+        if let Some((mask, file)) = masks.next() {
+            let MaskValues { values, told, .. } = file.into_values(way);
             findings.extend(told.map(|told| told.at(Place::File(mask.clone()))));
             photo.apply_mask(&values, Place::File(mask.clone()))?;
         }
@@ -97,7 +100,8 @@ fn sphere_in(photo: &ObjectPhoto, has_mask: bool, findings: &mut Vec<Finding>) -
                 circle = found;
                 if filling.distance(&found) > OFF {
                     let message = format!("the ball is taken to be where its mask is: {}", in_words(&found));
-                    findings.push(Finding::new(Severity::Note, "sphere-from-mask", message).at(place()));
+                    let told = Finding::new(Severity::Note, "sphere-from-mask", message).at(place());
+                    findings.push(told.extent(filling.distance(&found)));
                 }
             }
             found => {
@@ -109,7 +113,8 @@ fn sphere_in(photo: &ObjectPhoto, has_mask: bool, findings: &mut Vec<Finding>) -
                 findings.push(
                     Finding::new(Severity::Warning, "sphere-mask-not-round", message)
                         .at(place())
-                        .remedy("mask the whole ball and nothing else, or give the shape with --mesh or --normals"),
+                        .remedy("mask the whole ball and nothing else, or give the shape with --mesh or --normals")
+                        .extent(100.0 - on),
                 );
             }
         }
@@ -123,7 +128,8 @@ fn sphere_in(photo: &ObjectPhoto, has_mask: bool, findings: &mut Vec<Finding>) -
         findings.push(
             Finding::new(Severity::Warning, "sphere-off-centre", message)
                 .at(place())
-                .remedy("give its silhouette with --mask, or crop the photo to the ball"),
+                .remedy("give its silhouette with --mask, or crop the photo to the ball")
+                .extent(filling.distance(&found)),
         );
     }
     ObjectGeometry::sphere_at(width, height, circle.centre.as_vec2(), circle.radius as f32)

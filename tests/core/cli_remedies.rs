@@ -44,8 +44,8 @@ fn commands_of(path: &str) -> Option<&'static [&'static [&'static str]]> {
         {
             None
         }
-        // What a reader or the check says is printed by all that read scenes; `relight` replaces remedies with options.
-        _ if is_below(&["scene/"]) => Some(&[&["check"], &["fit"], &["render"], &["compare"]]),
+        // What a reader or the check says is printed by all that read scenes.
+        _ if is_below(&["scene/"]) => Some(&[&["check"], &["fit"], &["render"], &["compare"], &["relight"]]),
         _ if is_below(&["object/"]) => Some(&[&["object"]]),
         _ if is_below(&["export/", "job/export"]) => Some(&[&["export"]]),
         _ if is_below(&["atlas/", "fit/", "job/known_maps", "job/budget"]) => Some(&[&["fit"]]),

@@ -215,6 +215,12 @@ fn blind_views_and_masks_that_lie_are_named() {
     empty_mask.views[1].states.pixels_mut().fill(PixelState::Background);
     let report = assert_finding(&empty_mask, "mask-overlap-low", Severity::Warning);
     assert_eq!(report.views[1].mask_overlap, Some(0.0));
+    let pixels = empty_mask.views[0].states.pixels_mut().iter_mut();
+    pixels.step_by(4).filter(|state| state.is_surface()).for_each(|state| *state = PixelState::Background);
+    let report = assert_finding(&empty_mask, "mask-overlap-low", Severity::Warning);
+    let told = report.findings.iter().find(|finding| finding.code == "mask-overlap-low").unwrap();
+    assert_eq!(told.place, "view 00000001", "the worst is where to go");
+    assert!(told.message.ends_with("in 2 views, by 0 % in the first: 00000001, 00000000"), "{told}");
     let mut inverted = scene(4);
     for view in &mut inverted.views {
         for state in view.states.pixels_mut() {
@@ -262,6 +268,11 @@ fn photos_that_are_black_clipped_or_wrongly_encoded_are_named() {
     clipped.views[2].states.pixels_mut()[..4000].fill(PixelState::BackgroundClipped);
     let report = assert_finding(&clipped, "photo-clipped", Severity::Warning);
     assert!((report.views[2].clipped_share - 4000.0 / 12288.0).abs() < 1e-9);
+    clipped.views[3].states.pixels_mut()[..8000].fill(PixelState::BackgroundClipped);
+    let report = assert_finding(&clipped, "photo-clipped", Severity::Warning);
+    let told = report.findings.iter().find(|finding| finding.code == "photo-clipped").unwrap();
+    assert_eq!(told.place, "view 00000003", "the worst is where to go");
+    assert!(told.message.ends_with("in 2 views, 65 % in the first: 00000003, 00000002"), "{told}");
 
     // Linear values stored in 8 bits and decoded once more: v becomes about v^2.2. The sky is bright and small.
     let mut linear = scene(4);

@@ -64,9 +64,6 @@ pub struct RelightOptions {
     /// Max bounces: surface hits on the longest path, 1 to 16.
     #[arg(long, default_value_t = 3, value_parser = hits)]
     pub bounces: usize,
-    /// Downsample images by this whole factor.
-    #[arg(long = "downsample", alias = "shrink", value_name = "FACTOR", default_value_t = 1)]
-    pub shrink: usize,
     /// Exposure of the PNG files, in EV (stops).
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = finite)]
     pub exposure: f32,
@@ -92,6 +89,9 @@ pub struct RelightOptions {
     /// A turntable in place of single images.
     #[command(flatten)]
     pub turntable: crate::cli::turntable::TurntableOptions,
+    /// How the scene is read.
+    #[command(flatten)]
+    pub read: ReadOptions,
     /// Folder of the images; `relight` in the run folder when not given.
     #[arg(short, long)]
     pub output: Option<PathBuf>,

@@ -83,7 +83,7 @@ impl Drop for RunLock {
 fn held_by(owner: &str, path: &Path) -> Error {
     let owner = if owner.is_empty() { "another process" } else { owner };
     Error::new(ErrorKind::Unwritable, format!("another fit works in this run folder: {owner}"))
-        .at(Place::File(path.parent().unwrap_or(path).into()))
+        .at(Place::File(crate::files::folder_of(path).into()))
         .remedy("wait until it ends, stop it, or fit into another folder")
 }
 

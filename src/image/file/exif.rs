@@ -256,6 +256,23 @@ mod tests {
     }
 
     #[test]
+    fn colours_that_are_not_calibrated_are_told_where_no_encoding_is_given() {
+        let plain = file::encode_jpeg(&Image::filled(16, 16, [40, 200, 60]), 95).unwrap();
+        let block = [b"Exif\0\0".to_vec(), block_of_colours(65_535, b"R98\0")].concat();
+        let length = (block.len() as u16 + 2).to_be_bytes();
+        let bytes = [&plain[..2], &[0xff, 0xe1], &length, &block, &plain[2..]].concat();
+        let codes = |encoding| {
+            let options = PhotoOptions { encoding, ..PhotoOptions::default() };
+            let photo = file::read_photo_from(Path::new("a.jpg"), bytes.clone(), &options).unwrap();
+            photo.findings.iter().map(|finding| finding.code).collect::<Vec<_>>()
+        };
+        assert_eq!(codes(file::Encoding::Auto), ["colour-uncalibrated"]);
+        for encoding in [file::Encoding::Linear, file::Encoding::Srgb, file::Encoding::Gamma22] {
+            assert!(codes(encoding).is_empty(), "{encoding:?}");
+        }
+    }
+
+    #[test]
     fn a_tag_with_more_values_than_bytes_is_a_claim() {
         for little_endian in [true, false] {
             let mut bytes = block(little_endian);

@@ -257,7 +257,14 @@ impl Placed {
              pixels outside are not seen",
             self.offset.0, self.offset.1
         );
-        (!self.is_whole()).then(|| Finding::new(Severity::Note, "exr-window", message))
+        let seen = |offset: i64, stored: usize, size: usize| {
+            let end = offset.saturating_add(stored as i64).clamp(0, size as i64);
+            (end - offset.clamp(0, end)) as f64 / size.max(1) as f64
+        };
+        let share = seen(self.offset.0, stored_width, width) * seen(self.offset.1, stored_height, height);
+        // A window that only holds more than the picture hides nothing, and is told all the same.
+        let hidden = (1.0 - share).max(f64::EPSILON);
+        (!self.is_whole()).then(|| Finding::new(Severity::Note, "exr-window", message).extent(hidden))
     }
 }
 

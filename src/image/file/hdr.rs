@@ -228,7 +228,8 @@ fn told(header: &HdrHeader) -> Vec<Finding> {
         let [red, green, blue] = header.applied.to_array();
         let factors = if red == green && green == blue { format!("{red}") } else { format!("{red}, {green}, {blue}") };
         let message = format!("pixels are divided by {factors}, the EXPOSURE and COLORCORR of the file");
-        told.push(Finding::new(Severity::Note, "hdr-exposure", message));
+        let stops = header.applied.to_array().map(|factor| factor.log2().abs()).into_iter().fold(0.0, f32::max);
+        told.push(Finding::new(Severity::Note, "hdr-exposure", message).extent(f64::from(stops)));
     }
     if header.rec709_from_stored.is_some() {
         let from = if header.is_xyz { "CIE XYZ" } else { "the primaries of the file" };

@@ -6,7 +6,7 @@
 //! through [`crate::files`].
 //!
 //! [`read_photo`] is the whole of it: pixels, opacity, orientation, exposure, and what was done to them as findings.
-//! [`read_rgb`] and [`read_grey`] are for maps and lights, [`read_mask`] for masks.
+//! [`read_rgb`] and [`read_grey`] are for maps and lights, [`MaskFile`] for masks.
 //!
 //! What is not done here: turning pictures by their EXIF orientation (the camera decides: `scene::read`), and any
 //! judgement of values: a NaN in a file is a NaN in the image, and its reader decides. Raw files of cameras are refused.
@@ -32,7 +32,7 @@ mod tiff;
 pub use format::Format;
 pub(crate) use guard::guarded;
 pub use guard::keep_decoders_quiet;
-pub use mask::{read_mask, read_mask_from};
+pub use mask::{MaskFacts, MaskFile, MaskValues, MaskWay};
 pub use photo::{Encoding, PhotoFile, PhotoOptions, PhotoPixels, swaps_sides, turned};
 pub use source::read_header;
 

@@ -103,7 +103,7 @@ fn check_jpeg(source: &Source) -> Result<Vec<Finding>> {
     }
     if facts.stray_bytes > 0 {
         let message = format!("{} bytes of the JPEG belong to no segment: they are skipped", facts.stray_bytes);
-        findings.push(Finding::new(Severity::Note, "jpeg-stray-bytes", message));
+        findings.push(Finding::new(Severity::Note, "jpeg-stray-bytes", message).extent(facts.stray_bytes as f64));
     }
     Ok(findings)
 }

@@ -316,11 +316,16 @@ fn interpretation(
             }
         }
         Some((length, None)) => {
+            let taken = if curve.is_some() || is_float {
+                "its primaries are taken for those of sRGB"
+            } else {
+                "the photo is taken for sRGB"
+            };
             findings.push(
                 Finding::new(
                     Severity::Warning,
                     "profile-damaged",
-                    format!("the colour profile of {length} bytes cannot be read: the photo is taken for sRGB"),
+                    format!("the colour profile of {length} bytes cannot be read: {taken}"),
                 )
                 .remedy("export the photo again with an sRGB or Display P3 profile"),
             );
@@ -332,7 +337,8 @@ fn interpretation(
                 space.clone()
             }
             _ if is_float => ColourSpace::of_curve(Curve::Linear),
-            Declared::Uncalibrated => {
+            // Where the user says how it is encoded, nothing is taken for sRGB that may be otherwise.
+            Declared::Uncalibrated if curve.is_none() => {
                 let message = "EXIF says that colours are not sRGB, and no profile says what they are: taken for sRGB";
                 let remedy = "export the photos with their colour profile; cameras write so for Adobe RGB";
                 findings.push(Finding::new(Severity::Warning, "colour-uncalibrated", message).remedy(remedy));

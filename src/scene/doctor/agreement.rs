@@ -9,7 +9,7 @@
 //! It refuses to judge surfaces that look everywhere alike, and mirrors, whose pictures move with the camera.
 
 use super::probe::Probe;
-use super::{Report, names_of, neighbours};
+use super::{Report, names_of, neighbours, worst_first};
 use crate::error::{Finding, Place, Severity};
 use crate::math::{luminance, parallel, statistics::quantile};
 use crate::scene::{PixelState, Scene, View};
@@ -202,7 +202,7 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
     }
     let bad: Vec<usize> =
         (0..names.len()).filter(|&view| agreement[view].is_some_and(|agreement| agreement < LOW)).collect();
-    let mut left: Vec<&str> = Vec::new();
+    let mut left: Vec<(f64, &str)> = Vec::new();
     let mut done = vec![false; names.len()];
     for &view in &bad {
         if done[view] {
@@ -236,13 +236,14 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
             );
             continue;
         }
-        left.push(names[view]);
+        left.push((-own, names[view]));
     }
-    if !left.is_empty() {
+    if let Some((least, left)) = worst_first(left) {
         let message = format!(
-            "{} photos do not match the others on the same surface (correlation below {LOW}; the others have \
-             {middle:.2}): {}",
+            "{} photos do not match the others on the same surface (correlation below {LOW}, {:.2} in the first; the \
+             others have {middle:.2}): {}",
             left.len(),
+            -least,
             names_of(&left)
         );
         report.findings.push(

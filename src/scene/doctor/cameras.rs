@@ -44,7 +44,8 @@ pub fn check(scene: &Scene, report: &mut Report) -> Vec<bool> {
                 .remedy(
                     "the intrinsics may belong to photos of another size: scale them, or use the photos they were \
                      calibrated on",
-                ),
+                )
+                .extent(off.into()),
             );
         }
     }

@@ -209,6 +209,13 @@ fn sort(findings: &mut [Finding]) {
     findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
 }
 
+/// Names by how bad they are, the worst first, those as bad in the order given; and how bad the worst is. `None` of none.
+pub fn worst_first<'a>(mut bad: Vec<(f64, &'a str)>) -> Option<(f64, Vec<&'a str>)> {
+    bad.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let worst = bad.first()?.0;
+    Some((worst, bad.into_iter().map(|(_, name)| name).collect()))
+}
+
 /// A list of names for a message: the first few, then a count.
 fn names_of(names: &[&str]) -> String {
     const SHOWN: usize = 6;

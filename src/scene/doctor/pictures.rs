@@ -1,8 +1,8 @@
 //! Encoding, clipping and darkness of the photos.
 
 use super::probe::Probe;
-use super::{Report, names_of};
-use crate::error::{Finding, Severity};
+use super::{Report, names_of, worst_first};
+use crate::error::{Finding, Place, Severity};
 use crate::math::{luminance, statistics::quantile};
 use crate::scene::{PixelState, Scene, View};
 
@@ -30,7 +30,7 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
             continue;
         }
         if line.clipped_share > HIGH_CLIPPED_SHARE {
-            clipped.push(view.name.as_str());
+            clipped.push((line.clipped_share, view.name.as_str()));
         }
         let all = luminances(view, probes, false);
         let on_mesh = luminances(view, probes, true);
@@ -43,19 +43,18 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
         srgb_looking += usize::from(looks_encoded(view, &all));
     }
     let views = scene.views.len();
-    if !clipped.is_empty() {
+    if let Some((most, clipped)) = worst_first(clipped) {
+        let message = format!(
+            "more than {:.0} % of the pixels are clipped in {} views, {:.0} % in the first: {}",
+            100.0 * HIGH_CLIPPED_SHARE,
+            clipped.len(),
+            100.0 * most,
+            names_of(&clipped)
+        );
         report.findings.push(
-            Finding::new(
-                Severity::Warning,
-                "photo-clipped",
-                format!(
-                    "more than {:.0} % of the pixels are clipped in {} views: {}",
-                    100.0 * HIGH_CLIPPED_SHARE,
-                    clipped.len(),
-                    names_of(&clipped)
-                ),
-            )
-            .remedy("clipped pixels count as a lower bound only; develop the photos darker or from raw"),
+            Finding::new(Severity::Warning, "photo-clipped", message)
+                .at(Place::View(clipped[0].into()))
+                .remedy("clipped pixels count as a lower bound only; develop the photos darker or from raw"),
         );
     }
     if !black.is_empty() {

@@ -1,8 +1,8 @@
 //! Do the masks agree with the mesh's silhouette?
 
 use super::probe::Probe;
-use super::{Report, names_of};
-use crate::error::{Finding, Severity};
+use super::{Report, names_of, worst_first};
+use crate::error::{Finding, Place, Severity};
 use crate::math::statistics::quantile;
 use crate::scene::{PixelState, Scene, View};
 
@@ -37,7 +37,7 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
         line.mask_overlap = Some(overlap);
         overlaps.push(overlap);
         if overlap < LOW_OVERLAP {
-            low.push(view.name.as_str());
+            low.push((-overlap, view.name.as_str()));
         }
     }
     if overlaps.is_empty() {
@@ -55,19 +55,16 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
                 "check the overlays: masks may be inverted (255 is object), or the cameras may belong to another mesh",
             ),
         );
-    } else if !low.is_empty() {
+    } else if let Some((least, low)) = worst_first(low) {
+        let message = format!(
+            "masks and mesh overlap by less than {:.0} % in {} views, by {:.0} % in the first: {}",
+            100.0 * LOW_OVERLAP,
+            low.len(),
+            -100.0 * least,
+            names_of(&low)
+        );
         report.findings.push(
-            Finding::new(
-                Severity::Warning,
-                "mask-overlap-low",
-                format!(
-                    "masks and mesh overlap by less than {:.0} % in {} views: {}",
-                    100.0 * LOW_OVERLAP,
-                    low.len(),
-                    names_of(&low)
-                ),
-            )
-            .remedy(
+            Finding::new(Severity::Warning, "mask-overlap-low", message).at(Place::View(low[0].into())).remedy(
                 "check the overlays of these views: the mask may cover more than the mesh, or the camera may be off",
             ),
         );

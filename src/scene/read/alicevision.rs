@@ -12,6 +12,7 @@ use super::photo_index::{PhotoIndex, Posed, some_of};
 use super::source::{SourceCamera, SourceScene};
 use super::tool_folder::scene_of;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::files::folder_of;
 use crate::scene::lens::{Base, Lens, Model, Polynomial};
 use glam::{DMat3, DVec3};
 use serde_json::Value;
@@ -158,7 +159,7 @@ fn place_in_rig<'a>(rigs: &'a BTreeMap<String, Value>, rig: &str, view: &Value) 
 /// That other files of cameras lie beside the one that is read.
 fn told_of_others(path: &Path) -> Option<Finding> {
     let own = path.file_name().unwrap_or_default().to_string_lossy();
-    let files = files_in(path.parent().unwrap_or(Path::new("")));
+    let files = files_in(folder_of(path));
     let others = files.iter().filter_map(|file| file.file_name()).map(|name| name.to_string_lossy().into_owned());
     let others: Vec<String> = others.filter(|name| *name != own).collect();
     let message = format!("{own} is read, not {}", some_of(&others));
@@ -171,7 +172,7 @@ fn told_of_others(path: &Path) -> Option<Finding> {
 
 /// Lists an AliceVision scene and reads its cameras.
 pub fn read(path: &Path) -> Result<SourceScene> {
-    let folder = path.parent().unwrap_or(Path::new(""));
+    let folder = folder_of(path);
     let json: Value = serde_json::from_str(&read_text(path)?).map_err(|error| {
         Error::new(ErrorKind::Malformed, format!("the file is not JSON: {error}"))
             .at(Place::Line(path.into(), error.line().max(1)))

@@ -12,6 +12,7 @@ use super::camera_file;
 use super::mask_names::{self, Masks, PHOTO_EXTENSIONS};
 use super::source::{SourceScene, SourceView};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::files::name_of_folder;
 use crate::image::file;
 use crate::scene::Background;
 use crate::scene::settings::{ColourEncoding, PixelCentre, Up};
@@ -53,7 +54,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
         ));
     }
     Ok(SourceScene {
-        name: folder.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        name: name_of_folder(folder),
         folder: folder.into(),
         mesh,
         views,

@@ -10,6 +10,7 @@ use super::photo_index::{PhotoIndex, Posed};
 use super::source::{SourceCamera, SourceScene};
 use super::tool_folder::scene_of;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::files::folder_of;
 use crate::image::file;
 use crate::scene::lens::{Lens, Model, Polynomial};
 use glam::{DMat3, DVec3};
@@ -42,7 +43,7 @@ fn list_of(bundle: &Path) -> Option<PathBuf> {
     let stem = name.strip_suffix(".out").unwrap_or(&name);
     let stems = [stem.strip_suffix(".bundle").unwrap_or(stem), stem, &name];
     let names = stems.map(|stem| format!("{stem}.list.txt")).into_iter().chain(LISTS.map(str::to_owned));
-    let own = bundle.parent().unwrap_or(Path::new(""));
+    let own = folder_of(bundle);
     let above = if own.ends_with("bundle") { own.parent().unwrap_or(own) } else { own };
     let folders = [own.to_path_buf(), above.to_path_buf(), own.join("bundle")];
     names.flat_map(|name| folders.clone().map(|folder| folder.join(&name))).find(|path| path.is_file())

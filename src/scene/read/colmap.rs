@@ -24,6 +24,9 @@ use std::path::{Path, PathBuf};
 const MODEL_FOLDERS: [&str; 6] =
     ["sparse", "", "colmap/sparse", "dense/sparse", "dense/0/sparse", "undistorted/sparse"];
 
+/// Words of an image's line: its number, seven of its pose, its camera's number, a name.
+const WORDS_OF_IMAGE: usize = 10;
+
 /// A camera of `cameras`.
 struct ColmapCamera {
     model: &'static str,
@@ -87,7 +90,7 @@ fn images_of(model: &Path) -> usize {
         let count = Bytes::open(&binary).and_then(|mut bytes| bytes.count("the number of images", 73));
         return count.unwrap_or(0);
     }
-    read_images_txt(&model.join("images.txt")).map_or(0, |images| images.len())
+    read_images_txt(&model.join("images.txt")).map_or(0, |(images, _)| images.len())
 }
 
 /// That one of several models is read.
@@ -110,12 +113,12 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
     let models = models_of(folder);
     let model = models.first().map_or_else(|| folder.to_path_buf(), |(model, _)| model.clone());
     let is_binary = model.join("cameras.bin").is_file() && model.join("images.bin").is_file();
-    let (mut cameras, images) = if is_binary {
-        (read_cameras_bin(&model.join("cameras.bin"))?, read_images_bin(&model.join("images.bin"))?)
+    let (mut cameras, (images, noticed)) = if is_binary {
+        (read_cameras_bin(&model.join("cameras.bin"))?, (read_images_bin(&model.join("images.bin"))?, Vec::new()))
     } else {
         (read_cameras_txt(&model.join("cameras.txt"))?, read_images_txt(&model.join("images.txt"))?)
     };
-    let mut findings: Vec<Finding> = told_of_others(&models, folder).into_iter().collect();
+    let mut findings: Vec<Finding> = told_of_others(&models, folder).into_iter().chain(noticed).collect();
     let mut posed = Vec::new();
     for image in images {
         if cameras.get(&image.camera).is_some_and(Result::is_err) {
@@ -246,19 +249,59 @@ fn camera_of_line(text: &str, path: &Path, line: usize) -> Result<ColmapCamera> 
     Ok(ColmapCamera { model, size: (width, height), parameters, place })
 }
 
-fn read_images_txt(path: &Path) -> Result<Vec<ColmapImage>> {
+/// What a line of `images.txt` looks like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum ImagesLine {
+    Blank,
+    Points,
+    Image,
+    Neither,
+}
+
+/// The images of a text, and what of it was passed over: damage where the points of an image stand, which nobody needs.
+fn read_images_txt(path: &Path) -> Result<(Vec<ColmapImage>, Vec<Finding>)> {
+    use ImagesLine::{Blank, Image, Neither, Points};
     let text = read_text(path)?;
-    let mut images = Vec::new();
-    let mut lines = text.lines().enumerate().peekable();
-    while let Some((index, line)) = lines.next() {
-        if line.trim().is_empty() || line.trim_start().starts_with('#') {
+    let lines = text.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with('#'));
+    let lines: Vec<(usize, &str, ImagesLine)> =
+        lines.map(|(index, line)| (index + 1, line, kind_of(line, path, index + 1))).collect();
+    // The points of an image stand on a line of their own, which may be empty. Some programs leave it out: then a line that
+    // is no image is a damaged one.
+    let points = lines.iter().filter(|(_, _, kind)| *kind == Points).count();
+    let left_out = lines.windows(2).filter(|pair| (pair[0].2, pair[1].2) == (Image, Image)).count() > points;
+    let (mut images, mut findings) = (Vec::new(), Vec::new());
+    let mut lines = lines.into_iter().peekable();
+    while let Some((number, line, kind)) = lines.next() {
+        if kind == Blank {
             continue;
         }
-        images.push(image_of_line(line, path, index + 1)?);
-        // The points of the image: a line that may be empty. Some programs leave it out.
-        lines.next_if(|(index, line)| is_of_points(line) || image_of_line(line, path, index + 1).is_err());
+        images.push(image_of_line(line, path, number)?);
+        let is_of_image = |line: &str, kind| match kind {
+            Blank => true,
+            Image => false,
+            Points => !left_out || line.split_whitespace().count() >= WORDS_OF_IMAGE,
+            Neither => !left_out && points > 0,
+        };
+        if let Some((number, _, Neither)) = lines.next_if(|(_, line, kind)| is_of_image(line, *kind)) {
+            let message = "the points of an image are damaged: they are passed over";
+            let remedy = "nothing depends on them here; if the line was meant for an image, export the model again";
+            findings.push(
+                Finding::new(Severity::Warning, "image-points-damaged", message)
+                    .at(Place::Line(path.into(), number))
+                    .remedy(remedy),
+            );
+        }
     }
-    Ok(images)
+    Ok((images, findings))
+}
+
+fn kind_of(line: &str, path: &Path, number: usize) -> ImagesLine {
+    match () {
+        () if line.trim().is_empty() => ImagesLine::Blank,
+        () if is_of_points(line) => ImagesLine::Points,
+        () if image_of_line(line, path, number).is_ok() => ImagesLine::Image,
+        () => ImagesLine::Neither,
+    }
 }
 
 /// Whether a line has nothing but points: x, y and the number of a point in space, as often as there are points.
@@ -287,6 +330,11 @@ fn image_of_line(line: &str, path: &Path, number: usize) -> Result<ColmapImage> 
     let rotation = [pose[0], pose[1], pose[2], pose[3]];
     let translation = DVec3::new(pose[4], pose[5], pose[6]);
     // What is left is the name, spaces and all.
+    if rest.trim_end().is_empty() {
+        return Err(Error::new(ErrorKind::Malformed, "the image has no name")
+            .at(place)
+            .remedy("the file is cut short or damaged: export it again"));
+    }
     Ok(ColmapImage { rotation, translation, camera, name: rest.trim_end().to_owned(), place })
 }
 

@@ -168,7 +168,7 @@ fn lines_of_points_may_be_left_out() {
     let path = folder.path().join("images.txt");
     let names = |text: &str| -> Vec<String> {
         std::fs::write(&path, text).unwrap();
-        read_images_txt(&path).unwrap().into_iter().map(|image| image.name).collect()
+        read_images_txt(&path).unwrap().0.into_iter().map(|image| image.name).collect()
     };
     let image = |number: u32, name: &str| format!("{number} 1 0 0 0 0 0 {number} 1 {name}\n");
     let none = image(1, "a.png") + &image(2, "b.png") + &image(3, "7 c.png");
@@ -192,4 +192,37 @@ fn cameras_that_no_image_names_may_be_of_any_kind_and_numbers_must_be_finite() {
     assert!(error.kind() == ErrorKind::Unsupported && error.to_string().contains("SPHERE_X"), "{error}");
     std::fs::write(model.join("cameras.txt"), CAMERAS.replace("0.1 -0.01", "nan 0")).unwrap();
     assert_eq!(read(folder.path()).unwrap_err().kind(), ErrorKind::NonFinite);
+}
+
+#[test]
+fn a_damaged_image_is_an_error_with_its_line_and_damaged_points_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("images.txt");
+    let read = |text: &str| {
+        std::fs::write(&path, text).unwrap();
+        let read = read_images_txt(&path).map(|(images, findings)| (images.len(), findings));
+        read.map_err(|error| error.place().clone())
+    };
+    let line = |number| Place::Line(path.clone(), number);
+    let image = |index: usize| format!("{index} 1 0 0 0 0 0 {index} 2 right/{index}.png");
+    // Without lines of points: cut anywhere, or with a word for a number, the second image is missed.
+    let whole = image(2);
+    let cuts = (1..whole.len() - "right/2.png".len()).map(|length| whole[..length].to_owned());
+    let damaged: Vec<String> = cuts.chain([whole.replace(" 0 0 0 ", " 0 x 0 ")]).collect();
+    for damaged in &damaged {
+        let text = format!("# images\n{}\n{damaged}\n{}\n{}\n{}\n", image(1), image(3), image(4), image(5));
+        assert_eq!(read(&text).unwrap_err(), line(3), "{damaged}");
+    }
+    // With lines of points, empty or not, what stands in their place and is none is told.
+    let points = "1.5 2.5 -1 3 4 7";
+    let text = |second: &str| format!("{}\n{points}\n{}\n{second}\n{}\n\n", image(1), image(2), image(3));
+    assert_eq!(read(&text(points)).unwrap(), (3, Vec::new()));
+    for damaged in ["1.5 2.5 -1 3 4", "1.5 2.5 -1 3 4 x"] {
+        let (images, findings) = read(&text(damaged)).unwrap();
+        assert_eq!((images, findings.len(), &findings[0].target), (3, 1, &line(4)), "{damaged}");
+    }
+    let damaged = text(points).replace(&image(2), "2 1 0 0");
+    assert_eq!(read(&damaged).unwrap_err(), line(3));
+    assert_eq!(read(&format!("{}\n\n2 1 0 0 0 0 0 4 2\n\n", image(1))).unwrap_err(), line(3), "no name");
+    assert_eq!(read(&format!("{}\n{}\n{points}\n", image(1), image(2))).unwrap().0, 2, "left out where there are none");
 }

@@ -6,6 +6,7 @@ use super::{
     objects_with_lighting, openmvs, opensfm, realitycapture, realitycapture_csv, transforms,
 };
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::files::folder_of;
 use crate::scene::settings::ReadSettings;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -222,8 +223,7 @@ impl Located {
 pub fn locate(path: &Path) -> Result<Located> {
     if path.is_file() {
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-        let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
-        let folder = parent.unwrap_or(Path::new(".")).to_path_buf();
+        let folder = folder_of(path).to_path_buf();
         let format = match extension.as_str() {
             "toml" => Format::Manifest,
             "psx" => Format::MetashapeProject,

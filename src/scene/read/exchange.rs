@@ -13,6 +13,7 @@ use super::photos::shrink_linear;
 use super::source::{SourceScene, SourceView};
 use super::text;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::files::name_of_folder;
 use crate::image::{Image, file};
 use crate::light::Environment;
 use crate::material::{LobeModel, MaterialMaps};
@@ -116,7 +117,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
         })
         .collect();
     Ok(SourceScene {
-        name: json.name.unwrap_or_else(|| folder.file_name().unwrap_or_default().to_string_lossy().into_owned()),
+        name: json.name.unwrap_or_else(|| name_of_folder(folder)),
         folder: folder.into(),
         mesh: vec![mesh],
         views,

@@ -200,8 +200,8 @@ impl Reader<'_> {
         }
         if left_out > 0 {
             let message = format!("{left_out} sets of lines or points are not surfaces: they are ignored");
-            mesh.findings
-                .push(Finding::new(Severity::Note, "mesh-lines-dropped", message).at(Place::File(path.into())));
+            let told = Finding::new(Severity::Note, "mesh-lines-dropped", message).at(Place::File(path.into()));
+            mesh.findings.push(told.extent(left_out as f64));
         }
         Ok(mesh)
     }

@@ -21,6 +21,7 @@ use super::camera_file::read_cameras_json;
 use super::source::{SourceCamera, SourceScene, SourceView};
 use super::text;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::files::{folder_of, name_of_folder};
 use crate::scene::Background;
 use crate::scene::settings::{ColourEncoding, PixelCentre, Up};
 use glam::{DMat3, DVec3};
@@ -90,7 +91,7 @@ pub fn read(path: &Path) -> Result<SourceScene> {
             .at(Place::Line(path.into(), line))
             .remedy("it must name mesh, images and cameras")
     })?;
-    let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+    let folder = folder_of(path).to_path_buf();
     let mut findings = Vec::new();
     let images = folder.join(&manifest.images);
     if !images.is_dir() {
@@ -116,7 +117,7 @@ pub fn read(path: &Path) -> Result<SourceScene> {
         OneOrMore::More(meshes) => meshes.iter().map(|mesh| folder.join(mesh)).collect(),
     };
     Ok(SourceScene {
-        name: manifest.name.unwrap_or_else(|| folder.file_name().unwrap_or_default().to_string_lossy().into_owned()),
+        name: manifest.name.unwrap_or_else(|| name_of_folder(&folder)),
         folder,
         mesh,
         views,

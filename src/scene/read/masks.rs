@@ -3,7 +3,8 @@
 use super::source::SourceView;
 use super::zip::Archive;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
-use crate::image::{GreyImage, Image, file, resize};
+use crate::image::file::{self, MaskFile};
+use crate::image::{GreyImage, Image, resize};
 use crate::scene::{Photo, PixelState};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -22,25 +23,38 @@ pub fn archives_of_masks(views: &[SourceView]) -> Result<BTreeMap<PathBuf, Archi
     Ok(archives)
 }
 
-/// A mask from a file or from an archive. One from an archive was made on the photo that the project knows: it is brought to
-/// the size of the photo that is here, where that has the same shape.
-pub fn read_mask(
-    path: &Path,
-    photo: &Photo,
-    packed: &BTreeMap<PathBuf, Archive>,
-) -> Result<(GreyImage, Option<Finding>)> {
+/// Whether a file is a twin of a photo that is black where it is masked, by its name.
+fn is_twin(path: &Path) -> bool {
+    path.file_stem().is_some_and(|stem| stem.to_string_lossy().ends_with("_masked"))
+}
+
+/// A mask from a file or from an archive.
+pub fn read_mask(path: &Path, packed: &BTreeMap<PathBuf, Archive>) -> Result<MaskFile> {
+    let file = match path.parent().and_then(|parent| packed.get(parent)) {
+        None => MaskFile::open(path)?,
+        Some(archive) => {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            MaskFile::of_bytes(path, archive.read(&name)?)?
+        }
+    };
+    Ok(if is_twin(path) { file.as_picture() } else { file })
+}
+
+/// A mask from an archive was made on the photo that the project knows: it is brought to the size of the photo that is here,
+/// where that has the same shape.
+pub fn resized(mask: GreyImage, path: &Path, photo: &Photo, packed: &BTreeMap<PathBuf, Archive>) -> GreyImage {
     /// What rounding of the sides may make of a shape.
     const SAME_SHAPE: f64 = 0.01;
-    let Some(archive) = path.parent().and_then(|parent| packed.get(parent)) else { return file::read_mask(path) };
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let (mask, told) = file::read_mask_from(path, archive.read(&name)?)?;
+    if !path.parent().is_some_and(|parent| packed.contains_key(parent)) {
+        return mask;
+    }
     let (width, height) = (photo.width(), photo.height());
     let across = mask.width() as f64 / width as f64;
     let down = mask.height() as f64 / height as f64;
     if (mask.width(), mask.height()) == (width, height) || (across / down - 1.0).abs() > SAME_SHAPE {
-        return Ok((mask, told));
+        return mask;
     }
-    Ok((resize::enlarge(&resize::shrink(&mask, across as usize), width, height), told))
+    resize::enlarge(&resize::shrink(&mask, across as usize), width, height)
 }
 
 /// Turns the states of pixels with less than half of their opacity to background.
@@ -74,18 +88,18 @@ pub fn apply_alpha(alpha: &GreyImage, is_float: bool, states: &mut Image<PixelSt
     );
 }
 
-/// Turns the states of masked pixels to background. `stored` is the size and the orientation of the photo's file: a mask may
+/// Turns the states of masked pixels to background. A twin that is a picture is compared with the photo, one whose opacity is
+/// the mask is taken by it. `stored` is the size and the orientation of the photo's file: a mask may
 /// lie as the file does or as the camera sees it.
 pub fn apply_mask(
     path: &Path,
-    mut mask: GreyImage,
+    (mut mask, is_opacity): (GreyImage, bool),
     view: &SourceView,
     photo: &Photo,
     stored: ((usize, usize), u8),
     states: &mut Image<PixelState>,
     findings: &mut Vec<Finding>,
 ) -> Result<()> {
-    let is_twin = path.file_stem().is_some_and(|stem| stem.to_string_lossy().ends_with("_masked"));
     let size = (photo.width(), photo.height());
     if (mask.width(), mask.height()) != size && (mask.width(), mask.height()) == stored.0 {
         mask = file::turned(mask, stored.1);
@@ -98,7 +112,8 @@ pub fn apply_mask(
         .at(Place::File(path.into()))
         .remedy("resize the mask to the photo, or ignore all masks with --masks ignore"));
     }
-    let is_object: Image<bool> = if is_twin { object_of_twin(&mask, photo) } else { mask.map(|value| *value >= 0.5) };
+    let is_object: Image<bool> =
+        if is_twin(path) && !is_opacity { object_of_twin(&mask, photo) } else { mask.map(|value| *value >= 0.5) };
     let mut object_pixels = 0usize;
     for (state, &object) in states.pixels_mut().iter_mut().zip(is_object.pixels()) {
         object_pixels += usize::from(object);
@@ -132,4 +147,72 @@ fn object_of_twin(twin: &GreyImage, photo: &Photo) -> Image<bool> {
         };
         twin[(row, column)] > black || in_photo <= 2.0 * black
     })
+}
+
+#[cfg(test)]
+#[allow(clippy::disallowed_methods)]
+mod tests {
+    use super::super::photos::load_all;
+    use super::super::source::SourceCamera;
+    use super::*;
+    use crate::scene::ReadSettings;
+    use glam::{DMat3, DVec3};
+
+    fn view(folder: &Path, name: &str, mask: &str) -> SourceView {
+        SourceView {
+            name: name.to_owned(),
+            photo: folder.join(format!("{name}.png")),
+            mask: Some(folder.join(mask)),
+            camera: SourceCamera { intrinsics: DMat3::IDENTITY, rotation: DMat3::IDENTITY, translation: DVec3::ZERO },
+            lens: None,
+            size: None,
+            place: Place::Nowhere,
+        }
+    }
+
+    /// How many of the 12 pixels of each view are object.
+    fn objects_of(views: &[SourceView]) -> Vec<usize> {
+        let loaded = load_all(views, &vec![(4, 3); views.len()], Default::default(), None, &ReadSettings::default());
+        let count = |states: &Image<PixelState>| states.pixels().iter().filter(|state| state.is_surface()).count();
+        loaded.unwrap().iter().map(|photo| count(&photo.states)).collect()
+    }
+
+    #[test]
+    fn the_opacity_of_a_twin_is_its_mask_and_without_one_what_is_black() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        // The left half is the object, of which a quarter is black in the photo itself, as is much of what is around it.
+        let colour = |row: usize, column: usize| if row == 0 || column == 3 { [0u8; 3] } else { [90u8, 80, 70] };
+        file::write_png_srgb8(&root.join("a.png"), &Image::from_fn(4, 3, colour)).unwrap();
+        let twin = Image::from_fn(4, 3, |row, column| {
+            let [r, g, b] = colour(row, column);
+            if column < 2 { [r, g, b, 255] } else { [0, 0, 0, 0] }
+        });
+        file::write_png_srgba8(&root.join("a_masked.png"), &twin).unwrap();
+        assert_eq!(objects_of(&[view(root, "a", "a_masked.png")]), [6]);
+        let black = twin.map(|&[r, g, b, _]| [r, g, b]);
+        file::write_png_srgb8(&root.join("b_masked.png"), &black).unwrap();
+        assert_eq!(objects_of(&[view(root, "a", "b_masked.png")]), [4 + 4 + 2], "what is as dark in the photo stays");
+    }
+
+    #[test]
+    fn a_mask_of_one_value_is_read_as_its_neighbours_are() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        for name in ["a", "b", "c"] {
+            file::write_png_srgb8(&root.join(format!("{name}.png")), &Image::filled(4, 3, [90; 3])).unwrap();
+        }
+        let write = |name: &str, left: u8, right: u8| {
+            let value = |_, column| [if column < 2 { left } else { right }; 3];
+            file::write_png_srgb8(&root.join(name), &Image::from_fn(4, 3, value)).unwrap();
+        };
+        write("a_mask.png", 255, 0);
+        write("b_mask.png", 1, 1);
+        write("c_mask.png", 255, 255);
+        let views = ["a", "b", "c"].map(|name| view(root, name, &format!("{name}_mask.png")));
+        assert_eq!(objects_of(&views), [6, 0, 12]);
+        write("a_mask.png", 1, 0);
+        write("c_mask.png", 0, 0);
+        assert_eq!(objects_of(&views), [6, 12, 0]);
+    }
 }

@@ -15,6 +15,7 @@ use super::photo_index::{PhotoIndex, views_of};
 use super::source::{MeshFrame, SourceScene};
 use super::{blended_mvs::files_of, camera_file::read_text};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::files::folder_of;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -65,7 +66,7 @@ struct Candidate {
 pub fn read_export(file: &Path, chunk: Option<&str>) -> Result<SourceScene> {
     let text = read_text(file)?;
     let document = parse(&text, file)?;
-    let folder = file.parent().unwrap_or(Path::new(""));
+    let folder = folder_of(file);
     let photos = photos_of(folder)?;
     let chunks: Vec<_> = document.descendants().filter(|node| node.has_tag_name("chunk")).collect();
     if chunks.is_empty() {
@@ -93,7 +94,7 @@ pub fn read_export(file: &Path, chunk: Option<&str>) -> Result<SourceScene> {
 /// # Errors
 /// `InvalidSetting` for a chunk that is not there, those of the archives and of [`metashape_cameras`].
 pub fn read_project(file: &Path, asked: Option<&str>) -> Result<SourceScene> {
-    let folder = file.parent().unwrap_or(Path::new(""));
+    let folder = folder_of(file);
     let photos = photos_of(folder)?;
     let chunks = metashape_project::chunks(file)?;
     let candidate = |chunk: &Chunk| Candidate {

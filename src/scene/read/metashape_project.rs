@@ -3,6 +3,7 @@
 use super::camera_file::read_text;
 use super::zip::Archive;
 use crate::error::{Error, ErrorKind, Place, Result};
+use crate::files::folder_of;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
@@ -60,7 +61,7 @@ fn archive_of(project: &Path) -> Result<PathBuf> {
     let root = parse(&text, project)?;
     let stem = project.file_stem().unwrap_or_default().to_string_lossy();
     let path = root.root_element().attribute("path").unwrap_or("{projectname}.files/project.zip");
-    inside(project.parent().unwrap_or(Path::new("")), &path.replace("{projectname}", &stem), project)
+    inside(folder_of(project), &path.replace("{projectname}", &stem), project)
 }
 
 /// Whether the archive of a project is there.
@@ -80,7 +81,7 @@ pub fn chunks(project: &Path) -> Result<Vec<Chunk>> {
         .at(Place::File(project.into()))
         .remedy(format!("copy the folder {stem}.files along with the project")));
     }
-    let base = archive.parent().unwrap_or(Path::new(""));
+    let base = folder_of(&archive);
     let text = document(&archive)?;
     let listing = parse(&text, &archive)?;
     let mut found = Vec::new();
@@ -98,7 +99,7 @@ pub fn chunks(project: &Path) -> Result<Vec<Chunk>> {
                 root.descendants().filter(|node| node.has_tag_name("frame")).find_map(|node| node.attribute("path"));
             (root.attribute("label").unwrap_or_default().to_owned(), frame.map(str::to_owned))
         };
-        let frame = frame.map(|path| inside(file.parent().unwrap_or(base), &path, &file)).transpose()?;
+        let frame = frame.map(|path| inside(folder_of(&file), &path, &file)).transpose()?;
         let frame = frame.filter(|path| path.is_file()).map(|path| read_frame(&path)).transpose()?;
         let Frame { photos, masks, absent_masks } = frame.unwrap_or_default();
         let id = node.attribute("id").unwrap_or_default().to_owned();
@@ -128,7 +129,7 @@ fn read_frame(archive: &Path) -> Result<Frame> {
     let mut frame = Frame { photos, ..Default::default() };
     let named = document_of_frame.descendants().find(|node| node.has_tag_name("masks"));
     let Some(path) = named.and_then(|node| node.attribute("path")) else { return Ok(frame) };
-    let masks = inside(archive.parent().unwrap_or(Path::new("")), path, archive)?;
+    let masks = inside(folder_of(archive), path, archive)?;
     if !masks.is_file() {
         frame.absent_masks = Some(masks);
         return Ok(frame);

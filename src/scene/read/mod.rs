@@ -65,6 +65,7 @@ pub use mesh_file::read_mesh;
 pub use understood::{Understood, understand};
 
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::image::file::MaskWay;
 use crate::scene::doctor::pixel_centre;
 use crate::scene::settings::{BackgroundChoice, ColourEncoding, MaskUse, PixelCentre, ReadSettings, Up};
 use crate::scene::{Background, Scene, View, WorldFromSource};
@@ -121,7 +122,8 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
 
     // The photos.
     let encoding = if settings.encoding == ColourEncoding::Auto { source.encoding } else { settings.encoding };
-    let mut loaded = photos::load_all(&views, &sizes, encoding, settings)?;
+    let mut loaded = photos::load_all(&views, &sizes, encoding, None, settings)?;
+    let way_of_masks = photos::way_of_masks(&loaded);
     findings.extend(photos::told_of_lenses(&loaded));
     let mut background = match settings.background {
         BackgroundChoice::Auto => source.background,
@@ -201,7 +203,7 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
         let (centre, finding) = if settings.shrink == 1 {
             pixel_centre::decide(&scene, assumed_centre)
         } else {
-            decide_centre_unshrunk(&scene, &views, encoding, settings, assumed_centre)?
+            decide_centre_unshrunk(&scene, &views, (encoding, way_of_masks), settings, assumed_centre)?
         };
         let shift = (centre.shift_pixels() - assumed_centre.shift_pixels()) / settings.shrink as f64;
         scene.views.iter_mut().for_each(|view| view.camera.centre_pixels += shift as f32);
@@ -236,7 +238,7 @@ fn join(
 fn decide_centre_unshrunk(
     scene: &Scene,
     views: &[SourceView],
-    encoding: ColourEncoding,
+    (encoding, way_of_masks): (ColourEncoding, MaskWay),
     settings: &ReadSettings,
     assumed: PixelCentre,
 ) -> Result<(PixelCentre, Finding)> {
@@ -245,6 +247,7 @@ fn decide_centre_unshrunk(
         &few,
         &photo_size::of_files(&few)?,
         encoding,
+        Some(way_of_masks),
         &ReadSettings { shrink: 1, ..settings.clone() },
     )?;
     let joined = few

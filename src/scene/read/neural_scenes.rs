@@ -13,6 +13,7 @@ use super::numpy;
 use super::photo_index::{PhotoIndex, Posed, reduction_of, views_of};
 use super::source::{MeshFrame, SourceCamera, SourceScene};
 use crate::error::{Error, ErrorKind, Place, Result};
+use crate::files::folder_of;
 use crate::scene::lens::Lens;
 use glam::{DMat3, DMat4, DVec3};
 use std::path::{Path, PathBuf};
@@ -70,7 +71,7 @@ fn finish(folder: &Path, posed: Vec<Posed>, frames: Vec<MeshFrame>) -> Result<So
 
 /// Lists a scene of IDR or NeuS and reads its cameras.
 pub fn read_neus(file: &Path) -> Result<SourceScene> {
-    let folder = file.parent().unwrap_or(Path::new(""));
+    let folder = folder_of(file);
     let arrays = numpy::Arrays::open(file)?;
     let matrix_of = |name: String| -> Result<Option<DMat4>> {
         let Some(array) = arrays.get(&name)? else { return Ok(None) };
@@ -127,7 +128,7 @@ fn decomposed(product: DMat3) -> Option<(DMat3, DMat3)> {
 
 /// Lists a scene of LLFF and reads its cameras.
 pub fn read_llff(file: &Path) -> Result<SourceScene> {
-    let folder = file.parent().unwrap_or(Path::new(""));
+    let folder = folder_of(file);
     let array = numpy::read(file)?;
     if array.shape.len() != 2 || array.shape[1] != 17 {
         return Err(wrong(file, "the array is not N x 17"));

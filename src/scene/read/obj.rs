@@ -36,7 +36,8 @@ pub fn read(path: &Path) -> Result<SourceMesh> {
         findings.push(
             Finding::new(Severity::Note, "mesh-uvs-dropped", message)
                 .at(Place::File(path.into()))
-                .remedy("nothing is lost: the fit makes its own atlas"),
+                .remedy("nothing is lost: the fit makes its own atlas")
+                .extent(elements.materials.len() as f64),
         );
     }
     let origin = elements.origin(&triangles);

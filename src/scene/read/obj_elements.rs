@@ -184,7 +184,7 @@ impl Elements {
         let mut tell = |severity, code, count: usize, line: usize, message: &str, remedy: &str| {
             if count > 0 {
                 let finding = Finding::new(severity, code, format!("{count} {message}"));
-                findings.push(finding.at(Place::Line(path.into(), line)).remedy(remedy));
+                findings.push(finding.at(Place::Line(path.into(), line)).remedy(remedy).extent(count as f64));
             }
         };
         let (unused, line) = (self.bad_vertices.len(), self.bad_vertices.first().map_or(0, |bad| bad.1));

@@ -9,6 +9,7 @@ use super::photo_index::{PhotoIndex, Posed};
 use super::source::{SourceCamera, SourceScene};
 use super::tool_folder::scene_of;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::files::folder_of;
 use crate::image::file;
 use crate::scene::lens::Lens;
 use glam::{DMat3, DVec3};
@@ -85,7 +86,7 @@ fn platform(bytes: &mut Bytes, version: u32) -> Result<Platform> {
 
 /// Lists an OpenMVS scene and reads its cameras.
 pub fn read(path: &Path) -> Result<SourceScene> {
-    let folder = path.parent().unwrap_or(Path::new(""));
+    let folder = folder_of(path);
     let mut bytes = Bytes::open(path)?;
     if bytes.take(4, "its first word")? != b"MVSI" {
         return Err(Error::new(ErrorKind::Unsupported, "this is not an interface file of OpenMVS")

@@ -2,9 +2,9 @@
 
 use super::source::SourceView;
 use super::zip::Archive;
-use super::{masks, orientation};
+use super::{masks, orientation, repeated};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
-use crate::image::file::{self, Encoding, PhotoFile, PhotoOptions, PhotoPixels};
+use crate::image::file::{self, Encoding, MaskFacts, MaskValues, MaskWay, PhotoFile, PhotoOptions, PhotoPixels};
 use crate::image::{Image, RgbImage};
 use crate::math::parallel;
 use crate::scene::lens::{Lens, Undistorted, undistort};
@@ -34,6 +34,8 @@ pub struct LoadedPhoto {
     pub exposure_prior_stops: Option<f32>,
     /// What undoing the distortion of its lens did; `None` for a pinhole.
     pub undistorted: Option<Undistorted>,
+    /// What its mask says of the way that the masks are written in; `None` without one.
+    pub mask_facts: Option<MaskFacts>,
     /// What was noticed of it alone.
     pub findings: Vec<Finding>,
     /// What was noticed without a place, which other photos may share.
@@ -50,26 +52,45 @@ impl LoadedPhoto {
             file_size,
             exposure_prior_stops: None,
             undistorted: None,
+            mask_facts: None,
             findings: Vec::new(),
             shared: Vec::new(),
         }
     }
 }
 
+/// How the masks of photos are written, as all of them say together.
+pub fn way_of_masks(loaded: &[LoadedPhoto]) -> MaskWay {
+    MaskWay::of_set(loaded.iter().filter_map(|photo| photo.mask_facts))
+}
+
 /// Decodes all views, whose files are of these sizes; the first error in the order of `views` is returned. What several photos
-/// have in common is told once, with the first of them.
+/// have in common is told once, with the first of them. Masks are read in the way of `masks`, or in the one that they say
+/// together.
 pub fn load_all(
     views: &[SourceView],
     sizes: &[(usize, usize)],
     encoding: ColourEncoding,
+    masks: Option<MaskWay>,
     settings: &ReadSettings,
 ) -> Result<Vec<LoadedPhoto>> {
     let pixels: usize = sizes.iter().map(|(width, height)| width * height).sum();
     let shrink = settings.shrink;
     let as_half = pixels / (shrink * shrink) * std::mem::size_of::<Vec3>() > MOST_FLOAT_BYTES;
     let packed = if settings.masks == MaskUse::Use { masks::archives_of_masks(views)? } else { BTreeMap::new() };
-    let loaded = parallel::map_items(views, |view| load(view, encoding, settings, as_half, &packed));
+    let load = |view: &SourceView, masks| load(view, encoding, settings, as_half, (masks, &packed));
+    let loaded = parallel::map_items(views, |view| load(view, masks));
     let mut loaded = loaded.into_iter().collect::<Result<Vec<_>>>()?;
+    if masks.is_none() {
+        // The few that alone look otherwise than the others are read once more.
+        let way = way_of_masks(&loaded);
+        let differs = |photo: &LoadedPhoto| photo.mask_facts.is_some_and(|facts| facts.differs_by(way));
+        let again: Vec<usize> = (0..views.len()).filter(|&index| differs(&loaded[index])).collect();
+        let read = parallel::map_items(&again, |&index| load(&views[index], Some(way)));
+        for (index, photo) in again.into_iter().zip(read) {
+            loaded[index] = photo?;
+        }
+    }
     let mut gathered = gather(views, &loaded);
     gathered.extend(centre_exposures(&mut loaded));
     if let Some(first) = loaded.first_mut() {
@@ -105,27 +126,39 @@ pub fn told_of_lenses(loaded: &[LoadedPhoto]) -> Option<Finding> {
     )
 }
 
-/// One finding of those that photos share, with the names of the photos.
+/// One finding of those that photos share, with the names of the photos. Where they differ in how much there is of it, the
+/// worst is told.
 fn gather(views: &[SourceView], loaded: &[LoadedPhoto]) -> Vec<Finding> {
     const SHOWN: usize = 6;
-    let mut groups: Vec<(&Finding, Vec<&str>)> = Vec::new();
+    let is_same = |one: &Finding, other: &Finding| {
+        let both_measured = one.extent > 0.0 && other.extent > 0.0;
+        let key = |finding: &Finding| (finding.code, finding.severity, finding.remedy.clone());
+        one == other || both_measured && key(one) == key(other)
+    };
+    let mut groups: Vec<(Vec<&Finding>, Vec<&str>)> = Vec::new();
     for (view, photo) in views.iter().zip(loaded) {
         for finding in &photo.shared {
-            match groups.iter_mut().find(|(own, _)| *own == finding) {
-                Some((_, names)) => names.push(&view.name),
-                None => groups.push((finding, vec![&view.name])),
+            match groups.iter_mut().find(|(own, _)| is_same(own[0], finding)) {
+                Some((own, names)) => {
+                    own.push(finding);
+                    names.push(&view.name);
+                }
+                None => groups.push((vec![finding], vec![&view.name])),
             }
         }
     }
-    let told = groups.into_iter().map(|(finding, names)| {
+    let told = groups.into_iter().filter_map(|(findings, names)| {
+        let (worst, varies) = repeated::worst_of(findings.iter().copied())?;
+        let finding = findings[worst];
         let count = names.len();
         let which = match count {
             _ if count == views.len() && count > 1 => format!("all {count} photos"),
-            1 => return finding.clone().at(Place::View(names[0].to_owned())),
+            1 => return Some(finding.clone().at(Place::View(names[0].to_owned()))),
             _ if count <= SHOWN => format!("{count} of {} photos: {}", views.len(), names.join(", ")),
             _ => format!("{count} of {} photos: {} and others", views.len(), names[..SHOWN].join(", ")),
         };
-        Finding { message: format!("{} ({which})", finding.message), ..finding.clone() }
+        let which = if varies { format!("view {}, the most of {which}", names[worst]) } else { which };
+        Some(Finding { message: format!("{} ({which})", finding.message), ..finding.clone() })
     });
     told.collect()
 }
@@ -153,7 +186,7 @@ fn load(
     encoding: ColourEncoding,
     settings: &ReadSettings,
     as_half: bool,
-    packed: &BTreeMap<PathBuf, Archive>,
+    (way, packed): (Option<MaskWay>, &BTreeMap<PathBuf, Archive>),
 ) -> Result<LoadedPhoto> {
     let (mut findings, mut shared) = (Vec::new(), Vec::new());
     let options = PhotoOptions {
@@ -183,11 +216,16 @@ fn load(
     };
     mark(&mut states, clipped.as_ref(), PixelState::SurfaceClipped, |clipped| clipped);
     let file_size = (photo.width(), photo.height());
+    let mut mask_facts = None;
     if settings.masks == MaskUse::Use {
         match (&view.mask, &alpha) {
             (Some(mask), _) => {
-                let (values, told) = masks::read_mask(mask, &photo, packed)?;
+                let read = masks::read_mask(mask, packed)?;
+                mask_facts = Some(read.facts());
+                let way = way.unwrap_or_else(|| MaskWay::of_set([read.facts()]));
+                let MaskValues { values, are_opacity, told } = read.into_values(way);
                 shared.extend(told);
+                let values = (masks::resized(values, mask, &photo, packed), are_opacity);
                 masks::apply_mask(mask, values, view, &photo, stored, &mut states, &mut findings)?;
             }
             (None, Some(alpha)) => masks::apply_alpha(alpha, is_float, &mut states, &mut shared),
@@ -210,7 +248,8 @@ fn load(
         1 => (photo, states),
         factor => shrink(&photo, &states, factor),
     };
-    Ok(LoadedPhoto { photo, states, file_size, exposure_prior_stops: exposure_stops, undistorted, findings, shared })
+    let exposure_prior_stops = exposure_stops;
+    Ok(LoadedPhoto { photo, states, file_size, exposure_prior_stops, undistorted, mask_facts, findings, shared })
 }
 
 /// A pinhole sees less than 180 degrees.
@@ -281,7 +320,8 @@ fn checked_floats(
                 row: first_bad / width.max(1),
                 column: first_bad % width.max(1),
             })
-            .remedy("render or export the photo again if they matter"),
+            .remedy("render or export the photo again if they matter")
+            .extent(not_finite as f64),
         );
     }
     if negative > 0 && is_float {
@@ -291,7 +331,8 @@ fn checked_floats(
                 "photo-negative",
                 format!("{negative} pixels are negative: they are set to 0"),
             )
-            .at(Place::View(view.name.clone())),
+            .at(Place::View(view.name.clone()))
+            .extent(negative as f64),
         );
     } else if negative > 0 {
         shared.push(Finding::new(
@@ -383,7 +424,38 @@ pub fn histogram(bytes: &Image<[u8; 3]>, states: &Image<PixelState>) -> [u32; 25
 
 #[cfg(test)]
 mod tests {
+    use super::super::source::SourceCamera;
     use super::*;
+    use glam::{DMat3, DVec3};
+
+    #[test]
+    fn of_what_photos_share_the_worst_is_told_with_how_many_share_it() {
+        let view = |index: usize| SourceView {
+            name: format!("{index:02}"),
+            photo: PathBuf::new(),
+            mask: None,
+            camera: SourceCamera { intrinsics: DMat3::IDENTITY, rotation: DMat3::IDENTITY, translation: DVec3::ZERO },
+            lens: None,
+            size: None,
+            place: Place::Nowhere,
+        };
+        let views: Vec<SourceView> = (0..4).map(view).collect();
+        let told = |bytes: &[usize]| {
+            let loaded = bytes.iter().map(|&bytes| {
+                let states = Image::filled(1, 1, PixelState::Surface);
+                let mut photo = LoadedPhoto::new(Photo::Srgb8(Image::filled(1, 1, [0; 3])), states);
+                let finding = Finding::new(Severity::Note, "stray", format!("{bytes} bytes"));
+                photo.shared.extend((bytes > 0).then(|| finding.extent(bytes as f64)));
+                photo
+            });
+            let told = gather(&views[..bytes.len()], &loaded.collect::<Vec<_>>());
+            told.iter().map(Finding::to_string).collect::<Vec<_>>()
+        };
+        assert_eq!(told(&[2, 0, 900, 3]), ["note [stray]: 900 bytes (view 02, the most of 3 of 4 photos: 00, 02, 03)"]);
+        assert_eq!(told(&[2, 5]), ["note [stray]: 5 bytes (view 01, the most of all 2 photos)"]);
+        assert_eq!(told(&[5, 5]), ["note [stray]: 5 bytes (all 2 photos)"]);
+        assert_eq!(told(&[0, 5]), ["note [stray] view 01: 5 bytes"]);
+    }
 
     #[test]
     fn shrinking_averages_radiance_and_sets_mixtures_aside() {

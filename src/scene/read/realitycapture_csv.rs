@@ -17,6 +17,7 @@ use super::photo_index::{PhotoIndex, Posed, views_of};
 use super::source::{SourceCamera, SourceScene};
 use super::text;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::files::folder_of;
 use crate::image::file;
 use crate::scene::lens::{Lens, Model, Polynomial};
 use glam::{DMat3, DVec3};
@@ -123,7 +124,7 @@ pub fn read(path: &Path) -> Result<SourceScene> {
             .at(Place::Line(path.into(), 1))
             .remedy("export it as Internal/External camera parameters")
     })?;
-    let folder = path.parent().unwrap_or(Path::new(""));
+    let folder = folder_of(path);
     let inner = ["images", "photos", "image"].map(|name| folder.join(name)).into_iter().find(|inner| inner.is_dir());
     let roots: Vec<PathBuf> = inner.into_iter().chain([folder.to_path_buf()]).collect();
     let photos = PhotoIndex::of_folders(&roots)?;

@@ -5,26 +5,38 @@ use crate::error::{Finding, Place};
 /// Names that are told; more are counted.
 const SHOWN: usize = 6;
 
-/// The findings with those of one code joined, each at the place of its first: the first is told whole, of the others the names
-/// of view or file. What has no place, where the message itself says of what it speaks, stays as it is.
+/// The findings with those of one code joined, each where its first stood: the one with the most of it is told whole, of the
+/// others the names of view or file. What has no place, where the message itself says of what it speaks, stays as it is.
 pub fn joined(findings: Vec<Finding>) -> Vec<Finding> {
-    let mut groups: Vec<(Finding, Vec<String>)> = Vec::with_capacity(findings.len());
+    let mut groups: Vec<Vec<Finding>> = Vec::with_capacity(findings.len());
     for finding in findings {
-        let name = name_of(&finding.target);
-        match groups.iter().position(|(first, _)| is_same(first, &finding)) {
-            Some(place) if !name.is_empty() => groups[place].1.push(name),
-            _ => groups.push((finding, Vec::new())),
+        let has_name = !name_of(&finding.target).is_empty();
+        match groups.iter().position(|group| has_name && is_same(&group[0], &finding)) {
+            Some(place) => groups[place].push(finding),
+            None => groups.push(vec![finding]),
         }
     }
-    let told = groups.into_iter().map(|(mut first, others)| {
-        if !others.is_empty() {
-            let shown = others.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", ");
-            let more = if others.len() > SHOWN { format!(" and {} more", others.len() - SHOWN) } else { String::new() };
-            first.message = format!("{}; likewise in {} more: {shown}{more}", first.message, others.len());
-        }
-        first
-    });
-    told.collect()
+    groups.into_iter().filter_map(one_of).collect()
+}
+
+/// One finding of several that are the same but for their place and how much there is of it.
+fn one_of(mut group: Vec<Finding>) -> Option<Finding> {
+    let (worst, varies) = worst_of(&group)?;
+    let mut told = group.remove(worst);
+    if !group.is_empty() {
+        let names: Vec<String> = group.iter().take(SHOWN).map(|other| name_of(&other.target)).collect();
+        let more = if group.len() > SHOWN { format!(" and {} more", group.len() - SHOWN) } else { String::new() };
+        let likewise = if varies { "less, or as much, in" } else { "likewise in" };
+        told.message = format!("{}; {likewise} {} more: {}{more}", told.message, group.len(), names.join(", "));
+    }
+    Some(told)
+}
+
+/// The place of the finding with the most in it, the first of equals, and whether others have less; `None` of none.
+pub fn worst_of<'a>(findings: impl IntoIterator<Item = &'a Finding>) -> Option<(usize, bool)> {
+    let extents: Vec<f64> = findings.into_iter().map(|finding| finding.extent).collect();
+    let worst = (0..extents.len()).max_by(|&a, &b| extents[a].total_cmp(&extents[b]).then(b.cmp(&a)))?;
+    Some((worst, extents.iter().any(|extent| *extent < extents[worst])))
 }
 
 fn is_same(one: &Finding, other: &Finding) -> bool {
@@ -52,11 +64,11 @@ mod tests {
     #[test]
     fn findings_of_one_code_are_one_with_the_names_of_all() {
         let negative = |view: usize| {
-            Finding::new(Severity::Note, "photo-negative", format!("{view} pixels are negative")).at(Place::Pixel {
-                view: format!("{view:03}"),
-                row: 1,
-                column: 2,
-            })
+            let place = Place::Pixel { view: format!("{view:03}"), row: 1, column: 2 };
+            let pixels = if view == 7 { 900 } else { view };
+            Finding::new(Severity::Note, "photo-negative", format!("{pixels} pixels are negative"))
+                .at(place)
+                .extent(pixels as f64)
         };
         let depth = |file: &str| Finding::new(Severity::Note, "depth", "not used").at(Place::Line(file.into(), 12));
         let bare = |name: &str| Finding::new(Severity::Warning, "held-out-unknown", format!("no view {name}"));
@@ -66,8 +78,8 @@ mod tests {
         assert_eq!(
             messages,
             [
-                "note [photo-negative] view 000, pixel row 1 column 2: 0 pixels are negative; likewise in 8 more: 001, 002, \
-                 003, 004, 005, 006 and 2 more",
+                "note [photo-negative] view 007, pixel row 1 column 2: 900 pixels are negative; less, or as much, in 8 more: \
+                 000, 001, 002, 003, 004, 005 and 2 more",
                 "note [depth] a/x.txt, line 12: not used; likewise in 1 more: y.txt line 12",
                 "warning [held-out-unknown]: no view p",
                 "warning [held-out-unknown]: no view q",

@@ -1,6 +1,7 @@
 //! A scene as a reader finds it: paths and numbers of the source, before anything is turned or decoded.
 
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::files::name_of_folder;
 use crate::scene::lens::{Lens, Pinhole};
 use crate::scene::settings::{ColourEncoding, PixelCentre, Up};
 use crate::scene::{Background, Camera, WorldFromSource};
@@ -25,7 +26,7 @@ pub struct SourceView {
     pub name: String,
     /// The photo's file.
     pub photo: PathBuf,
-    /// The mask's file: full scale is object, or 1 of 0 and 1, or what is opaque ([`file::read_mask`](crate::image::file::read_mask)).
+    /// The mask's file: full scale is object, or 1 of 0 and 1, or what is opaque ([`file::MaskFile`](crate::image::file::MaskFile)).
     pub mask: Option<PathBuf>,
     /// The camera.
     pub camera: SourceCamera,
@@ -86,10 +87,8 @@ pub struct MeshFrame {
 impl SourceScene {
     /// A scene of photographs whose pixel centres are at (0.5, 0.5), with nothing said of its up axis: as most tools export.
     pub fn of_photographs(folder: &Path, mesh: Vec<PathBuf>, views: Vec<SourceView>) -> Self {
-        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-        let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.into());
         SourceScene {
-            name: whole.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            name: name_of_folder(folder),
             folder: folder.into(),
             mesh,
             views,
@@ -159,7 +158,8 @@ impl SourceCamera {
                     format!("the extrinsics are off a rotation by {departure:.1e}: the nearest rotation is used"),
                 )
                 .at(place.clone())
-                .remedy("export the camera with more digits"),
+                .remedy("export the camera with more digits")
+                .extent(departure),
             );
         }
         Ok((SourceCamera { intrinsics, rotation: nearest_rotation(rotation), translation }, findings))

@@ -28,7 +28,9 @@ pub fn read(path: &Path) -> Result<SourceMesh> {
     // A text has letters for a number of triangles, which stand for more than any file holds.
     let (corners, findings) = if let Some(trailing) = trailing.filter(|more| *more == 0 || count > 0) {
         let message = format!("{trailing} bytes behind the last of {count} triangles are passed over");
-        let told = Finding::new(Severity::Note, "stl-trailing-bytes", message).at(Place::Byte(path.into(), length));
+        let told = Finding::new(Severity::Note, "stl-trailing-bytes", message)
+            .at(Place::Byte(path.into(), length))
+            .extent(trailing as f64);
         (of_binary(&bytes[FRONT..length as usize], path)?, if trailing > 0 { vec![told] } else { Vec::new() })
     } else if is_text || bytes.starts_with(b"\xef\xbb\xbf") {
         of_ascii(bytes, path)?

@@ -10,6 +10,7 @@ use super::mesh_choice;
 use super::photo_index::{PhotoIndex, Posed, some_of, views_of};
 use super::source::{MeshFrame, SourceCamera, SourceScene};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::files::folder_of;
 use crate::image::file;
 use crate::scene::lens::{Base, Lens, Model, Polynomial};
 use glam::{DMat3, DMat4, DVec3, DVec4};
@@ -164,7 +165,7 @@ impl Transforms {
         let (camera, mut noticed) =
             SourceCamera::new(intrinsics, rotation, -(rotation * undone.w_axis.truncate()), &place)?;
         findings.append(&mut noticed);
-        let base = self.path.parent().unwrap_or(Path::new(""));
+        let base = folder_of(&self.path);
         let mask = frame.get("mask_path").and_then(Value::as_str).map(|mask| base.join(mask));
         if let Some(absent) = mask.as_ref().filter(|mask| !mask.is_file()) {
             return Err(Error::new(ErrorKind::Missing, format!("the mask {} is not there", absent.display()))
