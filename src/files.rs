@@ -5,10 +5,48 @@ use std::collections::HashSet;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+use unicode_normalization::UnicodeNormalization;
 
 /// The folder that a file lies in: of a bare name the current one, `.`, which can be listed where an empty path cannot.
 pub fn folder_of(file: &Path) -> &Path {
     file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// A name as it is compared with others: letters with marks are one character each (Unicode's form C). Some systems store
+/// file names with the marks behind the letters (form D), whatever a program wrote into its files.
+pub fn composed(name: &str) -> String {
+    if name.is_ascii() { name.to_owned() } else { name.nfc().collect() }
+}
+
+/// The name of a file, without its folder, [`composed`].
+pub fn name_of(path: &Path) -> String {
+    composed(&path.file_name().unwrap_or_default().to_string_lossy())
+}
+
+/// The name of a file without folder and extension, [`composed`].
+pub fn stem_of(path: &Path) -> String {
+    composed(&path.file_stem().unwrap_or_default().to_string_lossy())
+}
+
+/// A path as it lies on the disk, where names in it may be stored in another form of Unicode than they are written in; the
+/// path itself where there is none.
+pub fn as_stored(path: PathBuf) -> PathBuf {
+    let stored = |path: &Path| -> Option<PathBuf> {
+        let (folder, name) = (path.parent()?, name_of(path));
+        let folder = if folder.as_os_str().is_empty() { folder.into() } else { as_stored(folder.into()) };
+        let same = folder.join(path.file_name()?);
+        if same.exists() {
+            return Some(same);
+        }
+        let entries = std::fs::read_dir(folder_of(&same)).ok()?;
+        let found = entries.filter_map(|entry| Some(entry.ok()?.path())).find(|own| name_of(own) == name)?;
+        Some(folder.join(found.file_name()?))
+    };
+    // Plain letters have but one form.
+    if path.exists() || path.to_string_lossy().is_ascii() {
+        return path;
+    }
+    stored(&path).unwrap_or(path)
 }
 
 /// The name of a folder, also of one that its path does not name: `.`, `..`, an empty path. Empty for a root.
@@ -130,5 +168,23 @@ mod tests {
         assert_eq!(name_of_folder(Path::new("..")), name(current.parent().unwrap()));
         assert_eq!(name_of_folder(Path::new("far/away")), "away");
         assert!(std::fs::read_dir(folder_of(Path::new("Cargo.toml"))).is_ok());
+    }
+
+    #[test]
+    fn names_in_either_form_of_unicode_are_one() {
+        let [apart, whole] = ["cafe\u{301} 3", "caf\u{e9} 3"];
+        assert!(apart != whole && composed(apart) == whole && composed(whole) == whole);
+        assert_eq!(stem_of(Path::new("x/cafe\u{301} 3.png")), whole);
+        let folder = tempfile::tempdir().unwrap();
+        for (stored, written) in [(apart, whole), (whole, apart)] {
+            let root = folder.path().join(stored.replace(' ', "_"));
+            std::fs::create_dir_all(&root).unwrap();
+            std::fs::write(root.join(format!("{stored}.png")), b"").unwrap();
+            let path = folder.path().join(written.replace(' ', "_")).join(format!("{written}.png"));
+            let found = as_stored(path);
+            assert!(found.is_file(), "{found:?}");
+            assert!(as_stored(root.join("none\u{e9}.png")).ends_with("none\u{e9}.png"));
+            std::fs::remove_dir_all(&root).unwrap();
+        }
     }
 }

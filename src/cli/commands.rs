@@ -3,7 +3,7 @@
 use super::arguments::{CompareOptions, Layer, ReadOptions, RelightOptions, RenderOptions};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::export::RunFolder;
-use crate::files::unrepeated;
+use crate::files::{composed, unrepeated};
 use crate::fit::views::{ViewUse, uses_of};
 use crate::image::file;
 use crate::insight::scores::{aggregate, score_halves};
@@ -42,7 +42,7 @@ fn chosen_views(scene: &Scene, names: &[String], otherwise: impl Fn(&Scene) -> V
     names
         .iter()
         .map(|name| {
-            scene.views.iter().position(|view| view.name == *name).ok_or_else(|| {
+            scene.views.iter().position(|view| view.name == composed(name)).ok_or_else(|| {
                 Error::new(ErrorKind::InvalidSetting, format!("the scene has no view named {name}"))
                     .at(Place::Setting("views".into()))
                     .remedy("names are those of the photos without their ending")

@@ -29,6 +29,8 @@ pub struct Asset {
     pub lobe: LobeModel,
     /// The light; `None` for a run without one.
     pub light: Option<Light>,
+    /// How many metres a unit of the mesh is: 1 where it is not known.
+    pub unit_in_metres: f64,
 }
 
 /// The light of an asset.
@@ -60,7 +62,7 @@ impl Asset {
             let sun = sun_of(&environment);
             Light { whole: environment, sun }
         });
-        Asset { name: file_name_of(name), mesh, maps, has_lobe, lobe, light }
+        Asset { name: file_name_of(name), mesh, maps, has_lobe, lobe, light, unit_in_metres: 1.0 }
     }
 
     /// Roughness of glTF, Disney, Blender: the square root of the width of the GGX lobe, or of the nearest one.

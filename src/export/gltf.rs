@@ -89,6 +89,10 @@ pub fn glb(asset: &Asset, sixteen_bits: bool) -> Result<Glb> {
 
     // The scene: the surface, and the sun as a light that shines along -z of its node.
     let mut nodes = vec![json!({"mesh": 0, "name": asset.name})];
+    // glTF is in metres; what it has no unit for stays as it is.
+    if asset.unit_in_metres != 1.0 {
+        nodes[0]["scale"] = json!(vec![asset.unit_in_metres; 3]);
+    }
     let mut document_extensions = json!({});
     if let Some(sun) = asset.light.as_ref().and_then(|light| light.sun.as_ref()) {
         extensions_used.push("KHR_lights_punctual");
@@ -258,6 +262,9 @@ mod tests {
         let sun = asset.light.as_ref().unwrap().sun.as_ref().unwrap();
         let bytes = glb(&asset, false).unwrap().bytes;
         let (document, _) = parts(&bytes);
+        assert!(document["nodes"][0]["scale"].is_null());
+        let small = glb(&Asset { unit_in_metres: 0.5, ..small_asset(true) }, false).unwrap().bytes;
+        assert_eq!(parts(&small).0["nodes"][0]["scale"], json!([0.5, 0.5, 0.5]), "glTF is in metres");
         let rotation: Vec<f32> = document["nodes"][1]["rotation"]
             .as_array()
             .unwrap()

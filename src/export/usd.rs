@@ -78,7 +78,8 @@ fn stage(asset: &Asset, lobe: Option<Metalness>) -> String {
     let mesh = &asset.mesh;
     let mut text = format!(
         "#usda 1.0\n(\n    defaultPrim = \"{name}\"\n    doc = \"Written by Patina; see convention.txt\"\n    \
-         metersPerUnit = 1\n    upAxis = \"Y\"\n)\n\ndef Xform \"{name}\" (\n    kind = \"component\"\n)\n{{\n"
+         metersPerUnit = {}\n    upAxis = \"Y\"\n)\n\ndef Xform \"{name}\" (\n    kind = \"component\"\n)\n{{\n",
+        asset.unit_in_metres
     );
     let list = |values: &mut dyn Iterator<Item = String>| values.collect::<Vec<_>>().join(", ");
     let vectors = |values: &[glam::Vec3]| list(&mut values.iter().map(|v| format!("({}, {}, {})", v.x, v.y, v.z)));
@@ -295,6 +296,9 @@ mod tests {
             assert_eq!(text.matches('{').count(), text.matches('}').count());
             assert_eq!(text.matches('(').count(), text.matches(')').count());
             assert!(text.contains("point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]"));
+            assert!(text.contains("metersPerUnit = 1\n"));
+            let small = stage(&Asset { unit_in_metres: 0.001, ..small_asset(has_lobe) }, None);
+            assert!(small.contains("metersPerUnit = 0.001\n"));
             assert!(text.contains("primvars:st = [(0.1, 0.1), "));
             assert!(text.contains("int inputs:useSpecularWorkflow = 1"));
             assert_eq!(text.contains("specularColor.connect"), has_lobe);

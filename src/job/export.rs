@@ -254,6 +254,15 @@ fn lobe_of(folder: &RunFolder) -> Result<(bool, LobeModel)> {
     Ok((settings.fit.has_lobe(), settings.fit.lobe))
 }
 
+/// How many metres a unit of a run's mesh is, where it was given: 1 elsewhere.
+fn unit_of(folder: &RunFolder) -> Result<f64> {
+    if !folder.file("settings.toml").is_file() {
+        return Ok(1.0);
+    }
+    let settings: RunSettings = folder.read_settings()?;
+    Ok(settings.read.unit_in_metres.unwrap_or(1.0))
+}
+
 /// Writes an export. `tell` hears of it; `stop` ends it between files, and then nothing is left behind.
 ///
 /// # Errors
@@ -290,7 +299,8 @@ pub fn export(options: &ExportOptions, stop: &AtomicBool, tell: &dyn Fn(ExportEv
         }
     };
     go_on()?;
-    let asset = Asset::new(&name, result, has_light, lobe_of(&folder)?.0, options.size);
+    let mut asset = Asset::new(&name, result, has_light, lobe_of(&folder)?.0, options.size);
+    asset.unit_in_metres = unit_of(&folder)?;
     if asset.light.is_none() && has_light {
         findings.push(without_light());
     }

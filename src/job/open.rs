@@ -99,13 +99,16 @@ pub fn begin(
         known_light = Some(light);
     }
     let (scene, surface) = (Arc::clone(&prepared.scene), Arc::clone(&prepared.surface));
+    // What a manifest gives goes with the run, whose exports are scaled by it.
+    let unit_in_metres = settings.read.unit_in_metres.or(scene.world_from_source.unit_in_metres);
     let known_maps = known_maps::of_settings(&settings, &surface)?;
     let fitter = told(OpenStage::Start, stop, tell, || {
         let mut fitter = Fitter::new(scene, surface, settings.fit.clone(), known_light.as_ref())?;
         known_maps.map_or(Ok(()), |known| fitter.take_maps(known))?;
         Ok(fitter)
     })?;
-    let settings = RunSettings { fit: fitter.settings().clone(), ..settings };
+    let mut settings = RunSettings { fit: fitter.settings().clone(), ..settings };
+    settings.read.unit_in_metres = unit_in_metres;
     prepared.findings.retain(|finding| !settings.fit.do_what_is_asked(finding));
     Ok((prepared, fitter, settings))
 }

@@ -109,11 +109,14 @@ pub struct WorldFromSource {
     pub rotation: DMat3,
     /// The point of the source that becomes the origin: zero unless coordinates are too large for `f32`.
     pub origin_in_source: DVec3,
+    /// How many metres a unit of both is, where it is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit_in_metres: Option<f64>,
 }
 
 impl Default for WorldFromSource {
     fn default() -> Self {
-        WorldFromSource { rotation: DMat3::IDENTITY, origin_in_source: DVec3::ZERO }
+        WorldFromSource { rotation: DMat3::IDENTITY, origin_in_source: DVec3::ZERO, unit_in_metres: None }
     }
 }
 

@@ -28,9 +28,13 @@ pub struct ReadSettings {
     /// The layer of OpenEXR photos by its name, or the last part of it; none takes the layer of radiance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub layer: Option<String>,
-    /// The mesh, where the source names none or another is meant.
+    /// How many metres a unit of the source is; none leaves it open. Lengths are told in metres and exports are scaled by it,
+    /// a fit does not depend on it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub mesh: Option<PathBuf>,
+    pub unit_in_metres: Option<f64>,
+    /// The mesh, where the source names none or another is meant; several files are pieces of one.
+    #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "one_or_more")]
+    pub mesh: Vec<PathBuf>,
     /// The chunk of a Metashape project or export, by label or number; none takes the one whose photos are here.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chunk: Option<String>,
@@ -51,7 +55,8 @@ impl Default for ReadSettings {
             background: BackgroundChoice::Auto,
             encoding: ColourEncoding::Auto,
             layer: None,
-            mesh: None,
+            unit_in_metres: None,
+            mesh: Vec::new(),
             chunk: None,
             shrink: 1,
         }
@@ -66,8 +71,35 @@ impl ReadSettings {
                 .at(Place::Setting("downsample".into()))
                 .remedy("give a whole number from 1 to 64"));
         }
+        if let Some(metres) = self.unit_in_metres.filter(|&metres| !is_length(metres)) {
+            return Err(Error::new(ErrorKind::InvalidSetting, format!("a unit is {metres} metres"))
+                .at(Place::Setting("unit-in-metres".into()))
+                .remedy("give metres above 0, such as 0.001 for millimetres"));
+        }
         Ok(())
     }
+}
+
+/// Whether metres are a length that a unit can have.
+pub fn is_length(metres: f64) -> bool {
+    metres.is_finite() && metres > 0.0
+}
+
+/// A path, or a list of them, as settings and manifests name them.
+///
+/// # Errors
+/// What is neither.
+pub fn one_or_more<'de, D: serde::Deserializer<'de>>(deserializer: D) -> std::result::Result<Vec<PathBuf>, D::Error> {
+    #[derive(serde::Deserialize)]
+    #[serde(untagged)]
+    enum OneOrMore {
+        One(PathBuf),
+        More(Vec<PathBuf>),
+    }
+    Ok(match <OneOrMore as serde::Deserialize>::deserialize(deserializer)? {
+        OneOrMore::One(path) => vec![path],
+        OneOrMore::More(paths) => paths,
+    })
 }
 
 /// The direction of the source that points to the sky.
@@ -238,10 +270,18 @@ mod tests {
             pixel_centre: PixelCentre::Half,
             shrink: 2,
             layer: Some("Combined".into()),
+            unit_in_metres: Some(0.001),
+            mesh: vec!["a.obj".into(), "b.obj".into()],
             ..Default::default()
         };
         let text = toml::to_string(&settings).unwrap();
         assert_eq!(toml::from_str::<ReadSettings>(&text).unwrap(), settings);
+        let older: ReadSettings = toml::from_str("mesh = \"a.obj\"").unwrap();
+        assert_eq!(older.mesh, [PathBuf::from("a.obj")]);
+        for metres in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let error = ReadSettings { unit_in_metres: Some(metres), ..settings.clone() }.validate().unwrap_err();
+            assert_eq!(error.place(), &Place::Setting("unit-in-metres".into()), "{metres}");
+        }
         assert!(toml::from_str::<ReadSettings>("shrinkage = 2").is_err());
     }
 

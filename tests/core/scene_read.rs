@@ -4,10 +4,12 @@
 
 use super::scene_fixture::*;
 use glam::{Mat3, Vec3};
+use patina::error::Place;
 use patina::image::{Image, file};
+use patina::scene::read::understand;
 use patina::scene::settings::{MaskUse, PixelCentre, Up};
-use patina::scene::{Camera, Photo, PixelState, ReadSettings, Scene, read, read_mesh};
-use std::path::Path;
+use patina::scene::{Camera, Mesh, Photo, PixelState, ReadSettings, Scene, read, read_mesh};
+use std::path::{Path, PathBuf};
 
 fn assert_same_cameras(read: &Scene, written: &Scene) {
     assert_eq!(read.views.len(), written.views.len());
@@ -203,12 +205,19 @@ fn a_manifest_names_each_part_and_turns_what_it_says() {
         camera_matrix = "world_from_camera"
         pixel_centre = "half"
         up = "Y"
+        unit_in_metres = 0.01
         held_out = ["00000002", "nobody"]
         flip_winding = true
     "#;
     write(&folder.join("scene.toml"), text);
     let scene = read(&folder, &ReadSettings::default()).unwrap();
     assert_eq!(scene.name, "two balls");
+    assert_eq!(scene.world_from_source.unit_in_metres, Some(0.01));
+    let settings = ReadSettings { unit_in_metres: Some(0.5), ..Default::default() };
+    assert_eq!(read(&folder, &settings).unwrap().world_from_source.unit_in_metres, Some(0.5), "what is typed wins");
+    write(&folder.join("scene.toml"), &text.replace("0.01", "0"));
+    let error = read(&folder, &ReadSettings::default()).unwrap_err();
+    assert_eq!(error.place(), &Place::Line(folder.join("scene.toml"), 10), "{error}");
     assert_same_cameras(&scene, &written);
     assert_eq!(scene.views.iter().map(|view| view.held_out).collect::<Vec<_>>(), [false, false, true, false]);
     assert!(has(&scene, "held-out-unknown"));
@@ -309,4 +318,47 @@ fn normals_that_are_none_are_computed() {
         findings.iter().any(|finding| finding.code == "mesh-normals-dropped"),
         "one that is used is no number: {findings:?}"
     );
+}
+
+#[test]
+fn several_meshes_are_pieces_of_one_and_a_unit_is_told_and_kept() {
+    let (_keep, folder) = folder();
+    let written = scene(4);
+    write_blended_mvs(&folder, &written, &FolderStyle::default());
+    let corners = written.mesh.triangles.len() / 2;
+    let pieces: Vec<PathBuf> = [&written.mesh.triangles[..corners], &written.mesh.triangles[corners..]]
+        .iter()
+        .enumerate()
+        .map(|(index, triangles)| {
+            let path = folder.with_file_name(format!("piece_{index}.obj"));
+            let piece = Mesh { triangles: triangles.to_vec(), ..written.mesh.clone() };
+            write(&path, &obj_text(&piece, &FolderStyle::default()));
+            path
+        })
+        .collect();
+    let triangles = |mesh: &[PathBuf]| {
+        let settings = ReadSettings { mesh: mesh.to_vec(), ..Default::default() };
+        let scene = read(&folder, &settings).unwrap();
+        let told = understand(&folder, &settings, &scene).unwrap();
+        assert_eq!(told.mesh.len(), mesh.len().max(1));
+        (scene.mesh.triangles.len(), has(&scene, "mesh-pieces"))
+    };
+    let (whole, _) = triangles(&[]);
+    assert_eq!(triangles(&pieces), (whole, true));
+    assert_eq!(triangles(&pieces[..1]), (corners, false));
+
+    let page = |unit_in_metres| {
+        let settings = ReadSettings { unit_in_metres, ..Default::default() };
+        let scene = read(&folder, &settings).unwrap();
+        assert_eq!(scene.world_from_source.unit_in_metres, unit_in_metres);
+        let told = understand(&folder, &settings, &scene).unwrap();
+        let line = told.to_string().lines().find(|line| line.starts_with("scale")).unwrap().to_owned();
+        (told.diagonal, line)
+    };
+    let (diagonal, line) = page(None);
+    assert!(line.contains(&format!("{diagonal:.4} across")) && line.ends_with("in units of the source"), "{line}");
+    let (same, line) = page(Some(0.001));
+    assert_eq!(same, diagonal);
+    assert!(line.contains(&format!("{:.4} across", 0.001 * diagonal)), "{line}");
+    assert!(line.ends_with("in metres: a unit of the source is given as 0.001"), "{line}");
 }

@@ -3,7 +3,7 @@
 use super::groups;
 use crate::atlas::KeepUv;
 use crate::fit::{FitSettings, Method, Preset};
-use crate::scene::settings::{BackgroundChoice, ColourEncoding, MaskUse, PixelCentre, Up};
+use crate::scene::settings::{BackgroundChoice, ColourEncoding, MaskUse, PixelCentre, Up, is_length};
 use clap::{Args, FromArgMatches};
 use std::path::PathBuf;
 
@@ -58,9 +58,13 @@ pub struct ReadOptions {
     /// given.
     #[arg(long, help_heading = groups::SCENE, value_name = "NAME")]
     pub layer: Option<String>,
-    /// The mesh, where the scene's folder holds none or another is meant.
+    /// How many metres a unit of the data set is, such as 0.001 for millimetres: lengths are told in metres, and exports to
+    /// GLB and USD are scaled.
+    #[arg(long, help_heading = groups::SCENE, value_name = "METRES", value_parser = metres)]
+    pub unit_in_metres: Option<f64>,
+    /// The mesh, where the scene's folder holds none or another is meant; given more than once, its pieces.
     #[arg(long, help_heading = groups::SCENE, value_name = "FILE")]
-    pub mesh: Option<PathBuf>,
+    pub mesh: Vec<PathBuf>,
     /// The chunk of a Metashape project, by label or number.
     #[arg(long, help_heading = groups::SCENE, value_name = "NAME")]
     pub chunk: Option<String>,
@@ -101,9 +105,13 @@ impl ReadOptions {
         if let Some(layer) = &self.layer {
             settings.layer = Some(layer.clone());
         }
-        if let Some(mesh) = &self.mesh {
+        if self.unit_in_metres.is_some() {
+            settings.unit_in_metres = self.unit_in_metres;
+        }
+        if !self.mesh.is_empty() {
             // A run is resumed from other folders too.
-            settings.mesh = Some(std::path::absolute(mesh).unwrap_or_else(|_| mesh.clone()));
+            let whole = |mesh: &PathBuf| std::path::absolute(mesh).unwrap_or_else(|_| mesh.clone());
+            settings.mesh = self.mesh.iter().map(whole).collect();
         }
         if let Some(chunk) = &self.chunk {
             settings.chunk = Some(chunk.clone());
@@ -163,6 +171,12 @@ pub struct FitOptions {
     /// How maps and environment are fitted.
     #[command(flatten)]
     pub fit: TypedSettings,
+}
+
+/// The length of a unit.
+fn metres(text: &str) -> Result<f64, String> {
+    let metres = text.parse().map_err(|_| "give a number of metres".to_string())?;
+    if is_length(metres) { Ok(metres) } else { Err("give metres above 0, such as 0.001 for millimetres".into()) }
 }
 
 /// A time that can be waited for.

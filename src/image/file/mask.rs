@@ -142,7 +142,7 @@ impl MaskFile {
     }
 
     /// The same file, whose colours are a picture that is black where it is masked.
-    pub fn as_picture(mut self) -> Self {
+    pub fn of_picture(mut self) -> Self {
         self.facts.is_picture = true;
         self
     }

@@ -305,7 +305,8 @@ mod tests {
             encoding: ColourEncoding::Linear,
             layer: Some("View Layer.Combined".into()),
             shrink: 2,
-            mesh: Some("/meshes/vase.obj".into()),
+            unit_in_metres: Some(0.001),
+            mesh: vec!["/meshes/vase.obj".into(), "/meshes/lid.obj".into()],
             chunk: Some("Chunk 2".into()),
         };
         for read in [read, ReadSettings::default()] {

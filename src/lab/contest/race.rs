@@ -331,6 +331,7 @@ pub fn read_arguments(read: &ReadSettings) -> Vec<String> {
         format!("--shrink={}", read.shrink),
     ];
     arguments.extend(read.layer.iter().map(|layer| format!("--layer={layer}")));
+    arguments.extend(read.unit_in_metres.iter().map(|metres| format!("--unit-in-metres={metres}")));
     arguments.extend(read.mesh.iter().map(|mesh| format!("--mesh={}", mesh.display())));
     arguments.extend(read.chunk.iter().map(|chunk| format!("--chunk={chunk}")));
     arguments

@@ -251,6 +251,17 @@ fn scenes() -> Result<Vec<Kind>> {
             ("scale_mat_0.npy", bytes),
         ])
     };
+    let mut lighting = scene(
+        "objects-with-lighting",
+        "",
+        (0..PHOTOS.len()).map(|number| target(&format!("test/inputs/camera_000{number}.txt"), own::LIGHTING)).collect(),
+    )?;
+    // Photos and masks go by the numbers of their cameras.
+    let photos = lighting.others.drain(1..).enumerate();
+    let photos: Vec<_> =
+        photos.map(|(number, (_, photo))| (format!("test/inputs/image_000{number}.png"), photo)).collect();
+    lighting.others.push(("test/inputs/mask_0001.png".into(), photos[1].1.clone()));
+    lighting.others.extend(photos);
     let side = |name: &str| target(&name.replace(".png", ".xmp"), own::XMP);
     Ok(vec![
         blended,
@@ -268,6 +279,7 @@ fn scenes() -> Result<Vec<Kind>> {
         scene("opensfm", "images/", vec![target("reconstruction.json", own::OPENSFM)])?,
         scene("alicevision", "", vec![target("sfm.json", own::ALICEVISION)])?,
         neus,
+        lighting,
         scene("llff", "images/", vec![target("poses_bounds.npy", numpy::written(&[3, 17], &own::llff_rows()))])?,
     ])
 }

@@ -283,4 +283,20 @@ mod tests {
         let unknown = Settings { kinds: vec!["psd".into()], ..settings };
         assert_eq!(run(&unknown, &|_| {}).unwrap_err().kind(), ErrorKind::InvalidSetting);
     }
+
+    #[test]
+    fn every_format_of_scenes_has_a_kind() {
+        let scenes = kinds().unwrap().into_iter().filter(|kind| kind.opening == Opening::Scene);
+        let format_of = |kind: Kind| {
+            let folder = tempfile::tempdir().unwrap();
+            kind.others.iter().for_each(|(path, bytes)| write(&folder.path().join(path), bytes).unwrap());
+            for target in &kind.targets {
+                write(&folder.path().join(&target.path), &(target.wrap)(&target.whole)).unwrap();
+            }
+            read::locate(folder.path()).unwrap().format
+        };
+        let formats: Vec<read::Format> = scenes.map(format_of).collect();
+        let without: Vec<_> = read::Format::ALL.iter().filter(|format| !formats.contains(format)).collect();
+        assert!(without.is_empty(), "{without:?}");
+    }
 }

@@ -7,6 +7,9 @@ use crate::scene::read::numpy;
 pub const CAM_TXT: &str =
     "extrinsic\n1 0 0 -0.3\n0 1 0 -0.3\n0 0 1 4\n0 0 0 1\n\nintrinsic\n12 0 6\n0 12 4.5\n0 0 1\n\n0.1 0.01 192 5\n";
 
+/// Objects with Lighting: K, R, t, then width, height and channels.
+pub const LIGHTING: &str = "12 0 6\n0 12 4.5\n0 0 1\n1 0 0\n0 1 0\n0 0 1\n-0.3 -0.3 4\n1.2e+01 9 3\n";
+
 /// `scene.toml` with the cameras of [`CAMERAS_JSON`].
 pub const MANIFEST: &str = "name = \"small\"\nmesh = \"mesh.ply\"\nimages = \"photos\"\ncameras = \"cameras.json\"\ncamera_axes = \"opencv\"\n\
 camera_matrix = \"camera_from_world\"\nup = \"Y\"\npixel_centre = \"half\"\nbackground = \"environment\"\nheld_out = [\"b\"]\n";
@@ -70,10 +73,12 @@ pub const METASHAPE_XML: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <document version="1.5.0"><chunk label="Chunk 1" enabled="1"><sensors>
 <sensor id="0" type="frame"><resolution width="12" height="9"/><calibration type="frame" class="adjusted"><resolution width="12" height="9"/>
 <f>12</f><cx>0.5</cx><cy>-0.25</cy><b1>1</b1><b2>0.5</b2><k1>0.1</k1><p1>0.001</p1><p2>0.002</p2></calibration></sensor>
-<sensor id="1" type="fisheye"><resolution width="12" height="9"/><calibration type="fisheye" class="adjusted"><f>8</f></calibration></sensor></sensors>
+<sensor id="1" type="fisheye"><resolution width="12" height="9"/><calibration type="fisheye" class="adjusted"><f>8</f></calibration></sensor>
+<sensor id="2" type="frame" master_id="0"><resolution width="12" height="9"/><calibration type="frame" class="adjusted"><f>12</f></calibration>
+<rotation fixed="true">1 0 0 0 1 0 0 0 1</rotation><location fixed="false">0.1 0 0.05</location></sensor></sensors>
 <cameras><camera id="0" sensor_id="0" label="a"><transform>1 0 0 0.3 0 -1 0 0.3 0 0 -1 4 0 0 0 1</transform></camera>
 <group label="g"><camera id="1" sensor_id="1" label="b.png"><transform>1 0 0 0.2 0 -1 0 0.3 0 0 -1 4 0 0 0 1</transform></camera></group>
-<camera id="2" sensor_id="0" label="c"/></cameras>
+<camera id="2" sensor_id="2" master_id="0" label="c"/><camera id="3" sensor_id="0" label="d"/></cameras>
 <transform><rotation>0 -1 0 1 0 0 0 0 1</rotation><translation>1 2 3</translation><scale>2</scale></transform></chunk></document>"#;
 
 /// Metashape, a chunk of a project.

@@ -210,7 +210,7 @@ fn sort(findings: &mut [Finding]) {
 }
 
 /// Names by how bad they are, the worst first, those as bad in the order given; and how bad the worst is. `None` of none.
-pub fn worst_first<'a>(mut bad: Vec<(f64, &'a str)>) -> Option<(f64, Vec<&'a str>)> {
+pub fn worst_first(mut bad: Vec<(f64, &str)>) -> Option<(f64, Vec<&str>)> {
     bad.sort_by(|a, b| b.0.total_cmp(&a.0));
     let worst = bad.first()?.0;
     Some((worst, bad.into_iter().map(|(_, name)| name).collect()))

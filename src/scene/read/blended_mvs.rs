@@ -12,7 +12,7 @@ use super::camera_file;
 use super::mask_names::{self, Masks, PHOTO_EXTENSIONS};
 use super::source::{SourceScene, SourceView};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
-use crate::files::name_of_folder;
+use crate::files::{name_of_folder, stem_of};
 use crate::image::file;
 use crate::scene::Background;
 use crate::scene::settings::{ColourEncoding, PixelCentre, Up};
@@ -60,6 +60,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
         views,
         up: Up::Auto,
         pixel_centre: PixelCentre::Auto,
+        unit_in_metres: None,
         default_pixel_centre: PixelCentre::Integer,
         background: Background::Environment,
         encoding: ColourEncoding::Auto,
@@ -120,7 +121,7 @@ pub fn files_of(folder: &Path, extensions: &[&str]) -> Result<Vec<PathBuf>> {
 pub fn photos_of(images: &Path) -> Result<(BTreeMap<String, PathBuf>, BTreeMap<String, PathBuf>)> {
     let (mut photos, mut twins) = (BTreeMap::new(), BTreeMap::new());
     for path in files_of(images, &PHOTO_EXTENSIONS)? {
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let stem = stem_of(&path);
         if let Some(name) = stem.strip_suffix("_masked") {
             twins.insert(name.to_owned(), path);
         } else if let Some(other) = photos.insert(stem.clone(), path.clone()) {
@@ -163,7 +164,7 @@ pub fn views(
     let (photos, twins) = photos_of(images)?;
     let mut cameras = BTreeMap::new();
     for path in files_of(cams, &["txt"])? {
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let stem = stem_of(&path);
         if let Some(name) = stem.strip_suffix("_cam") {
             cameras.insert(name.to_owned(), path);
         }

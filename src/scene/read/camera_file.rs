@@ -4,6 +4,7 @@ use super::source::SourceCamera;
 pub use super::text::read as read_text;
 use super::text::{self, Words};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::files::stem_of;
 use glam::{DMat3, DVec3};
 use std::path::{Path, PathBuf};
 
@@ -135,7 +136,7 @@ pub fn read_cameras_json(path: &Path) -> Result<(Vec<JsonView>, Vec<Finding>)> {
     let mut views = Vec::new();
     let mut findings = Vec::new();
     for view in json.views {
-        let name = view.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let name = stem_of(&view.file);
         let place = Place::View(format!("{name} of {}", path.display()));
         if view.distortion.iter().any(|&coefficient| coefficient != 0.0) {
             return Err(Error::new(ErrorKind::Unsupported, "the camera has lens distortion")

@@ -13,7 +13,7 @@ use super::photos::shrink_linear;
 use super::source::{SourceScene, SourceView};
 use super::text;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
-use crate::files::name_of_folder;
+use crate::files::{as_stored, name_of_folder, stem_of};
 use crate::image::{Image, file};
 use crate::light::Environment;
 use crate::material::{LobeModel, MaterialMaps};
@@ -98,15 +98,15 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
             .remedy("compare maps with care: rough_pow 1 is used here, with lobe modct and g_mode half_alpha or with lobe ggx and g_mode smith_ggx"),
         );
     }
-    let stem = |file: &Path| file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let stem = |file: &Path| stem_of(file);
     let marked: Vec<String> = cameras.iter().filter(|view| view.held_out).map(|view| stem(&view.file)).collect();
     let views = cameras
         .into_iter()
         .map(|view| {
             let name = stem(&view.file);
-            let coverage = folder.join("coverage").join(format!("{name}.exr"));
+            let coverage = as_stored(folder.join("coverage").join(format!("{name}.exr")));
             SourceView {
-                photo: folder.join(&view.file),
+                photo: as_stored(folder.join(&view.file)),
                 mask: coverage.is_file().then_some(coverage),
                 camera: view.camera,
                 lens: None,
@@ -123,6 +123,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
         views,
         up: Up::Y,
         pixel_centre: PixelCentre::Half,
+        unit_in_metres: None,
         default_pixel_centre: PixelCentre::Half,
         background,
         encoding: ColourEncoding::Auto,

@@ -11,6 +11,7 @@
 //! encoding = "auto"                  # auto (by profile, else integers sRGB, floats linear), srgb, linear
 //! up = "auto"                        # auto, X, Y, Z, -X, -Y, -Z
 //! pixel_centre = "auto"              # auto, integer, half
+//! unit_in_metres = 0.001             # how many metres a unit is, here of millimetres; default: not known
 //! background = "environment"         # or black
 //! held_out = ["00000003"]            # views kept out of the fit; default: every 8th
 //! flip_winding = false               # turn every triangle over
@@ -21,9 +22,9 @@ use super::camera_file::read_cameras_json;
 use super::source::{SourceCamera, SourceScene, SourceView};
 use super::text;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
-use crate::files::{folder_of, name_of_folder};
+use crate::files::{as_stored, folder_of, name_of_folder, stem_of};
 use crate::scene::Background;
-use crate::scene::settings::{ColourEncoding, PixelCentre, Up};
+use crate::scene::settings::{ColourEncoding, PixelCentre, Up, is_length, one_or_more};
 use glam::{DMat3, DVec3};
 use std::path::{Path, PathBuf};
 
@@ -34,7 +35,8 @@ pub const FILE_NAME: &str = "scene.toml";
 #[serde(deny_unknown_fields)]
 struct Manifest {
     name: Option<String>,
-    mesh: OneOrMore,
+    #[serde(deserialize_with = "one_or_more")]
+    mesh: Vec<PathBuf>,
     images: PathBuf,
     cameras: PathBuf,
     masks: Option<PathBuf>,
@@ -48,6 +50,7 @@ struct Manifest {
     up: Up,
     #[serde(default)]
     pixel_centre: PixelCentre,
+    unit_in_metres: Option<f64>,
     #[serde(default = "environment")]
     background: Background,
     held_out: Option<Vec<String>>,
@@ -57,13 +60,6 @@ struct Manifest {
 
 fn environment() -> Background {
     Background::Environment
-}
-
-#[derive(serde::Deserialize)]
-#[serde(untagged)]
-enum OneOrMore {
-    One(PathBuf),
-    More(Vec<PathBuf>),
 }
 
 #[derive(Clone, Copy, Default, PartialEq, serde::Deserialize)]
@@ -93,15 +89,15 @@ pub fn read(path: &Path) -> Result<SourceScene> {
     })?;
     let folder = folder_of(path).to_path_buf();
     let mut findings = Vec::new();
-    let images = folder.join(&manifest.images);
+    let images = as_stored(folder.join(&manifest.images));
     if !images.is_dir() {
         return Err(missing(&images, "the folder of photos"));
     }
-    let masks = manifest.masks.as_ref().map(|masks| folder.join(masks));
+    let masks = manifest.masks.as_ref().map(|masks| as_stored(folder.join(masks)));
     if let Some(masks) = masks.as_ref().filter(|masks| !masks.is_dir()) {
         return Err(missing(masks, "the folder of masks"));
     }
-    let cameras = folder.join(&manifest.cameras);
+    let cameras = as_stored(folder.join(&manifest.cameras));
     let mut views = if cameras.is_dir() {
         blended_mvs::views(&images, &cameras, masks.as_deref(), true, &mut findings)?
     } else if cameras.is_file() {
@@ -112,10 +108,13 @@ pub fn read(path: &Path) -> Result<SourceScene> {
     for view in &mut views {
         view.camera = convert(view.camera, manifest.camera_axes, manifest.camera_matrix);
     }
-    let mesh = match manifest.mesh {
-        OneOrMore::One(mesh) => vec![folder.join(mesh)],
-        OneOrMore::More(meshes) => meshes.iter().map(|mesh| folder.join(mesh)).collect(),
-    };
+    if let Some(metres) = manifest.unit_in_metres.filter(|&metres| !is_length(metres)) {
+        let line = text.lines().position(|line| line.trim_start().starts_with("unit_in_metres")).map_or(1, |at| at + 1);
+        return Err(Error::new(ErrorKind::Malformed, format!("a unit is {metres} metres"))
+            .at(Place::Line(path.into(), line))
+            .remedy("give metres above 0, such as 0.001 for millimetres"));
+    }
+    let mesh = manifest.mesh.iter().map(|mesh| as_stored(folder.join(mesh))).collect();
     Ok(SourceScene {
         name: manifest.name.unwrap_or_else(|| name_of_folder(&folder)),
         folder,
@@ -123,6 +122,7 @@ pub fn read(path: &Path) -> Result<SourceScene> {
         views,
         up: manifest.up,
         pixel_centre: manifest.pixel_centre,
+        unit_in_metres: manifest.unit_in_metres,
         default_pixel_centre: PixelCentre::Half,
         background: manifest.background,
         encoding: manifest.encoding,
@@ -153,7 +153,7 @@ fn views_of_json(
     findings.append(&mut noticed);
     let mut views: Vec<SourceView> = Vec::new();
     for entry in entries {
-        let name = entry.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let name = stem_of(&entry.file);
         let Some(photo) = photos.get(&name) else {
             findings.push(
                 Finding::new(

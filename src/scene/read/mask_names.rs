@@ -5,6 +5,7 @@
 //! fulfils decides. What belongs to no photo is told, since it was meant for one.
 
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::files::{composed, name_of, stem_of};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -62,10 +63,10 @@ impl Masks {
     /// The mask of a photo, by its path below the folder of photos.
     pub fn of_photo(&mut self, photo: &Path) -> Option<PathBuf> {
         let folder = photo.parent().unwrap_or(Path::new("")).components().fold(String::new(), |text, part| {
-            let part = part.as_os_str().to_string_lossy();
-            if text.is_empty() { part.into_owned() } else { format!("{text}/{part}") }
+            let part = composed(&part.as_os_str().to_string_lossy());
+            if text.is_empty() { part } else { format!("{text}/{part}") }
         });
-        let name = photo.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let name = stem_of(photo);
         let lower = name.to_lowercase();
         let number = last_number(&lower);
         let rules: [&dyn Fn(&Entry) -> bool; 5] = [
@@ -120,7 +121,7 @@ fn collect(folder: &Path, below: String, depth: usize, entries: &mut Vec<Entry>)
     }
     for entry in std::fs::read_dir(folder).map_err(|source| Error::reading(folder, source))? {
         let path = entry.map_err(|source| Error::reading(folder, source))?.path();
-        let file_name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let file_name = name_of(&path);
         if file_name.starts_with('.') || file_name == "__MACOSX" {
             continue;
         }
@@ -229,6 +230,15 @@ mod tests {
         }
         let (_folder, mut none) = masks(&["b1.png", "a12.png", "a1x.png"]);
         assert_eq!(found(&mut none, "a1.jpg"), None);
+    }
+
+    #[test]
+    fn names_are_matched_in_either_form_of_unicode() {
+        let [apart, whole] = ["cafe\u{301}", "caf\u{e9}"];
+        for (stored, asked) in [(apart, whole), (whole, apart)] {
+            let (_folder, mut own) = masks(&[&format!("{stored}/{stored}_mask.png"), "cafe.png"]);
+            assert_eq!(found(&mut own, &format!("{asked}/{asked}.jpg")), Some(format!("{stored}_mask.png")));
+        }
     }
 
     #[test]

@@ -37,7 +37,7 @@ pub fn read_mask(path: &Path, packed: &BTreeMap<PathBuf, Archive>) -> Result<Mas
             MaskFile::of_bytes(path, archive.read(&name)?)?
         }
     };
-    Ok(if is_twin(path) { file.as_picture() } else { file })
+    Ok(if is_twin(path) { file.of_picture() } else { file })
 }
 
 /// A mask from an archive was made on the photo that the project knows: it is brought to the size of the photo that is here,

@@ -3,6 +3,10 @@
 //! Only what is used is read: a sensor that no aligned camera has may be of any kind. From version 1.5 on a chunk consists of
 //! components, each with a transform to the world of its own, and what could not be connected stands in different ones:
 //! cameras of another component are brought over where both transforms are known, and told of where not.
+//!
+//! Of a rig only the master's cameras may have a pose of their own. Those of a slave are where the sensor's `rotation` and
+//! `location` put them: `source_from_slave = source_from_master * [R | t]`, R from the slave's axes to the master's and t the
+//! slave's centre in the master's frame (PhotogrammetryCommunity, Metashape expert manual, "The slave-sensor transform").
 
 use super::colmap_lens::matrix;
 use super::photo_index::{Posed, some_of};
@@ -108,9 +112,50 @@ fn cameras_of<'a, 'b>(chunk: Node<'a, 'b>) -> Vec<Camera<'a, 'b>> {
 
 /// The labels of the cameras of a chunk that are aligned and enabled.
 pub fn aligned_labels(chunk: Node) -> Vec<String> {
-    let cameras = cameras_of(chunk).into_iter();
-    let used = cameras.filter(|camera| camera.transform.is_some() && !is_disabled(camera.node));
+    let (cameras, sensors) = (cameras_of(chunk), sensors_of(chunk));
+    let is_placed = |camera: &Camera| camera.transform.is_some() || on_rig(camera.node, &cameras, &sensors).is_some();
+    let used = cameras.iter().filter(|camera| !is_disabled(camera.node) && is_placed(camera));
     used.map(|camera| camera.label.to_owned()).collect()
+}
+
+fn sensors_of<'a, 'b>(chunk: Node<'a, 'b>) -> BTreeMap<&'a str, Node<'a, 'b>> {
+    let nodes = chunk.descendants().filter(|node| node.has_tag_name("sensor"));
+    nodes.filter_map(|node| Some((node.attribute("id")?, node))).collect()
+}
+
+/// The number of the master that a camera or a sensor hangs on; `None` for one that is its own.
+fn master_of<'a>(node: Node<'a, '_>) -> Option<&'a str> {
+    node.attribute("master_id").filter(|id| Some(*id) != node.attribute("id"))
+}
+
+/// `master_from_slave` of a sensor; `None` where it says nothing, or no numbers.
+fn offset_of(sensor: Node) -> Option<DMat4> {
+    let written = |name| text_of(sensor, name).filter(|text| !text.is_empty());
+    let (rotation, location) = (written("rotation"), written("location"));
+    if rotation.is_none() && location.is_none() {
+        return None;
+    }
+    let rotation = rotation.map_or(Some(DMat3::IDENTITY.to_cols_array()), numbers)?;
+    let location = location.map_or(Some([0.0; 3]), numbers)?;
+    let linear = DMat3::from_cols_array(&rotation).transpose();
+    Some(DMat4::from_translation(DVec3::from_array(location)) * DMat4::from_mat3(linear))
+}
+
+/// The transform and the component of a camera's master, and where its sensor stands on it; `None` where a part is missing,
+/// or the sensor's offset is from another sensor than the master's.
+fn on_rig<'a>(
+    camera: Node<'a, '_>,
+    cameras: &[Camera<'a, '_>],
+    sensors: &BTreeMap<&str, Node>,
+) -> Option<(&'a str, Option<&'a str>, DMat4)> {
+    let master = cameras
+        .iter()
+        .find(|own| own.node.attribute("id").is_some() && own.node.attribute("id") == master_of(camera))?;
+    let sensor = *sensors.get(camera.attribute("sensor_id")?)?;
+    let is_of_master = master_of(sensor).is_some() && master_of(sensor) == master.node.attribute("sensor_id");
+    let offset = offset_of(sensor).filter(|_| is_of_master)?;
+    let component = camera.attribute("component_id").or(master.node.attribute("component_id"));
+    Some((master.transform?, component, offset))
 }
 
 /// The cameras of a chunk and the frame they stand in.
@@ -134,21 +179,22 @@ pub fn read(
     file: &Path,
     findings: &mut Vec<Finding>,
 ) -> Result<Cameras> {
-    let nodes = chunk.descendants().filter(|node| node.has_tag_name("sensor"));
-    let nodes: BTreeMap<&str, Node> = nodes.filter_map(|node| Some((node.attribute("id")?, node))).collect();
+    let (nodes, listed) = (sensors_of(chunk), cameras_of(chunk));
     let mut sensors: BTreeMap<&str, Option<Sensor>> = BTreeMap::new();
     let mut posed = Vec::new();
     let (mut unaligned, mut of_rigs, mut excluded, mut uncalibrated) = (vec![], vec![], vec![], vec![]);
-    for Camera { node, label, transform } in cameras_of(chunk) {
+    let mut on_rigs = Vec::new();
+    for &Camera { node, label, transform } in &listed {
         if is_disabled(node) {
             excluded.push(label.to_owned());
             continue;
         }
         let sensor_id = node.attribute("sensor_id").unwrap_or_default();
-        let Some(transform) = transform else {
-            // Without a pose of its own it hangs on that of the rig's master, by an offset whose sense is not documented.
-            let is_slave = |node: &Node| node.attribute("master_id").is_some_and(|id| Some(id) != node.attribute("id"));
-            let is_of_rig = is_slave(&node) || nodes.get(sensor_id).is_some_and(is_slave);
+        // Without a pose of its own it may hang on that of the rig's master.
+        let own = transform.map(|transform| (transform, node.attribute("component_id"), DMat4::IDENTITY));
+        let Some((transform, component, offset)) = own.or_else(|| on_rig(node, &listed, &nodes)) else {
+            let is_of_rig =
+                master_of(node).is_some() || nodes.get(sensor_id).is_some_and(|own| master_of(*own).is_some());
             if is_of_rig {
                 of_rigs.push(label.to_owned())
             } else {
@@ -156,6 +202,7 @@ pub fn read(
             }
             continue;
         };
+        let is_on_rig = own.is_none();
         if !sensors.contains_key(sensor_id) {
             let place = Place::File(file.into());
             sensors.insert(sensor_id, nodes.get(sensor_id).map_or(Ok(None), |node| sensor(*node, &place))?);
@@ -170,15 +217,16 @@ pub fn read(
                 .at(place.clone())
                 .remedy("export the cameras again")
         })?;
-        let source_from_camera = DMat4::from_cols_array(&rows).transpose();
+        let source_from_camera = DMat4::from_cols_array(&rows).transpose() * offset;
+        on_rigs.extend(is_on_rig.then(|| label.to_owned()));
         let id = node.attribute("id");
         let listed = id.and_then(|id| paths.get(id)).cloned().unwrap_or_else(|| label.to_owned());
         let mask = id.and_then(|id| masks.get(id)).cloned();
-        posed.push((node.attribute("component_id"), source_from_camera, sensor, listed, mask, place));
+        posed.push((component, source_from_camera, sensor, listed, mask, place));
     }
     if posed.is_empty() && !(of_rigs.is_empty() && uncalibrated.is_empty()) {
         let (message, remedy) = if uncalibrated.is_empty() {
-            ("no camera has a pose of its own: all hang on the master of a rig", RIG_REMEDY)
+            ("no camera has a pose of its own: all hang on the master of a rig, which has none here", RIG_REMEDY)
         } else {
             ("the file holds poses but no calibration", CALIBRATION_REMEDY)
         };
@@ -206,10 +254,17 @@ pub fn read(
         (unaligned, Severity::Note, "camera-not-aligned", "are not aligned and are skipped", ""),
         (excluded, Severity::Note, "camera-disabled", "are disabled in the project and are skipped", ""),
         (
+            on_rigs,
+            Severity::Note,
+            "camera-on-rig",
+            "are placed by the pose of their rig's master and the offset of their sensor, in the units of the cameras",
+            "",
+        ),
+        (
             of_rigs,
             Severity::Warning,
             "camera-of-rig",
-            "have no pose of their own but hang on the master of a rig: they are skipped",
+            "hang on the master of a rig, whose pose or whose offset from theirs is not there: they are skipped",
             RIG_REMEDY,
         ),
         (

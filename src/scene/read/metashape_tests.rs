@@ -216,3 +216,40 @@ fn what_no_camera_uses_is_not_read_and_rigs_and_sensors_without_calibration_are_
     let error = read_text_of(folder.path(), &export(&[("1", unaligned)]), None).unwrap_err();
     assert!(error.to_string().contains("no camera has a pose"), "{error}");
 }
+
+#[test]
+fn slaves_of_a_rig_stand_where_their_sensors_put_them() {
+    let folder = folder_with_photos(&["a.png", "b.png", "c.png"]);
+    // The slave stands two units to the right of the master and one nearer to the scene, and looks to the master's left: its
+    // axes are the columns.
+    let offset = "<rotation fixed=\"true\">0 0 -1 0 1 0 1 0 0</rotation><location fixed=\"true\">2 0 1</location>";
+    // The master stands at (1, 2, 3), a quarter turn about its own z.
+    let turned = "<transform>0 -1 0 1 1 0 0 2 0 0 1 3 0 0 0 1</transform>";
+    let cameras = format!(
+        r#"<cameras><camera id="0" sensor_id="0" label="a">{turned}</camera>
+        <camera id="1" sensor_id="3" master_id="0" label="b"/><camera id="2" sensor_id="3" master_id="7" label="c"/></cameras>"#
+    );
+    let with = |offset: &str| {
+        let slave = r#"<sensor id="3" type="frame" master_id="0">"#;
+        export(&[("1", &cameras)]).replace(slave, &format!("{slave}{offset}"))
+    };
+    let scene = read_text_of(folder.path(), &with(offset), None).unwrap();
+    assert_eq!(scene.views.len(), 2);
+    let camera = &scene.views[1].camera;
+    let source_from_camera = camera.rotation.transpose();
+    let position = source_from_camera * -camera.translation;
+    // (2, 0, 1) of the master is (0, 2, 1) of the chunk; its left, -x, is -y.
+    assert!((position - DVec3::new(1.0, 4.0, 4.0)).length() < 1e-12, "{position}");
+    assert!((source_from_camera * DVec3::Z - DVec3::NEG_Y).length() < 1e-12);
+    assert!((source_from_camera * DVec3::X - DVec3::Z).length() < 1e-12);
+    assert_eq!(codes(&scene)[..2], ["camera-on-rig", "camera-of-rig"]);
+    assert!(scene.findings[1].message.ends_with(": c"), "its master is not there: {}", scene.findings[1]);
+    // Without an offset, or with one from another sensor than the master's, nothing is known.
+    for unknown in ["<rotation fixed=\"true\"/><location/>".to_owned(), offset.replace("2 0 1", "2 0")] {
+        let scene = read_text_of(folder.path(), &with(&unknown), None).unwrap();
+        assert_eq!((scene.views.len(), codes(&scene)[0]), (1, "camera-of-rig"), "{unknown}");
+    }
+    let other = with(offset).replace(r#"type="frame" master_id="0""#, r#"type="frame" master_id="1""#);
+    let scene = read_text_of(folder.path(), &other, None).unwrap();
+    assert_eq!((scene.views.len(), codes(&scene)[0]), (1, "camera-of-rig"));
+}

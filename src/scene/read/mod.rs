@@ -65,6 +65,7 @@ pub use mesh_file::read_mesh;
 pub use understood::{Understood, understand};
 
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::files::composed;
 use crate::image::file::MaskWay;
 use crate::scene::doctor::pixel_centre;
 use crate::scene::settings::{BackgroundChoice, ColourEncoding, MaskUse, PixelCentre, ReadSettings, Up};
@@ -102,7 +103,7 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
     let mut views = choose_views(views, settings.max_views, &folder)?;
     let sizes = photo_size::of_files(&views)?;
     photo_size::fit_to_photos(&mut views, &sizes, &mut findings)?;
-    let mesh = settings.mesh.as_ref().map_or(mesh, |chosen| vec![chosen.clone()]);
+    let mesh = if settings.mesh.is_empty() { mesh } else { settings.mesh.clone() };
     if mesh.is_empty() {
         return Err(Error::new(ErrorKind::Missing, "no mesh was found with the photos and cameras")
             .at(Place::File(folder))
@@ -175,7 +176,8 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
         joined =
             mesh_frame::put_right(&mut source_mesh, (&cameras, joined), &in_source, &source.mesh_frames, &mut findings);
     }
-    let world_from_source = world::world_from_source(up, source_mesh.bounds_of_most());
+    let mut world_from_source = world::world_from_source(up, source_mesh.bounds_of_most());
+    world_from_source.unit_in_metres = settings.unit_in_metres.or(source.unit_in_metres);
     for (index, (own, view)) in joined.iter_mut().zip(&views).enumerate() {
         own.camera = camera_in(&world_from_source, &view.camera, index);
     }
@@ -297,7 +299,7 @@ fn choose_views(mut views: Vec<SourceView>, most: usize, folder: &Path) -> Resul
 fn hold_out(views: &mut [View], named: Option<&[String]>, every: usize, findings: &mut Vec<Finding>) -> Result<()> {
     if let Some(names) = named {
         for name in names {
-            let Some(view) = views.iter_mut().find(|view| view.name == *name) else {
+            let Some(view) = views.iter_mut().find(|view| view.name == composed(name)) else {
                 findings.push(
                     Finding::new(
                         Severity::Warning,

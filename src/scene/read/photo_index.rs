@@ -7,10 +7,11 @@
 use super::mask_names::{EXTENSIONS_NOT_READ, Masks, PHOTO_EXTENSIONS, names_of_masks};
 use super::source::{SourceCamera, SourceView};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::files::{composed, name_of, stem_of};
 use crate::image::file;
 use crate::scene::lens::Lens;
 use std::collections::{BTreeSet, HashMap, HashSet};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// Folders that hold pictures of other kinds, by the beginnings of their names.
 const NOT_PHOTOS: [&str; 9] =
@@ -45,11 +46,11 @@ pub struct Posed {
 }
 
 fn lower(path: &Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().to_lowercase()
+    name_of(path).to_lowercase()
 }
 
 fn lower_stem(path: &Path) -> String {
-    path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase()
+    stem_of(path).to_lowercase()
 }
 
 /// The number of a folder of photos: 2 of `images_2`.
@@ -106,8 +107,8 @@ impl PhotoIndex {
         }
         let best = |candidates: Option<&Vec<PathBuf>>| {
             let agreement = |path: &Path| {
-                let own = path.components().rev().map(|part| part.as_os_str().to_string_lossy().to_lowercase());
-                let theirs = relative.components().rev().map(|part| part.as_os_str().to_string_lossy().to_lowercase());
+                let part = |part: Component| composed(&part.as_os_str().to_string_lossy()).to_lowercase();
+                let (own, theirs) = (path.components().rev().map(part), relative.components().rev().map(part));
                 own.zip(theirs).skip(1).take_while(|(a, b)| a == b).count()
             };
             let candidates = candidates?;
@@ -322,9 +323,9 @@ fn name_views(views: &mut [SourceView]) {
     for depth in 0..DEEPEST {
         let name = |path: &Path| {
             let mut parts: Vec<String> =
-                path.iter().rev().skip(1).take(depth).map(|part| part.to_string_lossy().into_owned()).collect();
+                path.iter().rev().skip(1).take(depth).map(|part| composed(&part.to_string_lossy())).collect();
             parts.reverse();
-            parts.push(path.file_stem().unwrap_or_default().to_string_lossy().into_owned());
+            parts.push(stem_of(path));
             parts.join("_")
         };
         views.iter_mut().for_each(|view| view.name = name(&view.photo));

@@ -1,6 +1,25 @@
 use super::*;
 
 #[test]
+fn photos_and_their_masks_are_found_in_either_form_of_unicode() {
+    let [apart, whole] = ["e\u{301}te\u{301}", "\u{e9}t\u{e9}"];
+    for (stored, listed) in [(apart, whole), (whole, apart)] {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        for file in ["images/S/S.png", "images/other/S.png", "images/S/S_mask.png"] {
+            let path = root.join(file.replace('S', stored));
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, b"").unwrap();
+        }
+        let index = PhotoIndex::of_folders(&[root.join("images")]).unwrap();
+        let photo = root.join("images/S/S.png".replace('S', stored));
+        assert_eq!(index.find(&"S/S.png".replace('S', listed)), Some(photo.clone()), "the folder tells them apart");
+        assert_eq!(index.find(&"far/S/S".replace('S', listed)), Some(photo.clone()));
+        assert_eq!(index.mask_beside(&photo), Some(root.join("images/S/S_mask.png".replace('S', stored))));
+    }
+}
+
+#[test]
 fn photos_are_found_by_the_end_of_their_path() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();

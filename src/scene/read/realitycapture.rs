@@ -13,6 +13,7 @@ use super::metashape_project::parse;
 use super::photo_index::{PhotoIndex, Posed, some_of, views_of};
 use super::source::{SourceCamera, SourceScene};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::files::stem_of;
 use crate::image::file;
 use crate::scene::lens::{Lens, Model, Polynomial};
 use glam::{DMat3, DVec3};
@@ -115,7 +116,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
     let mut findings = Vec::new();
     let (mut posed, mut rejected, mut unaligned, mut tangential) = (Vec::new(), Vec::new(), Vec::new(), false);
     for path in files_of(&inner, &["xmp"])? {
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let stem = stem_of(&path);
         let Some(side) = side_of(&path)? else {
             unaligned.push(stem);
             continue;

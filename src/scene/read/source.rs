@@ -56,6 +56,8 @@ pub struct SourceScene {
     pub pixel_centre: PixelCentre,
     /// What is assumed when neither the source nor a measurement says.
     pub default_pixel_centre: PixelCentre,
+    /// How many metres a unit is, where the source says so.
+    pub unit_in_metres: Option<f64>,
     /// What background pixels show.
     pub background: Background,
     /// How photos are encoded.
@@ -95,6 +97,7 @@ impl SourceScene {
             up: Up::Auto,
             pixel_centre: PixelCentre::Half,
             default_pixel_centre: PixelCentre::Half,
+            unit_in_metres: None,
             background: Background::Environment,
             encoding: ColourEncoding::Auto,
             held_out: None,

@@ -10,7 +10,7 @@ use super::mesh_choice;
 use super::photo_index::{PhotoIndex, Posed, some_of, views_of};
 use super::source::{MeshFrame, SourceCamera, SourceScene};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
-use crate::files::folder_of;
+use crate::files::{as_stored, folder_of};
 use crate::image::file;
 use crate::scene::lens::{Base, Lens, Model, Polynomial};
 use glam::{DMat3, DMat4, DVec3, DVec4};
@@ -166,7 +166,7 @@ impl Transforms {
             SourceCamera::new(intrinsics, rotation, -(rotation * undone.w_axis.truncate()), &place)?;
         findings.append(&mut noticed);
         let base = folder_of(&self.path);
-        let mask = frame.get("mask_path").and_then(Value::as_str).map(|mask| base.join(mask));
+        let mask = frame.get("mask_path").and_then(Value::as_str).map(|mask| as_stored(base.join(mask)));
         if let Some(absent) = mask.as_ref().filter(|mask| !mask.is_file()) {
             return Err(Error::new(ErrorKind::Missing, format!("the mask {} is not there", absent.display()))
                 .at(place)

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// What was understood. Lengths are in units of the source, which seldom says which they are.
+/// What was understood. Lengths are in units of the source, which seldom says which they are: then it can be given.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Understood {
     /// The kind of the scene.
@@ -43,6 +43,8 @@ pub struct Understood {
     pub origin_in_source: [f64; 3],
     /// Smallest and largest distance of a camera from the middle of the mesh.
     pub distances: (f32, f32),
+    /// How many metres a unit of the source is; `None` where it is not given.
+    pub unit_in_metres: Option<f64>,
     /// What the background shows.
     pub background: Background,
     /// Whether the mesh stood in the frame of the cameras, was moved into it, or may stand in another.
@@ -85,7 +87,7 @@ pub fn understand(path: &Path, settings: &ReadSettings, scene: &Scene) -> Result
     Ok(Understood {
         format: located.format.to_string(),
         why: located.why(),
-        mesh: settings.mesh.as_ref().map_or(source.mesh.clone(), |mesh| vec![mesh.clone()]),
+        mesh: if settings.mesh.is_empty() { source.mesh.clone() } else { settings.mesh.clone() },
         triangles: scene.mesh.triangles.len(),
         diagonal: (high - low).length(),
         views: scene.views.len(),
@@ -104,6 +106,7 @@ pub fn understand(path: &Path, settings: &ReadSettings, scene: &Scene) -> Result
         up_in_source: world.rotation.row(1).to_array(),
         origin_in_source: world.origin_in_source.to_array(),
         distances: span(&mut cameras().map(|own| own.position_in_world().distance(middle))),
+        unit_in_metres: world.unit_in_metres,
         background: scene.background,
         frames: match &scene.findings {
             findings if findings.iter().any(|finding| finding.code == "mesh-frame-changed") => Frames::Moved,
@@ -179,11 +182,15 @@ impl fmt::Display for Understood {
         if self.origin_in_source != [0.0; 3] {
             writeln!(formatter, "origin      {} of the source becomes 0", triple(self.origin_in_source))?;
         }
-        let (near, far) = self.distances;
+        let unit = self.unit_in_metres.unwrap_or(1.0);
+        let [across, near, far] = [self.diagonal, self.distances.0, self.distances.1].map(|own| f64::from(own) * unit);
+        let units = match self.unit_in_metres {
+            None => "units of the source".to_owned(),
+            Some(metres) => format!("metres: a unit of the source is given as {metres}"),
+        };
         write!(
             formatter,
-            "scale       the mesh is {:.4} across and cameras stand {near:.4} to {far:.4} from its middle, in units of the source",
-            self.diagonal
+            "scale       the mesh is {across:.4} across and cameras stand {near:.4} to {far:.4} from its middle, in {units}"
         )
     }
 }

@@ -109,7 +109,7 @@ pub fn world_from_source(up: DVec3, bounds: Option<(DVec3, DVec3)>) -> WorldFrom
         DMat3::from_quat(DQuat::from_rotation_arc(up, DVec3::Y))
     };
     let origin_in_source = bounds.and_then(|(low, high)| far_origin(low, high)).unwrap_or_default();
-    WorldFromSource { rotation, origin_in_source }
+    WorldFromSource { rotation, origin_in_source, unit_in_metres: None }
 }
 
 #[cfg(test)]
