@@ -41,7 +41,7 @@ pub enum ErrorKind {
 }
 
 /// Where it went wrong.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum Place {
     /// Nowhere in particular.

@@ -1,4 +1,11 @@
 //! Files that are written whole or not at all, and settings that are read with the line of what is wrong.
+//!
+//! [`kept`] is a folder of results that can be computed again, found by what they were computed from; [`digest`] tells
+//! contents apart, [`packed`] makes bytes of arrays.
+
+pub mod digest;
+pub mod kept;
+pub mod packed;
 
 use crate::error::{Error, ErrorKind, Place, Result};
 use std::collections::HashSet;
@@ -64,6 +71,15 @@ pub fn name_of_folder(folder: &Path) -> String {
 /// Whatever was at `path` before stays until the new file is complete: a full disk or a killed process loses nothing.
 /// `fill` writes the content through a buffer.
 pub fn write_atomically(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>) -> Result<()> {
+    replace(path, true, fill)
+}
+
+/// [`write_atomically`], or without waiting for the disk: then a power cut may leave a file that is cut.
+fn replace(
+    path: &Path,
+    is_flushed: bool,
+    fill: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+) -> Result<()> {
     let temporary = temporary_beside(path);
     let outcome = (|| {
         if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
@@ -72,7 +88,9 @@ pub fn write_atomically(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> 
         let mut writer = BufWriter::new(File::create(&temporary)?);
         fill(&mut writer)?;
         writer.flush()?;
-        writer.get_ref().sync_all()?;
+        if is_flushed {
+            writer.get_ref().sync_all()?;
+        }
         std::fs::rename(&temporary, path)
     })();
     outcome.map_err(|source| {

@@ -1,5 +1,6 @@
 //! The built-in scene: photographs are rendered from a truth, so that every error can be measured.
 
+use super::kept::{self, Kept};
 use super::prepare::{RunSettings, timed};
 use crate::atlas::{AtlasSettings, KeepUv};
 use crate::error::{Error, ErrorKind, Result};
@@ -47,9 +48,27 @@ pub fn scene(
     stop: &AtomicBool,
     progress: &dyn Fn(f32),
 ) -> Result<Scene> {
+    scene_with(settings, &Kept::nowhere(), timings, stop, progress)
+}
+
+/// [`scene`] whose photographs are taken from disk where they were rendered before.
+///
+/// # Errors
+/// `Stopped` when the flag is raised.
+pub fn scene_with(
+    settings: &DemoSettings,
+    kept: &Kept,
+    timings: &mut Vec<StageTime>,
+    stop: &AtomicBool,
+    progress: &dyn Fn(f32),
+) -> Result<Scene> {
     let demo = timed(timings, "build demo", || demo::build(settings))?;
     let mut scene = demo.scene;
-    timed(timings, "render photographs", || photograph(&mut scene, PHOTO_SAMPLES, settings.seed, 1.0, stop, progress))?;
+    timed(timings, "render photographs", || {
+        kept::photograph(&mut scene, &(settings, PHOTO_SAMPLES), kept, |scene| {
+            photograph(scene, PHOTO_SAMPLES, settings.seed, 1.0, stop, progress)
+        })
+    })?;
     Ok(scene)
 }
 

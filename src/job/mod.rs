@@ -6,6 +6,7 @@
 //! cannot.
 //!
 //! [`open`] opens scenes and runs, begins fits and takes them up; [`prepare`] turns a scene into a surface with an atlas,
+//! [`kept`] keeps on disk what opening takes long to make,
 //! [`known_maps`] takes that of a run whose maps are kept,
 //! [`worker`] is the thread and [`handle`] what a watcher holds of it, `save` keeps the run folder whole while it runs,
 //! [`budget`] limits how long that is,
@@ -36,6 +37,7 @@ pub mod film;
 pub mod gallery;
 pub mod gauge;
 pub mod handle;
+pub mod kept;
 pub mod known_maps;
 pub mod materials;
 mod newest;

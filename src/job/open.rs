@@ -5,12 +5,15 @@
 //! refuses to do: to begin on a scene that cannot work, and to show a run without its own maps; a scene that moved away
 //! is only a finding there.
 
+use super::kept::Kept;
 use super::known_maps;
-pub use super::opened_scene::{OpenedScene, check, open_demo, open_scene, open_scene_of, read_scene, read_unchecked};
+pub use super::opened_scene::{
+    OpenedScene, check, open_demo, open_demo_with, open_scene, open_scene_of, read_scene, read_unchecked,
+};
 use super::prepare::{Prepared, RunSettings, prepare_with, surface_of};
 use super::stages::told;
 pub use super::stages::{OpenStage, Tell};
-pub use super::view::{OpenedRun, view_run};
+pub use super::view::{OpenedRun, view_run, view_run_with};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::export::RunFolder;
 use crate::files::folder_of;
@@ -75,7 +78,7 @@ pub fn start_new(
     }
     settings.fit.validate()?;
     let OpenedScene { scene, report, timings } = opened;
-    let prepared = prepare_with(Arc::new(scene), report.findings, &settings, timings, stop, tell)?;
+    let prepared = prepare_with(Arc::new(scene), report.findings, &settings, timings, &Kept::nowhere(), stop, tell)?;
     begin(prepared, settings, stop, tell)
 }
 
@@ -125,12 +128,26 @@ pub fn resume(
     stop: &AtomicBool,
     tell: Tell,
 ) -> Result<(Prepared, Fitter, RunSettings)> {
+    resume_with(folder, moved_scene, &Kept::nowhere(), stop, tell)
+}
+
+/// [`resume`] with what was kept of the scene's opening.
+///
+/// # Errors
+/// As of [`resume`].
+pub fn resume_with(
+    folder: &RunFolder,
+    moved_scene: Option<&Path>,
+    kept: &Kept,
+    stop: &AtomicBool,
+    tell: Tell,
+) -> Result<(Prepared, Fitter, RunSettings)> {
     let mut settings: RunSettings = folder.read_settings()?;
     if let Some(path) = moved_scene {
         settings.scene = std::path::absolute(path).unwrap_or_else(|_| path.into());
     }
     let state = told(OpenStage::Maps, stop, tell, || checkpoint::read(&folder.checkpoint_path()))?;
-    let opened = open_scene_of(&settings, stop, tell)?;
+    let opened = open_scene_of(&settings, kept, stop, tell)?;
     opened.refuse_fatal()?;
     let surface = told(OpenStage::Tracer, stop, tell, || surface_of(folder))?;
     let OpenedScene { scene, report, timings } = opened;

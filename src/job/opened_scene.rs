@@ -1,5 +1,6 @@
 //! A scene that was read and checked, from a path or built in.
 
+use super::kept::{self, Kept};
 use super::prepare::{RunSettings, timed};
 use super::stages::{OpenStage, Tell, told};
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
@@ -51,8 +52,19 @@ impl OpenedScene {
 /// # Errors
 /// Whatever keeps the scene from being read, with place and remedy; `Stopped` when the flag is raised.
 pub fn open_scene(path: &Path, settings: &ReadSettings, stop: &AtomicBool, tell: Tell) -> Result<OpenedScene> {
+    open_scene_with(path, settings, &Kept::nowhere(), stop, tell)
+}
+
+/// [`open_scene`] whose check is taken from disk where it was made before.
+fn open_scene_with(
+    path: &Path,
+    settings: &ReadSettings,
+    kept: &Kept,
+    stop: &AtomicBool,
+    tell: Tell,
+) -> Result<OpenedScene> {
     let mut opened = read_unchecked(path, settings, stop, tell)?;
-    opened.report = check(&opened.scene, &mut opened.timings, stop, tell)?;
+    opened.report = check(&opened.scene, kept, &mut opened.timings, stop, tell)?;
     Ok(opened)
 }
 
@@ -67,12 +79,18 @@ pub fn read_unchecked(path: &Path, settings: &ReadSettings, stop: &AtomicBool, t
     Ok(OpenedScene { scene, report: doctor::Report::default(), timings })
 }
 
-/// The check of a scene that was read.
+/// The check of a scene that was read, from disk where it was checked before.
 ///
 /// # Errors
 /// `Stopped` when the flag is raised.
-pub fn check(scene: &Scene, timings: &mut Vec<StageTime>, stop: &AtomicBool, tell: Tell) -> Result<doctor::Report> {
-    told(OpenStage::Check, stop, tell, || timed(timings, "check", || doctor::check_until(scene, stop)))
+pub fn check(
+    scene: &Scene,
+    kept: &Kept,
+    timings: &mut Vec<StageTime>,
+    stop: &AtomicBool,
+    tell: Tell,
+) -> Result<doctor::Report> {
+    told(OpenStage::Check, stop, tell, || timed(timings, "check", || kept::check(scene, kept, stop)))
 }
 
 /// Builds and photographs the demo scene.
@@ -80,9 +98,17 @@ pub fn check(scene: &Scene, timings: &mut Vec<StageTime>, stop: &AtomicBool, tel
 /// # Errors
 /// `Stopped` when the flag is raised.
 pub fn open_demo(settings: &DemoSettings, stop: &AtomicBool, tell: Tell) -> Result<OpenedScene> {
+    open_demo_with(settings, &Kept::nowhere(), stop, tell)
+}
+
+/// [`open_demo`] whose photographs are taken from disk where they were rendered before.
+///
+/// # Errors
+/// `Stopped` when the flag is raised.
+pub fn open_demo_with(settings: &DemoSettings, kept: &Kept, stop: &AtomicBool, tell: Tell) -> Result<OpenedScene> {
     let mut timings = Vec::new();
     let progress = |share: f32| tell(OpenStage::Photograph, share);
-    let scene = super::demo::scene(settings, &mut timings, stop, &progress)?;
+    let scene = super::demo::scene_with(settings, kept, &mut timings, stop, &progress)?;
     Ok(OpenedScene { scene, report: doctor::Report::default(), timings })
 }
 
@@ -90,13 +116,12 @@ pub fn open_demo(settings: &DemoSettings, stop: &AtomicBool, tell: Tell) -> Resu
 ///
 /// # Errors
 /// As of [`open_scene`] and [`open_demo`].
-pub fn open_scene_of(settings: &RunSettings, stop: &AtomicBool, tell: Tell) -> Result<OpenedScene> {
+pub fn open_scene_of(settings: &RunSettings, kept: &Kept, stop: &AtomicBool, tell: Tell) -> Result<OpenedScene> {
     if settings.scene.as_os_str().is_empty() {
         let FitSettings { seed, lobe, .. } = settings.fit;
-        open_demo(&DemoSettings { seed, lobe, ..DemoSettings::default() }, stop, tell)
-    } else {
-        open_scene(&settings.scene, &settings.read, stop, tell)
+        return open_demo_with(&DemoSettings { seed, lobe, ..DemoSettings::default() }, kept, stop, tell);
     }
+    open_scene_with(&settings.scene, &settings.read, kept, stop, tell)
 }
 
 /// Reads and checks a scene. A finding that is fatal is an error: nothing starts a long fit on a scene that cannot work.

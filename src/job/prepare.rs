@@ -1,8 +1,9 @@
 //! From a scene folder to something a fit can start on.
 
+use super::kept::{self, Kept};
 use super::known_maps;
 use super::stages::{OpenStage, Tell, told};
-use crate::atlas::{self, AtlasQuality, AtlasSettings, covered_texels};
+use crate::atlas::{AtlasQuality, AtlasSettings, covered_texels};
 use crate::error::{Finding, Result};
 use crate::export::RunFolder;
 use crate::fit::FitSettings;
@@ -74,15 +75,17 @@ pub fn prepare(
             progress(share);
         }
     };
-    prepare_with(Arc::new(scene), findings, settings, timings, &AtomicBool::new(false), &tell)
+    prepare_with(Arc::new(scene), findings, settings, timings, &Kept::nowhere(), &AtomicBool::new(false), &tell)
 }
 
-/// [`prepare`] that tells of its stages and honours a stop flag between them.
+/// [`prepare`] that takes the atlas from disk where it was made before, tells of its stages and honours a stop flag between
+/// them.
 pub fn prepare_with(
     scene: Arc<Scene>,
     mut findings: Vec<Finding>,
     settings: &RunSettings,
     mut timings: Vec<StageTime>,
+    kept: &Kept,
     stop: &AtomicBool,
     tell: Tell,
 ) -> Result<Prepared> {
@@ -93,7 +96,7 @@ pub fn prepare_with(
     let atlas_settings = AtlasSettings { resolution_texels: settings.fit.map_size, ..settings.atlas.clone() };
     let progress = |share: f32| tell(OpenStage::Atlas, share);
     let atlas = told(OpenStage::Atlas, stop, tell, || {
-        timed(&mut timings, "atlas", || atlas::build(&scene.mesh, &atlas_settings, &progress))
+        timed(&mut timings, "atlas", || kept::atlas(&scene.mesh, &atlas_settings, kept, &progress))
     })?;
     findings.extend(atlas.findings);
     let mesh = atlas.mesh;

@@ -1,6 +1,7 @@
 //! A run to look at, finished or not.
 
 use super::budget::ENDED_BY_BUDGET;
+use super::kept::Kept;
 use super::opened_scene::open_scene_of;
 use super::prepare::{RunSettings, surface_of};
 use super::solver_told::SolverTold;
@@ -52,6 +53,20 @@ pub struct OpenedRun {
 /// # Errors
 /// When its settings, its mesh or its maps cannot be read; `Stopped` when the flag is raised.
 pub fn view_run(folder: &RunFolder, moved_scene: Option<&Path>, stop: &AtomicBool, tell: Tell) -> Result<OpenedRun> {
+    view_run_with(folder, moved_scene, &Kept::nowhere(), stop, tell)
+}
+
+/// [`view_run`] with what was kept of the scene's opening.
+///
+/// # Errors
+/// As of [`view_run`].
+pub fn view_run_with(
+    folder: &RunFolder,
+    moved_scene: Option<&Path>,
+    kept: &Kept,
+    stop: &AtomicBool,
+    tell: Tell,
+) -> Result<OpenedRun> {
     let mut settings: RunSettings = folder.read_settings()?;
     if let Some(path) = moved_scene {
         settings.scene = std::path::absolute(path).unwrap_or_else(|_| path.into());
@@ -103,7 +118,7 @@ pub fn view_run(folder: &RunFolder, moved_scene: Option<&Path>, stop: &AtomicBoo
     } else {
         None
     };
-    let scene = match open_scene_to_view(&settings, stop, tell) {
+    let scene = match open_scene_to_view(&settings, kept, stop, tell) {
         Ok(scene) => Some(Arc::new(scene)),
         Err(error) if error.kind() == ErrorKind::Stopped => return Err(error),
         Err(error) => {
@@ -139,9 +154,9 @@ fn ended_by_budget(folder: &RunFolder, steps: usize) -> bool {
 }
 
 /// A scene that is only looked at needs no check.
-fn open_scene_to_view(settings: &RunSettings, stop: &AtomicBool, tell: Tell) -> Result<Scene> {
+fn open_scene_to_view(settings: &RunSettings, kept: &Kept, stop: &AtomicBool, tell: Tell) -> Result<Scene> {
     if settings.scene.as_os_str().is_empty() {
-        return Ok(open_scene_of(settings, stop, tell)?.scene);
+        return Ok(open_scene_of(settings, kept, stop, tell)?.scene);
     }
     told(OpenStage::Read, stop, tell, || crate::scene::read(&settings.scene, &settings.read))
 }

@@ -20,7 +20,7 @@ pub enum Photo {
 }
 
 /// What a pixel is evidence for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::NoUninit)]
 #[repr(u8)]
 pub enum PixelState {
     /// The surface, and its radiance is known.

@@ -1,8 +1,9 @@
 //! What is remembered from one start to the next.
 
-use super::support::{Key, Modifiers, TestStudio, finished_run};
+use super::support::{Key, Modifiers, TestStudio, finished_run, small_scene};
 use patina::studio::layout::Panel;
 use patina::studio::model::store::ThemeChoice;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 #[test]
@@ -81,4 +82,38 @@ fn a_layout_of_another_version_is_replaced_by_the_first_one() {
     studio.wait("the run", |model| model.project.is_some());
     assert_eq!(studio.harness.ctx.zoom_factor(), 1.0);
     assert!(studio.harness.state().layout.visible().contains(&Panel::Stage));
+}
+
+#[test]
+fn what_opening_made_is_found_by_the_next_start_and_is_the_same() {
+    let made = |studio: &mut TestStudio| {
+        let project = studio.model().project.as_ref().unwrap();
+        format!("{:?} {:?} {:?} {:?}", project.mesh, project.findings, project.quality, project.settings)
+    };
+    let kept_in = |folder: &Path| {
+        let listed = std::fs::read_dir(folder.join("cache")).unwrap().map(|entry| entry.unwrap().path());
+        let mut files: Vec<PathBuf> = listed.filter(|path| path.extension().is_some_and(|own| own == "kept")).collect();
+        files.sort();
+        files
+    };
+    let mut studio = TestStudio::with_small_scene();
+    let first = made(&mut studio);
+    let folder = studio.close();
+    let kept = kept_in(folder.path());
+    assert_eq!(kept.len(), 2, "the check and the atlas: {kept:?}");
+
+    let mut again = TestStudio::in_folder(Arc::clone(&folder), Some(small_scene().into()));
+    again.prepare_fit();
+    assert_eq!(made(&mut again), first);
+    again.close();
+    assert_eq!(kept_in(folder.path()), kept, "found, and not made again under another name");
+
+    // What is damaged is no obstacle, and nothing to tell of.
+    for path in &kept {
+        std::fs::write(path, b"not what was written").unwrap();
+    }
+    let mut third = TestStudio::in_folder(folder, Some(small_scene().into()));
+    third.prepare_fit();
+    assert_eq!(made(&mut third), first);
+    assert!(third.model().log.banner().is_none(), "{}", third.log());
 }

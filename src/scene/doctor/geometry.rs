@@ -8,7 +8,7 @@ use glam::Vec3;
 use std::collections::HashMap;
 
 /// Counts of the mesh.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct MeshCheck {
     /// Vertices.
     pub vertices: usize,

@@ -44,7 +44,7 @@ const LEAST_SHINE: f64 = 0.5;
 const LEAST_LEAD: f64 = 0.2;
 
 /// How the shading of the photos goes with the cameras.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LightCheck {
     /// Root mean square of what one light leaves of the logarithms of radiance.
     pub one_light_residual: f64,

@@ -52,9 +52,10 @@ use crate::trace::Bvh;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What the check found.
-#[derive(Clone, Debug, Default, serde::Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Report {
     /// Findings of the reader and of the check, the gravest first.
+    #[serde(skip_deserializing)]
     pub findings: Vec<Finding>,
     /// Figures of each view, in the order of the scene.
     pub views: Vec<ViewCheck>,
@@ -77,7 +78,7 @@ pub struct Report {
 }
 
 /// Shares in [0, 1] of what training photos show of the surface.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SurfaceCheck {
     /// Triangles that are wide and turn much from one to the next: [`facets`].
     pub coarse_share: f64,
@@ -90,7 +91,7 @@ pub struct SurfaceCheck {
 }
 
 /// Figures of a view. Shares are in [0, 1].
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ViewCheck {
     /// Name of the view.
     pub name: String,

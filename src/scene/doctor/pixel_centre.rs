@@ -32,7 +32,7 @@ const NEAR_PIXELS: f64 = 0.15;
 const LARGEST_ERROR_PIXELS: f64 = 0.125;
 
 /// What a measurement is made from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Evidence {
     /// Edges of masks.
@@ -42,7 +42,7 @@ pub enum Evidence {
 }
 
 /// Where pixel centres were found to lie.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CentreMeasurement {
     /// What it is made from.
     pub evidence: Evidence,

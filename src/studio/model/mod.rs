@@ -46,6 +46,7 @@ pub use phase::Phase;
 pub use project::Project;
 
 use crate::error::{Place, Result};
+use crate::job::kept::Kept;
 use crate::light::day::Day;
 use crate::studio::act::Act;
 use crate::studio::layout::Panel;
@@ -146,6 +147,8 @@ pub struct Model {
     pub preferences: Preferences,
     /// Where it is remembered.
     pub store: Store,
+    /// What opening a scene took long to make, on disk.
+    pub kept: Kept,
     /// Lights to look at the materials in.
     pub shelf: Shelf,
     /// Hour and latitude that the sky of the shelf was made for.
@@ -221,6 +224,7 @@ impl Model {
             card: false,
             start_is_queued: false,
             preferences,
+            kept: store.kept(),
             store,
             shelf: Shelf::built_in(),
             day_in_force: Day::default(),

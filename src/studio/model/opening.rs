@@ -90,13 +90,14 @@ impl Model {
         self.log.dismiss();
         let path = std::path::absolute(&path).unwrap_or(path);
         let mut settings = RunSettings { scene: path.clone(), read, ..RunSettings::default() };
+        let kept = self.kept.clone();
         self.tasks.spawn(TaskKind::Opening, move |context| {
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
             context.tell("looking at the folder", 0.0);
             match open::kind_of(&path)? {
                 PathKind::Run => {
                     let folder = RunFolder::open(&path)?;
-                    let run = open::view_run(&folder, None, &context.stop, &tell)?;
+                    let run = open::view_run_with(&folder, None, &kept, &context.stop, &tell)?;
                     context.tell("thumbnails", 0.0);
                     Ok(Done::RunOpened(Box::new(RunRead::new(folder, run))))
                 }
@@ -116,10 +117,11 @@ impl Model {
     pub fn open_demo(&mut self) {
         self.workspace = Workspace::Scene;
         self.tasks.stop(&TaskKind::Opening);
+        let kept = self.kept.clone();
         self.tasks.spawn(TaskKind::Opening, move |context| {
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
             let settings = demo::settings();
-            let opened = open::open_demo(&DemoSettings::default(), &context.stop, &tell)?;
+            let opened = open::open_demo_with(&DemoSettings::default(), &kept, &context.stop, &tell)?;
             Ok(Done::SceneRead(Box::new(SceneRead::new(None, settings, opened))))
         });
     }
@@ -207,10 +209,10 @@ impl Model {
     fn check(&mut self) {
         let Some(project) = &self.project else { return };
         let Some(scene) = project.scene.clone() else { return };
-        let mut timings = project.timings.clone();
+        let (mut timings, kept) = (project.timings.clone(), self.kept.clone());
         self.tasks.spawn(TaskKind::Checking, move |context| {
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
-            let report = open::check(&scene, &mut timings, &context.stop, &tell)?;
+            let report = open::check(&scene, &kept, &mut timings, &context.stop, &tell)?;
             let suited = Suited::to(&scene, &report);
             Ok(Done::SceneChecked(Box::new(SceneChecked { suited, findings: report.findings, timings })))
         });
@@ -244,11 +246,11 @@ impl Model {
     fn prepare(&mut self) {
         let Some(project) = &self.project else { return };
         let Some(scene) = project.scene.clone() else { return };
-        let settings = project.settings.clone();
+        let (settings, kept) = (project.settings.clone(), self.kept.clone());
         let (findings, timings) = (project.findings.clone(), project.timings.clone());
         self.tasks.spawn(TaskKind::Preparing, move |context| {
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
-            let prepared = prepare_with(scene, findings, &settings, timings, &context.stop, &tell)?;
+            let prepared = prepare_with(scene, findings, &settings, timings, &kept, &context.stop, &tell)?;
             let atlas = Atlas::of(Arc::clone(&prepared.surface));
             let clipped_shares = clipped_shares(&prepared.scene, &prepared.surface);
             Ok(Done::Prepared(Box::new(PreparedScene { prepared, atlas, clipped_shares })))

@@ -69,13 +69,13 @@ impl Model {
         let (findings, timings, quality) = (project.findings.clone(), project.timings.clone(), project.quality.clone());
         // The atlas keeps its charts apart at the size it was made for; other map sizes need another atlas.
         let same_atlas = project.settings.fit.map_size == settings.fit.map_size || project.is_run;
-        let options = self.job_options();
+        let (options, kept) = (self.job_options(), self.kept.clone());
         self.tasks.spawn(TaskKind::Starting, move |context| {
             let folder = RunFolder::create(&path)?;
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
             let prepared = match same_atlas {
                 true => Prepared { scene, surface, quality, findings, timings },
-                false => prepare_with(scene, findings, &settings, timings, &context.stop, &tell)?,
+                false => prepare_with(scene, findings, &settings, timings, &kept, &context.stop, &tell)?,
             };
             let (prepared, fitter, settings) = open::begin(prepared, settings, &context.stop, &tell)?;
             let started = Started::new(prepared, fitter, settings, folder, options)?;
@@ -104,11 +104,11 @@ impl Model {
     }
 
     fn go_on_with(&mut self, folder: RunFolder) {
-        let options = self.job_options();
+        let (options, kept) = (self.job_options(), self.kept.clone());
         let wanted = self.edits.fit.clone();
         self.tasks.spawn(TaskKind::Starting, move |context| {
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
-            let (prepared, mut fitter, mut settings) = open::resume(&folder, None, &context.stop, &tell)?;
+            let (prepared, mut fitter, mut settings) = open::resume_with(&folder, None, &kept, &context.stop, &tell)?;
             if settings.fit != wanted {
                 // What was changed while the fit stood still takes effect, as far as it can.
                 fitter.change(wanted)?;

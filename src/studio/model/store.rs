@@ -6,6 +6,7 @@
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::image::display::DisplaySettings;
 use crate::image::{RgbImage, file};
+use crate::job::kept::{self, Kept};
 use crate::studio::stage::Navigation;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -148,19 +149,27 @@ impl Preferences {
 #[derive(Clone, Debug)]
 pub struct Store {
     path: Option<PathBuf>,
+    cache: Option<PathBuf>,
     written: Option<Preferences>,
 }
 
 impl Store {
     /// The store of this user; without a home folder nothing is remembered.
     pub fn of_user() -> Self {
-        let path = directories::ProjectDirs::from("", "", "patina").map(|folders| folders.config_dir().into());
-        Store { path: path.map(|folder: PathBuf| folder.join("studio.json")), written: None }
+        let folders = directories::ProjectDirs::from("", "", "patina");
+        let path = folders.as_ref().map(|folders| folders.config_dir().join("studio.json"));
+        Store { path, cache: folders.map(|folders| folders.cache_dir().into()), written: None }
     }
 
-    /// A store in a file of one's own; `None` remembers nothing.
+    /// A store in a file of one's own, with a folder `cache` beside it; `None` remembers nothing.
     pub fn at(path: Option<PathBuf>) -> Self {
-        Store { path, written: None }
+        let cache = path.as_ref().map(|path| path.with_file_name("cache"));
+        Store { path, cache, written: None }
+    }
+
+    /// Where what opening a scene takes long to make is kept.
+    pub fn kept(&self) -> Kept {
+        self.cache.clone().map_or_else(Kept::nowhere, kept::in_folder)
     }
 
     /// Where the small picture of a path that was opened before is kept; `None` where nothing is remembered.
