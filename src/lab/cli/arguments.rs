@@ -127,7 +127,8 @@ pub enum BenchTask {
     Atlas(crate::lab::atlas_quality::AtlasArguments),
     /// Cached transport against the path tracer, over its settings.
     Cache(crate::lab::cached_error::CacheArguments),
-    /// The window: frames a second, time from an act to its answer, what it takes from a fit, memory. Needs a display.
+    /// The window against what it should keep to: seconds to open and to the first maps, stalls, frames a second, time from
+    /// an act to its answer, relighting, what it takes from a fit, memory. Most of it needs a display.
     Studio(BenchStudioOptions),
 }
 
@@ -143,7 +144,7 @@ pub struct BenchStudioOptions {
     /// Cycles of open, fit some steps, close.
     #[arg(long, default_value_t = 40)]
     pub cycles: usize,
-    /// Measure on this scene in place of a sphere of 454 854 triangles with maps of 2048 x 2048 texels.
+    /// Measure on this scene, beside the demo, in place of a sphere of 454 854 triangles with maps of 2048 x 2048 texels.
     #[arg(long)]
     pub scene: Option<PathBuf>,
     /// A small sphere, few seconds, few cycles.
@@ -160,6 +161,13 @@ pub struct BenchStudioOptions {
 /// A part of `patina-lab bench studio`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum BenchPart {
+    /// Seconds from the drop of a scene until a fit could start, the first time and again. Needs no display.
+    Opening,
+    /// Seconds from Start to the first maps, the longest wait for newer ones, and how right the time left is, over two whole
+    /// fits. Needs no display.
+    Starting,
+    /// For how long the window hears nobody while a scene is opened and from Start on.
+    Stalls,
     /// Frames a second while the eye moves, frames at rest, share of the processors.
     Frames,
     /// Time from an act to the frame that shows its answer.
@@ -171,7 +179,7 @@ pub enum BenchPart {
     /// Whether maps fitted under the window are those fitted without, bit for bit.
     Equality,
     /// Milliseconds of a new environment from cached transport, and its error against the path tracer; fails beyond its
-    /// limits. Needs no display where it is the only part.
+    /// limits. Needs no display.
     Relight,
 }
 

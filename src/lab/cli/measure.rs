@@ -82,21 +82,45 @@ pub fn bench_scale(options: &BenchOptions, json: bool) -> Result<()> {
 #[cfg(feature = "studio")]
 pub fn bench_studio(options: &BenchStudioOptions, json: bool) -> Result<()> {
     use super::arguments::BenchPart;
+    use crate::export::RunFolder;
     use crate::lab::window as bench;
+    use std::path::{Path, PathBuf};
     let asked = |part: BenchPart| options.parts.is_empty() || options.parts.contains(&part);
     let tell = std::sync::Arc::new(move |text: &str| {
         if !json {
             eprintln!("{text}");
         }
     });
-    let relit = match asked(BenchPart::Relight) {
-        true => bench::relight::measure(options.scene.as_deref(), options.quick, &*tell)?,
-        false => Vec::new(),
-    };
-    if options.parts.as_slice() == [BenchPart::Relight] {
-        std::fs::create_dir_all(&options.output).map_err(|source| Error::writing(&options.output, source))?;
-        let report =
-            bench::BenchReport { machine: bench::machine::Machine::here(), relight: relit, ..Default::default() };
+    std::fs::create_dir_all(&options.output).map_err(|source| Error::writing(&options.output, source))?;
+    let mut report = bench::BenchReport { machine: bench::machine::Machine::here(), ..Default::default() };
+    // The demo, and the scene that is named; a run has no opening that takes long, and no Start.
+    let named = options.scene.as_deref();
+    let is_run = |path: &Path| RunFolder::open(path).is_ok_and(|folder| folder.is_run());
+    let to_open: Vec<Option<&Path>> = [None].into_iter().chain(named.filter(|path| !is_run(path)).map(Some)).collect();
+    let mut to_relight: Vec<Option<PathBuf>> = vec![None];
+    for path in &to_open {
+        if asked(BenchPart::Opening) {
+            report.opening.extend(bench::opening::measure(*path, &options.output, &*tell)?);
+        }
+        if asked(BenchPart::Starting) {
+            let times = if options.quick { 1 } else { 2 };
+            let (rows, run) = bench::starting::measure(*path, times, &options.output, &*tell)?;
+            report.starting.extend(rows);
+            // What was fitted is relit: a scene of photos has no other maps.
+            to_relight.extend(path.map(|_| Some(run)));
+        }
+    }
+    let is_relit = to_relight.len() > 1;
+    to_relight.extend(named.filter(|_| !is_relit).map(|path| Some(path.to_path_buf())));
+    if asked(BenchPart::Relight) {
+        for path in &to_relight {
+            report.relight.extend(bench::relight::measure(path.as_deref(), options.quick, &*tell)?);
+        }
+    }
+    let _ = std::fs::remove_dir_all(options.output.join("starting"));
+    let needs_window =
+        |part: &BenchPart| !matches!(part, BenchPart::Opening | BenchPart::Starting | BenchPart::Relight);
+    if !options.parts.is_empty() && !options.parts.iter().any(needs_window) {
         report.write(&options.output)?;
         return tell_report(&report, json);
     }
@@ -107,12 +131,13 @@ pub fn bench_studio(options: &BenchStudioOptions, json: bool) -> Result<()> {
         scene: options.scene.clone(),
         is_small: options.quick,
         output: options.output.clone(),
+        stalls: asked(BenchPart::Stalls),
         frames: asked(BenchPart::Frames),
         answers: asked(BenchPart::Answers),
         slowdown: asked(BenchPart::Slowdown),
         memory: asked(BenchPart::Memory),
         equality: asked(BenchPart::Equality),
-        relit,
+        before: report,
         tell,
     })?;
     tell_report(&report, json)

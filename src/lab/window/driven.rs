@@ -24,6 +24,8 @@ pub struct Glance {
     pub began: Instant,
     /// When the adapter was done with it; `None` until then.
     pub presented: Option<Instant>,
+    /// Seconds for which the window's thread was at it and heard nobody; `None` until it is done.
+    pub busy_seconds: Option<f64>,
     /// The state of the fit.
     pub status: FitStatus,
     /// The light of the stage.
@@ -123,6 +125,12 @@ impl Shared {
         self.news.notify_all();
     }
 
+    fn done(&self, frame: u64, busy_seconds: f64) {
+        if let Some(glance) = self.lock().glances.iter_mut().rev().find(|glance| glance.frame == frame) {
+            glance.busy_seconds = Some(busy_seconds);
+        }
+    }
+
     fn drawn(&self, frame: u64, scenes_drawn: u64, is_light_uploading: bool) {
         if let Some(glance) = self.lock().glances.iter_mut().rev().find(|glance| glance.frame == frame) {
             glance.scenes_drawn = scenes_drawn;
@@ -135,12 +143,14 @@ impl Shared {
 pub struct Driven {
     studio: Studio,
     shared: Arc<Shared>,
+    /// When the frame at hand began to take in news.
+    began: Option<Instant>,
 }
 
 impl Driven {
     /// A window around a studio.
     pub fn new(studio: Studio, shared: Arc<Shared>) -> Self {
-        Driven { studio, shared }
+        Driven { studio, shared, began: None }
     }
 
     /// Notes what this frame shows; returns its number.
@@ -154,6 +164,7 @@ impl Driven {
             frame,
             began,
             presented: None,
+            busy_seconds: None,
             status: model.fit.status.clone(),
             light: model.edits.relight.first.clone(),
             layer: model.edits.layer,
@@ -184,6 +195,7 @@ impl eframe::App for Driven {
     }
 
     fn logic(&mut self, context: &egui::Context, frame: &mut eframe::Frame) {
+        self.began.get_or_insert_with(Instant::now);
         let orders = std::mem::take(&mut self.shared.lock().orders);
         for order in orders {
             order(&mut self.studio, context);
@@ -194,6 +206,9 @@ impl eframe::App for Driven {
     fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
         let number = self.glance(Instant::now());
         self.studio.ui(ui, frame);
+        if let Some(began) = self.began.take() {
+            self.shared.done(number, began.elapsed().as_secs_f64());
+        }
         if frame.wgpu_render_state().is_some() {
             let (shared, stage) = (Arc::clone(&self.shared), self.studio.memory.stage.stage.clone());
             let mark = FrameMark { shared, stage, number };

@@ -2,26 +2,32 @@
 //!
 //! Read [`person`] first: a thread that acts like somebody in front of the window, by keys, mouse and acts, and watches
 //! what comes of it. [`driven`] is the window it sits at: the studio and nothing less, with a mark on every frame that
-//! tells when the adapter was done with it. `script` runs the measurements one after another: [`frames`], [`answers`],
-//! [`slowdown`], [`memory`], [`equality`], and without a window [`relight`]; [`scenes`] makes what they work on, [`machine`] reads threads, memory and load
-//! from the system, [`report`] writes the tables.
+//! tells when the adapter was done with it. `script` runs the measurements one after another: [`stalls`], [`frames`],
+//! [`answers`], [`slowdown`], [`memory`], [`equality`]. [`opening`], [`starting`] and [`relight`] need no window.
+//! [`scenes`] makes what they work on, [`machine`] reads threads, memory and load from the system, [`report`] writes the
+//! tables, [`bars`] holds the figures against what the window should keep to.
 //!
 //! What it refuses to do: to judge. Figures depend on the machine and on what else runs there, so nothing here is a
 //! test, and the load is told with them. It also measures no display: a frame counts as shown when the adapter is done
 //! with it and it was handed on.
 
 pub mod answers;
+pub mod bars;
 pub mod driven;
 pub mod equality;
 pub mod frames;
 pub mod machine;
 pub mod memory;
+pub mod opening;
 pub mod person;
 pub mod relight;
 pub mod report;
+mod report_alive;
 pub mod scenes;
 mod script;
 pub mod slowdown;
+pub mod stalls;
+pub mod starting;
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::studio::app::{Studio, StudioOptions};
@@ -47,6 +53,8 @@ pub struct BenchOptions {
     pub is_small: bool,
     /// Where the tables go, and the runs meanwhile.
     pub output: PathBuf,
+    /// Measure how long the window hears nobody.
+    pub stalls: bool,
     /// Measure frames.
     pub frames: bool,
     /// Measure answers.
@@ -58,7 +66,7 @@ pub struct BenchOptions {
     /// Compare maps.
     pub equality: bool,
     /// What was measured without the window before.
-    pub relit: Vec<relight::RelightRow>,
+    pub before: BenchReport,
     /// Hears what is being done.
     pub tell: Arc<dyn Fn(&str) + Send + Sync>,
 }

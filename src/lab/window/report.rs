@@ -5,8 +5,11 @@ use super::equality::EqualityRow;
 use super::frames::FramesRow;
 use super::machine::Machine;
 use super::memory::{MemoryRow, MemoryTrend};
+use super::opening::OpeningRow;
 use super::relight::RelightRow;
 use super::slowdown::SlowdownRow;
+use super::stalls::StallsRow;
+use super::starting::StartingRow;
 use crate::error::{Error, ErrorKind, Result};
 use std::fmt::Write;
 use std::path::Path;
@@ -16,6 +19,12 @@ use std::path::Path;
 pub struct BenchReport {
     /// On what.
     pub machine: Machine,
+    /// From drop to ready.
+    pub opening: Vec<OpeningRow>,
+    /// From Start to the report.
+    pub starting: Vec<StartingRow>,
+    /// How long the window hears nobody.
+    pub stalls: Vec<StallsRow>,
     /// Frames.
     pub frames: Vec<FramesRow>,
     /// Answers to acts, beside a running fit.
@@ -40,6 +49,10 @@ impl BenchReport {
     pub fn to_markdown(&self) -> String {
         let mut text = String::from("# The window in figures\n\n");
         self.machine_text(&mut text);
+        self.bars_text(&mut text);
+        self.opening_text(&mut text);
+        self.starting_text(&mut text);
+        self.stalls_text(&mut text);
         self.frames_text(&mut text);
         self.answers_text(&mut text);
         self.slowdown_text(&mut text);
@@ -222,6 +235,36 @@ impl BenchReport {
             let plain = |word: &str| format!("\"{}\"", word.replace('"', "\"\""));
             let _ = writeln!(text, "{part},{},{},{measure},{unit},{value}", plain(scene), plain(case));
         };
+        for row in &self.opening {
+            let case = if row.is_again { "again" } else { "first" };
+            let mut own = |measure, unit, value| line("opening", &row.scene, case, measure, unit, value);
+            own("shown", "s", row.shown);
+            own("photos", "s", row.photos);
+            own("ready", "s", row.ready);
+            own("relit", "s", row.relit);
+            own("processors to ready", "s", row.ready_processor.unwrap_or(f64::NAN));
+            own("processors", "s", row.processor.unwrap_or(f64::NAN));
+        }
+        for row in &self.starting {
+            let case = if row.is_again { "again" } else { "first" };
+            let mut own = |measure, unit, value| line("starting", &row.scene, case, measure, unit, value);
+            own("first maps", "s", row.first_maps);
+            own("longest wait", "s", row.longest_wait);
+            own("maps", "", row.maps as f64);
+            own("whole", "s", row.whole);
+            own("time left off median", "", row.left_error);
+            own("time left off most", "", row.left_error_most);
+            own("bar went back", "", row.backwards as f64);
+        }
+        for row in &self.stalls {
+            let mut own = |measure, unit, value| line("stalls", &row.scene, &row.case, measure, unit, value);
+            own("median", "s", row.median);
+            own("longest", "s", row.longest);
+        }
+        for bar in self.bars() {
+            line("bar", &bar.scene, &bar.figure, "value", bar.unit, bar.value);
+            line("bar", &bar.scene, &bar.figure, bar.sign(), bar.unit, bar.limit);
+        }
         for row in &self.frames {
             let mut own = |measure, unit, value| line("frames", &row.scene, &row.case, measure, unit, value);
             own("rate", "1/s", row.frames_per_second);
@@ -297,7 +340,8 @@ impl BenchReport {
     }
 }
 
-fn milliseconds(seconds: f64) -> String {
+/// Milliseconds for a table; a dash for what was not measured.
+pub(super) fn milliseconds(seconds: f64) -> String {
     if seconds.is_finite() { format!("{:.0}", 1e3 * seconds) } else { "–".into() }
 }
 

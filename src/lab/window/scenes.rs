@@ -49,11 +49,21 @@ impl BenchScene {
         }
     }
 
-    /// Opens it in the window and waits until a fit could start.
+    /// Opens it in the window and waits until a fit could start: one by Adam, whose steps are short and many, so that what the
+    /// window takes from a fit can be measured on them.
     ///
     /// # Errors
     /// Where it cannot be opened, or takes too long.
     pub fn open(&self, person: &Person) -> Result<()> {
+        self.open_as_it_is(person)?;
+        person.ask(|studio, _| studio.model.edits.fit.method = Method::Adam)
+    }
+
+    /// [`BenchScene::open`] with the settings that the scene has by default.
+    ///
+    /// # Errors
+    /// As of [`BenchScene::open`].
+    pub fn open_as_it_is(&self, person: &Person) -> Result<()> {
         let scene = self.clone();
         person.ask(move |studio, _| {
             // The layout of a first start, and nothing remembered of the measurement before.
@@ -72,11 +82,7 @@ impl BenchScene {
         if person.ask(|studio, _| studio.model.project.as_ref().is_none_or(|project| project.surface.is_none()))? {
             return Err(Error::new(ErrorKind::InvalidScene, format!("{} cannot be opened", self.name())));
         }
-        person.ask(|studio, _| {
-            // Adam's steps are short and many: what the window takes from a fit is measured on them.
-            studio.model.edits.fit.method = Method::Adam;
-            studio.layout.activate(Panel::Stage);
-        })
+        person.ask(|studio, _| studio.layout.activate(Panel::Stage))
     }
 }
 

@@ -3,7 +3,7 @@
 use super::person::Person;
 use super::report::BenchReport;
 use super::scenes::{self, BenchScene};
-use super::{BenchOptions, answers, equality, frames, machine, memory, slowdown};
+use super::{BenchOptions, answers, equality, frames, machine, memory, slowdown, stalls};
 use crate::error::Result;
 use crate::studio::act::Act;
 use std::time::Instant;
@@ -15,7 +15,7 @@ const LONG: f64 = 900.0;
 
 /// Measures what was asked for.
 pub(super) fn measure(person: &Person, options: &BenchOptions) -> Result<BenchReport> {
-    let mut report = BenchReport { relight: options.relit.clone(), ..BenchReport::default() };
+    let mut report = options.before.clone();
     let load_before = machine::load();
     let busy = || machine::busy_seconds_of_machine().zip(machine::processor_seconds().map(|seconds| seconds.all));
     let (busy_before, began) = (busy(), Instant::now());
@@ -26,6 +26,14 @@ pub(super) fn measure(person: &Person, options: &BenchOptions) -> Result<BenchRe
     let processors = std::thread::available_parallelism().map_or(1, |count| count.get());
 
     let large = BenchScene::large(options.scene.as_deref(), options.is_small);
+    if options.stalls {
+        for scene in [BenchScene::Demo, large.clone()] {
+            (options.tell)(&format!("how long the window hears nobody: {}", scene.name()));
+            report.stalls.extend(stalls::measure(person, &scene, options.seconds)?);
+            person.ask(|studio, _| slowdown::forget_run(studio))?;
+            close(person)?;
+        }
+    }
     if options.frames || options.answers || options.slowdown {
         for scene in [BenchScene::Demo, large] {
             with_scene(person, &scene, options, &mut report)?;
