@@ -5,8 +5,8 @@
 //! objective itself, with lobes integrated anew and light between surfaces as the new maps have it, is less; a step that
 //! never is leaves all as it was. Noise and gains are learned before each step, and stay while the objective falls.
 //!
-//! With a light it begins twice: at the texels that were found, and at one plain dielectric ([`super::second_start`]).
-//! At its end the scale of the light is told ([`super::light_scale`]), and dielectrics are common ones.
+//! With a light it begins twice: at the texels that were found, and at one plain dielectric ([`super::second_start`]). From
+//! there the light is found once more ([`super::light_again`]). At its end the scale of the light is told ([`super::light_scale`]), and dielectrics are common ones.
 
 use super::conjugate_gradients::conjugate_gradients;
 use super::estimate::Estimate;
@@ -15,6 +15,7 @@ use super::neighbours::Neighbours;
 use super::objective::{Learned, Objective};
 use super::pixel_system::{Lanes, PixelSystem, Rows};
 use super::pixels::Pixels;
+use super::refine::log_gains;
 use super::report::ErrorSums;
 use super::scene::SolverScene;
 use super::sight::{Lit, Sight, Slopes, lanes_of};
@@ -159,6 +160,9 @@ impl SolverScene {
         if lit == Lit::Yes {
             place = descent.or_plain(place, (&start, &shown, texture_scale), &mut trace)?;
         }
+        if lit == Lit::Yes && self.is_scale_open() {
+            place = descent.under_light_again(place, estimate, (&shown, texture_scale))?;
+        }
         let mut place = descent.down(place, &LAST_STEPS, &mut trace)?;
         let scale = (lit == Lit::Yes && self.is_scale_open()).then(|| LightScale::told_by(&place.texels, &shown));
         let scaled_specular = place.texels.iter().map(LightScale::changes_specular).collect();
@@ -187,6 +191,24 @@ impl Descent<'_> {
     pub(super) fn sight(&mut self, texels: &[Material<f32>], slopes: Slopes) -> Option<Sight> {
         let pixels = (self.pixels, &mut self.system);
         self.scene.sight(pixels, &self.light, texels, (self.lit, slopes), self.stop)
+    }
+
+    /// Goes on under the light that the texels of a place say. What that makes wrong of them, steps make good.
+    fn under_light_again(
+        &mut self,
+        place: Place,
+        estimate: &Estimate,
+        (shown, texture_scale): (&[bool], f32),
+    ) -> Option<Place> {
+        let mut here = estimate.clone();
+        here.texels.clone_from(&place.texels);
+        here.light.clone_from(&self.light);
+        if let (true, Some(learned)) = (self.scene.settings.exposure, &place.learned) {
+            here.log_gains = log_gains(&learned.gains);
+        }
+        self.light = self.scene.light_again(&here, self.stop)?;
+        let sight = self.sight(&place.texels, FIRST_STEPS[0].slopes)?;
+        Some(Place { learned: place.learned, ..self.place(&place.texels, sight, (shown, texture_scale)) })
     }
 
     /// The end of the way: the light is multiplied by what was told of its scale, and dielectrics are known to be common

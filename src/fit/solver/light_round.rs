@@ -12,7 +12,7 @@ use super::light_step::{ChannelKnown, Gauge, LightPrior, solve_channel};
 use super::light_suns::{GROWTHS, narrow_scales};
 use super::normal_equations::NormalEquations;
 use super::pixel_terms::BlockPrior;
-use super::plan;
+use super::plan::{self, Block};
 use super::report::{ErrorSums, StepReport, median};
 use super::round::{BlockWork, Round, open_prior};
 use super::scene::{BackgroundPixel, SolverScene};
@@ -32,13 +32,14 @@ const BACKGROUND_GAUGE_SLACK: f64 = 0.022;
 /// they are believed.
 const INDEPENDENCE_OF_ROWS: f64 = 0.25;
 /// A block with fewer observations says nothing of the light.
-const LEAST_OBSERVATIONS: usize = 16;
+pub(super) const LEAST_OBSERVATIONS: usize = 16;
 /// The same where its reflectances are given: it has nothing to find out of them first.
 const LEAST_WITH_GIVEN_MAPS: usize = 4;
 /// Parts in which normal matrices are added up; fixed, so that results do not depend on the number of threads.
 const PARTS: usize = 4;
 
-type Solved = Vec<(usize, BlockWork)>;
+/// Places of blocks, and what was found of each.
+pub(super) type Solved = Vec<(usize, BlockWork)>;
 
 impl SolverScene {
     /// One round; `number` counts them from 0 and sets which blocks take part and how far lobes are let go. `None` when
@@ -132,9 +133,37 @@ impl SolverScene {
         number: usize,
         stop: &AtomicBool,
     ) -> Option<([NormalEquations; 3], Solved)> {
-        let blocks = &self.round_blocks;
-        let least = if self.settings.fixed_maps { LEAST_WITH_GIVEN_MAPS } else { LEAST_OBSERVATIONS };
-        let chosen = plan::choose(blocks, self.settings.blocks, least, self.settings.seed, number);
+        let settings = &self.settings;
+        let of_block = |block: &Block, work: &mut BlockWork, rows: &mut [BlockRows; 3]| {
+            let is_solved = match settings.fixed_maps {
+                true => round.take_given(estimate, prior, work),
+                false => round.solve(block, prior, work),
+            };
+            match is_solved {
+                true if settings.fixed_maps => round.given_rows(estimate, None, work, shape, rows),
+                true if !settings.fixed_light => round.rows(block, work, shape, rows),
+                _ => {}
+            }
+            is_solved
+        };
+        let least = if settings.fixed_maps { LEAST_WITH_GIVEN_MAPS } else { LEAST_OBSERVATIONS };
+        let (mut total, done, kept) = self.sums_of_blocks(round, (shape, number, least), &of_block, stop)?;
+        if !settings.fixed_light && !settings.fixed_maps {
+            self.add_coupled(&mut total, &done, &kept);
+        }
+        Some((total, done))
+    }
+
+    /// Adds up what blocks that take part say of the light: `of_block` fills the rows of one, and says whether it was solved.
+    /// The last of their unknowns is kept apart. `None` when `stop` was raised.
+    pub(super) fn sums_of_blocks(
+        &self,
+        round: &Round,
+        (shape, number, least): (&LightShape, usize, usize),
+        of_block: &(dyn Fn(&Block, &mut BlockWork, &mut [BlockRows; 3]) -> bool + Sync),
+        stop: &AtomicBool,
+    ) -> Option<([NormalEquations; 3], Solved, [Vec<KeptUnknown>; 3])> {
+        let chosen = plan::choose(&self.round_blocks, self.settings.blocks, least, self.settings.seed, number);
         let part = chosen.len().div_ceil(PARTS).max(1);
         let parts = parallel::map_chunks(&chosen, part, |_, chosen| {
             let mut equations = [(); 3].map(|()| NormalEquations::new(shape.count()));
@@ -146,22 +175,12 @@ impl SolverScene {
                     break;
                 }
                 let mut work = BlockWork::default();
-                round.gather(&blocks[index], self.settings.observations, &mut work);
-                let is_solved = match self.settings.fixed_maps {
-                    true => round.take_given(estimate, prior, &mut work),
-                    false => round.solve(&blocks[index], prior, &mut work),
-                };
-                if !is_solved {
+                round.gather(&self.round_blocks[index], self.settings.observations, &mut work);
+                if !of_block(&self.round_blocks[index], &mut work, &mut rows) {
                     continue;
                 }
-                if self.settings.fixed_maps {
-                    round.given_rows(estimate, &work, shape, &mut rows);
+                if !self.settings.fixed_light {
                     equations.iter_mut().zip(&rows).for_each(|(equations, rows)| equations.add(rows));
-                } else if !self.settings.fixed_light {
-                    round.rows(&blocks[index], &work, shape, &mut rows);
-                    for (equations, rows) in equations.iter_mut().zip(&rows) {
-                        equations.add(rows);
-                    }
                     kept.iter_mut().zip(&mut rows).for_each(|(kept, rows)| kept.push(std::mem::take(&mut rows.kept)));
                 }
                 done.push((index, work));
@@ -179,18 +198,20 @@ impl SolverScene {
             done.extend(part);
             kept.iter_mut().zip(own).for_each(|(kept, own)| kept.extend(own));
         }
-        if !self.settings.fixed_light && !self.settings.fixed_maps {
-            let own: Vec<&plan::Block> = done.iter().map(|(index, _): &(usize, BlockWork)| &blocks[*index]).collect();
-            let pairs = coupling::neighbours(&own);
-            total.par_iter_mut().zip(&kept).for_each(|(total, kept)| {
-                coupling::add_coupled(total, kept, &pairs, INDEPENDENCE_OF_ROWS);
-            });
-        }
-        (!stop.load(Ordering::Relaxed)).then_some((total, done))
+        (!stop.load(Ordering::Relaxed)).then_some((total, done, kept))
+    }
+
+    /// Adds what blocks say together, by what is believed of neighbours.
+    pub(super) fn add_coupled(&self, total: &mut [NormalEquations; 3], done: &Solved, kept: &[Vec<KeptUnknown>; 3]) {
+        let own: Vec<&Block> = done.iter().map(|(index, _)| &self.round_blocks[*index]).collect();
+        let pairs = coupling::neighbours(&own);
+        total.par_iter_mut().zip(kept).for_each(|(total, kept)| {
+            coupling::add_coupled(total, kept, &pairs, INDEPENDENCE_OF_ROWS);
+        });
     }
 
     /// Background pixels as rows of few entries.
-    fn add_background(&self, total: &mut [NormalEquations; 3], shape: &LightShape, log_gains: &[f32]) {
+    pub(super) fn add_background(&self, total: &mut [NormalEquations; 3], shape: &LightShape, log_gains: &[f32]) {
         let noise = BACKGROUND_NOISE * f64::from(self.observations.mean);
         for BackgroundPixel { view, tap, radiance, scatter } in &self.background {
             let entries: Vec<(u32, f32)> = tap.index.into_iter().zip(tap.weight).collect();
@@ -208,13 +229,11 @@ impl SolverScene {
     /// What the mean light on the surface is held to, per channel: grey surface at first, then as much light in all, of
     /// the colour that highlights ask for.
     fn held_light(&self, estimate: &Estimate, done: &Solved, number: usize) -> [f64; 3] {
-        let (row, grey) = &self.gauge;
+        let grey = &self.gauge.1;
         if number < self.settings.coarse_rounds || self.settings.fixed_maps {
             return *grey;
         }
-        let now = [0, 1, 2].map(|c| -> f64 {
-            row.iter().zip(&estimate.light).map(|(&weight, light)| f64::from(weight) * f64::from(light[c])).sum()
-        });
+        let now = self.mean_light(&estimate.light);
         let beside_grey = [0, 1, 2].map(|c| (now[c] / grey[c]).max(1e-3).ln());
         let change = change_by_highlights(done.iter().map(|(_, work)| work), beside_grey, self.settings.independence);
         let asked = [0, 1, 2].map(|c| (now[c] * change[c]).max(1e-9));
@@ -222,8 +241,14 @@ impl SolverScene {
         asked.map(|asked| asked * factor)
     }
 
+    /// The mean light on the surface, per channel.
+    pub(super) fn mean_light(&self, light: &[[f32; 3]]) -> [f64; 3] {
+        let row = &self.gauge.0;
+        [0, 1, 2].map(|c| row.iter().zip(light).map(|(&weight, light)| f64::from(weight) * f64::from(light[c])).sum())
+    }
+
     /// The light, and what each of its texels is known by. `surface` are the diagonals before background was added.
-    fn solve_light(
+    pub(super) fn solve_light(
         &self,
         equations: &[NormalEquations; 3],
         surface: &[Vec<f64>; 3],

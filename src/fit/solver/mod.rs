@@ -20,7 +20,8 @@
 //!    [`lobe_evidence`], [`lobe_prior`], [`lobe_sums`], [`lobe_widths`], [`lobe_families`]).
 //!    Then `refine`: [`descent`] of the one [`objective`] over all texels (`conjugate_gradients`), by what whole [`pixels`] see
 //!    (`sight`, `pixel_system`), with what `neighbours` have in common and the `texture_scale` that predicts photos that took
-//!    no part best; from the lobes that were found, or those of one dielectric where that explains pixels as well (`second_start`, `agreement`).
+//!    no part best; from the lobes that were found, or those of one dielectric where that explains pixels as well (`second_start`, `agreement`), under
+//!    the light that these maps say (`light_again`).
 //! 6. [`choice`]: views that took no part say what lobes, light between surfaces and the light's resolution bought;
 //!    `lobe_tails` says whether highlights reach further than the model's lobes.
 //! 7. [`solver`]: the steps in their order. A fit does them one by one, as [`crate::fit::Fitter`] does those of Adam: on
@@ -42,6 +43,7 @@ pub mod estimate;
 mod first_maps;
 mod gains;
 mod given_maps;
+mod light_again;
 mod light_colour;
 pub mod light_evidence;
 mod light_holes;

@@ -19,6 +19,13 @@ pub struct Block {
     pub centre: Vec3,
 }
 
+impl Block {
+    /// The cell that a texel is in; the first where it is in none.
+    pub fn cell_of(&self, texel: u32) -> u16 {
+        self.texels.iter().find(|(own, _)| *own == texel).map_or(0, |(_, cell)| *cell)
+    }
+}
+
 /// Cuts square maps into blocks of `side` texels with cells of `cell` texels.
 ///
 /// Charts meet in the gutters of an atlas: texels of one block that lie far apart in the world become blocks of their own.

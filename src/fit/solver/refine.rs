@@ -101,7 +101,7 @@ pub(super) mod tests {
     }
 
     /// The same with lobes of this width under this light.
-    fn photographed_under(
+    pub fn photographed_under(
         light: &Environment,
         log_width: f32,
         gains: impl Fn(usize) -> [f32; 3],
