@@ -24,8 +24,11 @@ use std::path::Path;
 /// # Errors
 /// Files that cannot be written; `TooLarge` for a package beyond four gigabytes.
 pub fn write(asset: &Asset, folder: &Path, sixteen_bits: bool) -> Result<(f64, Option<MetalSplit>)> {
+    // Renderers interpolate between texels as they are written, and along the sRGB curve the mean of a bright and a dark one
+    // comes out too dark. Sixteen bits hold colours in proportion; eight do not.
+    let of_colours = if sixteen_bits { Curve::Linear } else { Curve::Srgb };
     let png = |texture: Texture, curve: Curve| texture.png(curve, sixteen_bits);
-    let mut files = vec![("textures/diffuse.png", png(Texture::Rgb(&asset.maps.diffuse), Curve::Srgb)?)];
+    let mut files = vec![("textures/diffuse.png", png(Texture::Rgb(&asset.maps.diffuse), of_colours)?)];
     let metals = asset.metals();
     let (mut held_share, mut lobe) = (0.0, None);
     if asset.has_lobe {
@@ -37,12 +40,12 @@ pub fn write(asset: &Asset, folder: &Path, sixteen_bits: bool) -> Result<(f64, O
         held_share = held;
         let dielectric = asset.dielectric_beside(metals.as_ref());
         lobe = Some(Metalness { has_metals: metals.is_some(), tint_scale: dielectric.factor_over(LOW_IOR) });
-        files.push(("textures/base_color.png", png(Texture::Rgb(&base_colour), Curve::Srgb)?));
+        files.push(("textures/base_color.png", png(Texture::Rgb(&base_colour), of_colours)?));
         if let Some(split) = &metals {
             files.push(("textures/metallic.png", png(Texture::Grey(&split.metallic), Curve::Linear)?));
         }
-        files.push(("textures/tint.png", png(Texture::Rgb(&dielectric.colour), Curve::Srgb)?));
-        files.push(("textures/specular.png", png(Texture::Rgb(&asset.maps.specular), Curve::Srgb)?));
+        files.push(("textures/tint.png", png(Texture::Rgb(&dielectric.colour), of_colours)?));
+        files.push(("textures/specular.png", png(Texture::Rgb(&asset.maps.specular), of_colours)?));
         files.push(("textures/roughness.png", png(Texture::Grey(&roughness), Curve::Linear)?));
     }
     for (name, bytes) in &files {
@@ -54,7 +57,7 @@ pub fn write(asset: &Asset, folder: &Path, sixteen_bits: bool) -> Result<(f64, O
         let path = folder.join(name);
         files.push((name, std::fs::read(&path).map_err(|source| Error::reading(&path, source))?));
     }
-    let stage = stage(asset, lobe).into_bytes();
+    let stage = stage(asset, lobe, of_colours).into_bytes();
     let name = format!("{}.usda", asset.name);
     write_bytes(&folder.join(&name), &stage)?;
     let mut members: Vec<(&str, &[u8])> = vec![(&name, &stage)];
@@ -72,8 +75,8 @@ struct Metalness {
     tint_scale: f32,
 }
 
-/// The stage as text; `lobe` is `None` without one.
-fn stage(asset: &Asset, lobe: Option<Metalness>) -> String {
+/// The stage as text; `lobe` is `None` without one, and colours are written by this curve.
+fn stage(asset: &Asset, lobe: Option<Metalness>, of_colours: Curve) -> String {
     let name = &asset.name;
     let mesh = &asset.mesh;
     let mut text = format!(
@@ -106,7 +109,7 @@ fn stage(asset: &Asset, lobe: Option<Metalness>) -> String {
         "        uniform token subdivisionScheme = \"none\"\n    }\n".into(),
     ];
     text.push_str(&lines.join("\n"));
-    text.push_str(&material(&asset.name, lobe));
+    text.push_str(&material(&asset.name, lobe, of_colours));
     if asset.light.is_some() {
         text.push_str(
             "\n    def DomeLight \"environment\"\n    {\n        float inputs:intensity = 1\n        \
@@ -118,7 +121,7 @@ fn stage(asset: &Asset, lobe: Option<Metalness>) -> String {
     text
 }
 
-fn material(name: &str, lobe: Option<Metalness>) -> String {
+fn material(name: &str, lobe: Option<Metalness>, of_colours: Curve) -> String {
     let path = format!("/{name}/material");
     let variants = match lobe {
         Some(_) => {
@@ -151,7 +154,7 @@ fn material(name: &str, lobe: Option<Metalness>) -> String {
          string inputs:varname = \"st\"\n            float2 outputs:result\n        }\n",
     );
     let Some(lobe) = lobe else {
-        return text + &texture(&path, "diffuse", Kind::Colour, "        ") + "    }\n";
+        return text + &texture(&path, "diffuse", Kind::Colour(of_colours), "        ") + "    }\n";
     };
     text += &texture(&path, "roughness", Kind::Value, "        ");
     let deep = "                ";
@@ -168,17 +171,17 @@ fn material(name: &str, lobe: Option<Metalness>) -> String {
         },
         format!("color3f inputs:specularColor.connect = <{path}/tint.outputs:rgb>"),
         "int inputs:useSpecularWorkflow = 0".into(),
-    ]) + &texture(&path, "base_color", Kind::Colour, deep);
+    ]) + &texture(&path, "base_color", Kind::Colour(of_colours), deep);
     if lobe.has_metals {
         metalness += &texture(&path, "metallic", Kind::Value, deep);
     }
-    metalness += &texture(&path, "tint", Kind::Scaled(lobe.tint_scale), deep);
+    metalness += &texture(&path, "tint", Kind::Scaled(of_colours, lobe.tint_scale), deep);
     let specular = over(&[
         format!("color3f inputs:diffuseColor.connect = <{path}/diffuse.outputs:rgb>"),
         format!("color3f inputs:specularColor.connect = <{path}/specular.outputs:rgb>"),
         "int inputs:useSpecularWorkflow = 1".into(),
-    ]) + &texture(&path, "diffuse", Kind::Colour, deep)
-        + &texture(&path, "specular", Kind::Colour, deep);
+    ]) + &texture(&path, "diffuse", Kind::Colour(of_colours), deep)
+        + &texture(&path, "specular", Kind::Colour(of_colours), deep);
     let _ = write!(
         text,
         "\n        variantSet \"workflow\" = {{\n            \"metalness\" {{\n{metalness}            }}\n            \
@@ -190,16 +193,17 @@ fn material(name: &str, lobe: Option<Metalness>) -> String {
 /// What a texture holds.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
-    Colour,
+    Colour(Curve),
     Value,
     /// A colour over this factor.
-    Scaled(f32),
+    Scaled(Curve, f32),
 }
 
 /// A node that reads `textures/MAP.png`.
 fn texture(path: &str, map: &str, kind: Kind, indent: &str) -> String {
     let (space, output) = match kind {
-        Kind::Colour | Kind::Scaled(_) => ("sRGB", "float3 outputs:rgb"),
+        Kind::Colour(Curve::Srgb) | Kind::Scaled(Curve::Srgb, _) => ("sRGB", "float3 outputs:rgb"),
+        Kind::Colour(Curve::Linear) | Kind::Scaled(Curve::Linear, _) => ("raw", "float3 outputs:rgb"),
         Kind::Value => ("raw", "float outputs:r"),
     };
     let lines = [
@@ -212,7 +216,7 @@ fn texture(path: &str, map: &str, kind: Kind, indent: &str) -> String {
         output.into(),
     ];
     let scale = match kind {
-        Kind::Scaled(scale) => vec![format!("float4 inputs:scale = ({scale}, {scale}, {scale}, 1)")],
+        Kind::Scaled(_, scale) => vec![format!("float4 inputs:scale = ({scale}, {scale}, {scale}, 1)")],
         _ => Vec::new(),
     };
     let lines: String = lines.iter().chain(&scale).map(|line| format!("{indent}    {line}\n")).collect();
@@ -293,11 +297,12 @@ mod tests {
             let place = folder.path().join(name);
             assert_eq!(write(&asset, &place, true).unwrap().1.is_some(), has_metals);
             let text = std::fs::read_to_string(place.join("a_run.usda")).unwrap();
+            assert!(!text.contains("\"sRGB\"") && text.contains("\"raw\""));
             assert_eq!(text.matches('{').count(), text.matches('}').count());
             assert_eq!(text.matches('(').count(), text.matches(')').count());
             assert!(text.contains("point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]"));
             assert!(text.contains("metersPerUnit = 1\n"));
-            let small = stage(&Asset { unit_in_metres: 0.001, ..small_asset(has_lobe) }, None);
+            let small = stage(&Asset { unit_in_metres: 0.001, ..small_asset(has_lobe) }, None, Curve::Srgb);
             assert!(small.contains("metersPerUnit = 0.001\n"));
             assert!(text.contains("primvars:st = [(0.1, 0.1), "));
             assert!(text.contains("int inputs:useSpecularWorkflow = 1"));

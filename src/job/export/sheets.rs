@@ -22,13 +22,14 @@ environment.*    the whole light, linear; +x in the centre, as three.js and Blen
 pub(super) const USD_FILES: &str = "\
 *.usda, *.usdz   mesh, UsdPreviewSurface, dome light; the package holds the same
   workflow       variant set of the material: `metalness`, chosen at first, which every importer knows, or `specular`
-base_color.png   sRGB, metalness: diffuse reflectance over 1 - mean F, or F0 of what is metal, less what renderers
-                 add by light between microfacets
-metallic.png     no curve, metalness
-tint.png         sRGB, metalness, times 4: by what F0 of the index of refraction is multiplied for the fitted one; readers of
-                 the metalness workflow pass over it, Blender does not
-diffuse.png      sRGB, specular: diffuse reflectance as fitted
-specular.png     sRGB, specular: F0 as fitted
+base_color.png   metalness: diffuse reflectance over 1 - mean F, or F0 of what is metal, less what renderers add by light
+                 between microfacets. This and other colours are in proportion (`raw`) with 16 bits and sRGB with 8, as the
+                 stage says: between texels of sRGB some renderers interpolate along the curve, which is too dark
+metallic.png     metalness, no curve; where there are metals
+tint.png         metalness, times the scale that the stage says: by what F0 of the index of refraction, 1.3, is multiplied for
+                 the fitted one; readers of the metalness workflow pass over it, Blender does not
+diffuse.png      specular: diffuse reflectance as fitted
+specular.png     specular: F0 as fitted
 roughness.png    square root of the GGX width, no curve
 environment.exr  the whole light, linear; left border -z, +z in the centre (OpenEXR's latitude-longitude)";
 pub(super) const MITSUBA_FILES: &str = "\
