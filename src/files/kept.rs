@@ -57,7 +57,10 @@ impl Kept {
     /// What was kept of this kind under a key, bit for bit; `None` where nothing whole is there.
     pub fn read(&self, kind: &str, key: Digest) -> Option<Vec<u8>> {
         let own = self.0.as_ref()?;
-        let mut file = std::fs::File::open(own.file_of(kind, key)).ok()?;
+        let path = own.file_of(kind, key);
+        // Some systems let only who may write set the time of a file.
+        let to_touch = std::fs::OpenOptions::new().read(true).write(true).open(&path);
+        let mut file = to_touch.or_else(|_| std::fs::File::open(&path)).ok()?;
         let size = file.metadata().ok().filter(std::fs::Metadata::is_file)?.len();
         if size < AROUND as u64 || size > own.most_bytes {
             return None;
@@ -88,13 +91,16 @@ impl Kept {
         }
         let front = front_of(key, body.len() as u64);
         // Nobody waits for the disk: a file that a power cut leaves cut is found out.
+        let is_new = !own.path.exists();
         let written = super::replace(&own.file_of(kind, key), false, |writer| {
             writer.write_all(&front)?;
             writer.write_all(body)?;
             writer.write_all(&checksum(&front, body))
         });
         if written.is_ok() {
-            own.tag();
+            if is_new {
+                own.tag();
+            }
             own.make_room();
         }
     }
@@ -105,11 +111,18 @@ impl Folder {
         self.path.join(format!("{kind}-{key}.{ENDING}"))
     }
 
+    /// Only of a folder that was made here: backups pass it over.
     fn tag(&self) {
-        let path = self.path.join(TAG.0);
-        if !path.exists() {
-            let _ = std::fs::write(path, TAG.1);
-        }
+        let _ = super::replace(&self.path.join(TAG.0), false, |writer| writer.write_all(TAG.1.as_ref()));
+    }
+
+    /// Whether a file is one of these, or what a writer that was killed left of one: `KIND-DIGEST.kept`, `KIND-DIGEST.kept.PID.tmp`.
+    fn is_own(path: &std::path::Path) -> bool {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let Some((stem, endings)) = name.split_once('.') else { return false };
+        let digest = stem.rsplit_once('-').map_or("", |(_, digest)| digest);
+        let is_digest = digest.len() == 32 && digest.bytes().all(|own| own.is_ascii_hexdigit());
+        is_digest && (endings == ENDING || endings.starts_with(&format!("{ENDING}.")) && endings.ends_with(".tmp"))
     }
 
     /// Deletes what was not used for longest until the rest is small enough.
@@ -118,9 +131,8 @@ impl Folder {
         let mut files: Vec<(SystemTime, u64, PathBuf)> = listed
             .filter_map(|entry| {
                 let path = entry.ok()?.path();
-                // A writer that was killed left its file under a temporary name.
-                let is_own = path.extension().is_some_and(|ending| ending == ENDING || ending == "tmp");
-                let about = std::fs::symlink_metadata(&path).ok().filter(|about| is_own && about.is_file())?;
+                let about =
+                    std::fs::symlink_metadata(&path).ok().filter(|about| Self::is_own(&path) && about.is_file())?;
                 Some((about.modified().ok()?, about.len(), path))
             })
             .collect();

@@ -91,7 +91,7 @@ fn what_opening_made_is_found_by_the_next_start_and_is_the_same() {
         format!("{:?} {:?} {:?} {:?}", project.mesh, project.findings, project.quality, project.settings)
     };
     let kept_in = |folder: &Path| {
-        let listed = std::fs::read_dir(folder.join("cache")).unwrap().map(|entry| entry.unwrap().path());
+        let listed = std::fs::read_dir(folder.join("patina-cache")).unwrap().map(|entry| entry.unwrap().path());
         let mut files: Vec<PathBuf> = listed.filter(|path| path.extension().is_some_and(|own| own == "kept")).collect();
         files.sort();
         files

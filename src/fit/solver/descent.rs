@@ -6,7 +6,7 @@
 //! never is leaves all as it was. Noise and gains are learned before each step, and stay while the objective falls.
 //!
 //! With a light it begins twice: at the texels that were found, and at one plain dielectric ([`super::second_start`]). From
-//! there the light is found once more ([`super::light_again`]). At its end the scale of the light is told ([`super::light_scale`]), and dielectrics are common ones.
+//! there the light is found once more ([`super::light_again`]) and taken as it is. At its end the scale of the light is told ([`super::light_scale`]), and dielectrics are common ones.
 
 use super::conjugate_gradients::conjugate_gradients;
 use super::estimate::Estimate;

@@ -43,8 +43,11 @@ impl SolverScene {
                 },
                 stop,
             )?;
-            if done.is_empty() {
+            if done.is_empty() && number == rounds {
                 return Some(estimate.light);
+            }
+            if done.is_empty() {
+                break;
             }
             self.add_coupled(&mut equations, &done, &kept);
             let surface = equations.each_ref().map(NormalEquations::diagonal);

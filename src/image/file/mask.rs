@@ -74,7 +74,7 @@ impl MaskFacts {
     fn reading(&self, way: MaskWay) -> Reading {
         let by_alpha = match self.alpha_tells {
             Some(true) => true,
-            Some(false) => way.by_alpha && (self.is_picture || !self.grey_tells),
+            Some(false) => way.by_alpha && (self.is_picture || !self.grey_tells || !self.is_of_two),
             None => false,
         };
         match () {
@@ -93,14 +93,16 @@ impl MaskFacts {
 impl MaskWay {
     /// The way that most of a set's masks are written in, of those that tell.
     pub fn of_set(masks: impl IntoIterator<Item = MaskFacts>) -> Self {
-        let (mut by_alpha, mut dark, mut full) = (false, 0usize, 0usize);
+        let (mut by_alpha, mut beside_alpha, mut dark, mut full) = (0usize, 0usize, 0usize, 0usize);
         for own in masks {
-            by_alpha |= own.alpha_tells == Some(true);
+            by_alpha += usize::from(own.alpha_tells == Some(true));
+            beside_alpha +=
+                usize::from(own.alpha_tells == Some(false) && !own.is_picture && own.grey_tells && own.is_of_two);
             let is_by_grey = own.alpha_tells != Some(true) && !own.is_picture;
             dark += usize::from(is_by_grey && own.is_dark());
             full += usize::from(is_by_grey && own.most >= OBJECT);
         }
-        MaskWay { by_alpha, of_ones: dark > full }
+        MaskWay { by_alpha: by_alpha > beside_alpha, of_ones: dark > full }
     }
 }
 

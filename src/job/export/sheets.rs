@@ -13,6 +13,7 @@ pub(super) const GLB_FILES: &str = "\
   metalness      blue of the second texture, no curve; used where the surface has metals (F0 above 0.16), else 0:
                  base colour is then F0 of what is metal, less what renderers add by light between microfacets
   roughness      square root of the GGX width; green of the second texture, no curve
+  scale          of the node: a unit that was given (--unit-in-metres); all other formats and cameras.json are in units of the mesh
   F0             ((ior - 1) / (ior + 1))^2 times factor and texture (sRGB) of the specular colour: KHR_materials_ior,
                  KHR_materials_specular
   sun            colour times intensity = irradiance facing it, in the environment's radiance times steradian; Blender:
@@ -31,6 +32,7 @@ tint.png         metalness, times the scale that the stage says: by what F0 of t
 diffuse.png      specular: diffuse reflectance as fitted
 specular.png     specular: F0 as fitted
 roughness.png    square root of the GGX width, no curve
+metersPerUnit    a unit that was given (--unit-in-metres); coordinates are those of the mesh
 environment.exr  the whole light, linear; left border -z, +z in the centre (OpenEXR's latitude-longitude)";
 pub(super) const MITSUBA_FILES: &str = "\
 scene.xml        sum of a diffuse BSDF and of `principled` as a metal, by blendbsdf of weight 0.9: diffuse_part.exr is

@@ -10,7 +10,7 @@ use crate::scene::{Scene, doctor};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-const GO: AtomicBool = AtomicBool::new(false);
+static GO: AtomicBool = AtomicBool::new(false);
 const SMALL: DemoSettings = DemoSettings {
     views: 5,
     held_out: 1,

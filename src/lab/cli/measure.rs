@@ -117,7 +117,7 @@ pub fn bench_studio(options: &BenchStudioOptions, json: bool) -> Result<()> {
             report.relight.extend(bench::relight::measure(path.as_deref(), options.quick, &*tell)?);
         }
     }
-    let _ = std::fs::remove_dir_all(options.output.join("starting"));
+    let _ = std::fs::remove_dir_all(bench::scratch(&options.output, "starting"));
     let needs_window =
         |part: &BenchPart| !matches!(part, BenchPart::Opening | BenchPart::Starting | BenchPart::Relight);
     if !options.parts.is_empty() && !options.parts.iter().any(needs_window) {

@@ -7,8 +7,8 @@
 //! [`scenes`] makes what they work on, [`machine`] reads threads, memory and load from the system, [`report`] writes the
 //! tables, [`bars`] holds the figures against what the window should keep to.
 //!
-//! What it refuses to do: to judge. Figures depend on the machine and on what else runs there, so nothing here is a
-//! test, and the load is told with them. It also measures no display: a frame counts as shown when the adapter is done
+//! What it refuses to do: to be a test. Figures depend on the machine and on what else runs there, so bars are told beside them,
+//! with the load, and only `relight` fails where it misses its own. It also measures no display: a frame counts as shown when the adapter is done
 //! with it and it was handed on.
 
 pub mod answers;
@@ -37,6 +37,11 @@ use person::Person;
 pub use report::BenchReport;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
+
+/// A folder of this process alone below the one for results, for what a measurement makes and takes away again.
+pub fn scratch(output: &std::path::Path, name: &str) -> std::path::PathBuf {
+    output.join(format!("{name}-{}", std::process::id()))
+}
 
 /// What is measured, and how long.
 #[derive(Clone)]

@@ -52,7 +52,7 @@ pub fn name_of(path: Option<&Path>) -> String {
 /// What cannot be opened.
 pub fn measure(path: Option<&Path>, folder: &Path, tell: &dyn Fn(&str)) -> Result<Vec<OpeningRow>> {
     let name = name_of(path);
-    let own = folder.join("opening");
+    let own = super::scratch(folder, "opening");
     let mut rows = Vec::new();
     for is_again in [false, true] {
         tell(&format!("opening {}: {name}", if is_again { "again" } else { "for the first time" }));

@@ -69,7 +69,7 @@ pub fn measure(
     tell: &dyn Fn(&str),
 ) -> Result<(Vec<StartingRow>, PathBuf)> {
     let name = super::opening::name_of(path);
-    let own = folder.join("starting");
+    let own = super::scratch(folder, "starting");
     let mut rows = Vec::new();
     let mut run = PathBuf::new();
     for time in 0..times.max(1) {

@@ -154,7 +154,7 @@ fn on_rig<'a>(
     let sensor = *sensors.get(camera.attribute("sensor_id")?)?;
     let is_of_master = master_of(sensor).is_some() && master_of(sensor) == master.node.attribute("sensor_id");
     let offset = offset_of(sensor).filter(|_| is_of_master)?;
-    let component = camera.attribute("component_id").or(master.node.attribute("component_id"));
+    let component = master.node.attribute("component_id").or(camera.attribute("component_id"));
     Some((master.transform?, component, offset))
 }
 

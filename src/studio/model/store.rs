@@ -161,9 +161,9 @@ impl Store {
         Store { path, cache: folders.map(|folders| folders.cache_dir().into()), written: None }
     }
 
-    /// A store in a file of one's own, with a folder `cache` beside it; `None` remembers nothing.
+    /// A store in a file of one's own, with a folder `patina-cache` beside it; `None` remembers nothing.
     pub fn at(path: Option<PathBuf>) -> Self {
-        let cache = path.as_ref().map(|path| path.with_file_name("cache"));
+        let cache = path.as_ref().map(|path| path.with_file_name("patina-cache"));
         Store { path, cache, written: None }
     }
 
