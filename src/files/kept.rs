@@ -234,10 +234,11 @@ mod tests {
     #[test]
     fn what_was_not_used_for_longest_goes_first() {
         let folder = tempfile::tempdir().unwrap();
-        let kept = Kept::at(folder.path().into(), Digest::of(b""), 3 * (100 + AROUND as u64));
+        let place = folder.path().join("kept");
+        let kept = Kept::at(place.clone(), Digest::of(b""), 3 * (100 + AROUND as u64));
         let keys: Vec<Digest> = (0..4u8).map(|number| key_of(&kept, &[number])).collect();
         let age = |number: usize, hours: u64| {
-            let path = folder.path().join(format!("atlas-{}.{ENDING}", keys[number]));
+            let path = place.join(format!("atlas-{}.{ENDING}", keys[number]));
             let then = SystemTime::now() - Duration::from_secs(3600 * hours);
             std::fs::File::options().write(true).open(path).unwrap().set_modified(then).unwrap();
         };
@@ -246,13 +247,19 @@ mod tests {
             age(number, 9 - number as u64);
         }
         assert!(kept.read("atlas", keys[0]).is_some(), "used now");
-        std::fs::write(folder.path().join("letter.txt"), [0; 5000]).unwrap();
+        for other in ["letter.txt", "render.tmp", "scene.kept"] {
+            std::fs::write(place.join(other), [0; 5000]).unwrap();
+        }
         kept.write("atlas", keys[3], &[3; 100]);
         let there: Vec<bool> = keys.iter().map(|&key| kept.read("atlas", key).is_some()).collect();
         assert_eq!(there, [true, false, true, true]);
         kept.write("atlas", key_of(&kept, b"large"), &[0; 1000]);
-        assert_eq!(files_in(folder.path()).len(), 3, "too large to be kept at all");
-        assert!(folder.path().join("letter.txt").is_file() && folder.path().join(TAG.0).is_file());
+        assert_eq!(files_in(&place).len(), 4, "too large to be kept at all");
+        assert!(["letter.txt", "render.tmp", "scene.kept", TAG.0].iter().all(|name| place.join(name).is_file()));
+        // A folder that was there before is not marked as one that backups may pass over.
+        let kept = Kept::at(folder.path().into(), Digest::of(b""), 1000);
+        kept.write("atlas", keys[0], &[0; 100]);
+        assert!(kept.read("atlas", keys[0]).is_some() && !folder.path().join(TAG.0).exists());
     }
 
     #[test]

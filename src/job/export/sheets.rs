@@ -94,7 +94,7 @@ fn proof_of(format: Format) -> Option<&'static str> {
              grazing angles. `patina-lab proof RUN` measures another run"
         }
         Format::Usd => {
-            "the demo in Cycles, imported by Blender 4.5: 3.2 and 2.7 % of the mean off under two lights (root mean square, after one factor) where \
+            "the demo in Cycles, imported by Blender 4.5: 2.7 and 2.4 % of the mean off under two lights (root mean square, after one factor) where \
              the lobe is GGX. `patina-lab proof RUN` measures another run"
         }
         Format::Mitsuba => {
