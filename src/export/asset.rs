@@ -73,6 +73,21 @@ impl Asset {
         })
     }
 
+    /// The base colour for a renderer that lays a lobe over its diffuse part, by [`MetalSplit::base_colour_under_fresnel`] where
+    /// metals are set apart and by [`Asset::diffuse_under_fresnel`] where they are not. The second value is the share of texels
+    /// held at 1.
+    pub fn base_colour_beside(
+        &self,
+        metals: Option<&MetalSplit>,
+        grazing: f32,
+        perceptual_roughness: Option<&GreyImage>,
+    ) -> (RgbImage, f64) {
+        match metals {
+            Some(split) => split.base_colour_under_fresnel(grazing, perceptual_roughness),
+            None => self.diffuse_under_fresnel(grazing),
+        }
+    }
+
     /// F0 of what is no metal, of all where metals are not set apart.
     pub fn dielectric_beside(&self, metals: Option<&MetalSplit>) -> Dielectric {
         match metals {

@@ -21,10 +21,7 @@ const SCRIPT: &str = include_str!("python/import_patina.py");
 /// Files that cannot be written.
 pub fn write(asset: &Asset, folder: &Path) -> Result<(f64, Option<MetalSplit>)> {
     let metals = asset.metals();
-    let (base_colour, held_share) = match &metals {
-        Some(split) => split.base_colour_under_fresnel(GRAZING_OF_VIEWS, None),
-        None => asset.diffuse_under_fresnel(GRAZING_OF_VIEWS),
-    };
+    let (base_colour, held_share) = asset.base_colour_beside(metals.as_ref(), GRAZING_OF_VIEWS, None);
     write_exr_rgb(&folder.join("diffuse.exr"), &asset.maps.diffuse)?;
     if asset.has_lobe {
         write_exr_rgb(&folder.join("specular.exr"), &asset.maps.specular)?;

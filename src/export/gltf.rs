@@ -54,10 +54,8 @@ pub fn glb(asset: &Asset, sixteen_bits: bool) -> Result<Glb> {
     // The material.
     let metals = asset.metals();
     let roughness = asset.perceptual_roughness();
-    let (base_colour, held_share) = match &metals {
-        Some(split) => split.base_colour_under_fresnel(GRAZING_OF_HALF_VECTORS, Some(&roughness)),
-        None => asset.diffuse_under_fresnel(GRAZING_OF_HALF_VECTORS),
-    };
+    let (base_colour, held_share) =
+        asset.base_colour_beside(metals.as_ref(), GRAZING_OF_HALF_VECTORS, Some(&roughness));
     let mut metallic_roughness = roughness.map(|&roughness| Vec3::new(1.0, roughness, 0.0));
     if let Some(split) = &metals {
         metallic_roughness.pixels_mut().iter_mut().zip(split.metallic.pixels()).for_each(|(rgb, metal)| rgb.z = *metal);

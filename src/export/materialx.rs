@@ -14,12 +14,10 @@ use std::path::Path;
 /// Files that cannot be written.
 pub fn write(asset: &Asset, folder: &Path) -> Result<(f64, Option<MetalSplit>)> {
     let metals = asset.metals();
-    let (base_colour, held_share) = match &metals {
-        Some(split) => split.base_colour_under_fresnel(GRAZING_OF_VIEWS, Some(&asset.perceptual_roughness())),
-        None => asset.diffuse_under_fresnel(GRAZING_OF_VIEWS),
-    };
+    let roughness = asset.perceptual_roughness();
+    let (base_colour, held_share) = asset.base_colour_beside(metals.as_ref(), GRAZING_OF_VIEWS, Some(&roughness));
     write_exr_rgb(&folder.join("base_color.exr"), &base_colour)?;
-    write_exr_grey(&folder.join("specular_roughness.exr"), &asset.perceptual_roughness())?;
+    write_exr_grey(&folder.join("specular_roughness.exr"), &roughness)?;
     let dielectric = asset.has_lobe.then(|| asset.dielectric_beside(metals.as_ref()));
     if let Some(split) = &metals {
         write_exr_grey(&folder.join("base_metalness.exr"), &split.metallic)?;

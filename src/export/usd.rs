@@ -33,10 +33,7 @@ pub fn write(asset: &Asset, folder: &Path, sixteen_bits: bool) -> Result<(f64, O
     let (mut held_share, mut lobe) = (0.0, None);
     if asset.has_lobe {
         let roughness = asset.perceptual_roughness();
-        let (base_colour, held) = match &metals {
-            Some(split) => split.base_colour_under_fresnel(GRAZING_OF_HALF_VECTORS, Some(&roughness)),
-            None => asset.diffuse_under_fresnel(GRAZING_OF_HALF_VECTORS),
-        };
+        let (base_colour, held) = asset.base_colour_beside(metals.as_ref(), GRAZING_OF_HALF_VECTORS, Some(&roughness));
         held_share = held;
         let dielectric = asset.dielectric_beside(metals.as_ref());
         lobe = Some(Metalness { has_metals: metals.is_some(), tint_scale: dielectric.factor_over(LOW_IOR) });

@@ -200,13 +200,17 @@ impl Descent<'_> {
         estimate: &Estimate,
         (shown, texture_scale): (&[bool], f32),
     ) -> Option<Place> {
-        let mut here = estimate.clone();
-        here.texels.clone_from(&place.texels);
-        here.light.clone_from(&self.light);
-        if let (true, Some(learned)) = (self.scene.settings.exposure, &place.learned) {
-            here.log_gains = log_gains(&learned.gains);
-        }
-        self.light = self.scene.light_again(&here, self.stop)?;
+        let here = Estimate {
+            texels: place.texels.clone(),
+            variances: estimate.variances.clone(),
+            light: self.light.clone(),
+            log_gains: match &place.learned {
+                Some(learned) if self.scene.settings.exposure => log_gains(&learned.gains),
+                _ => estimate.log_gains.clone(),
+            },
+            ..Estimate::default()
+        };
+        self.light = self.scene.light_again(here, self.stop)?;
         let sight = self.sight(&place.texels, FIRST_STEPS[0].slopes)?;
         Some(Place { learned: place.learned, ..self.place(&place.texels, sight, (shown, texture_scale)) })
     }

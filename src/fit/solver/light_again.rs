@@ -21,8 +21,7 @@ const OPENNESS: f64 = 0.5;
 
 impl SolverScene {
     /// The light by the estimate's maps, which stay, holes filled; as it is where no block has maps. `None` when `stop` was raised.
-    pub(super) fn light_again(&self, estimate: &Estimate, stop: &AtomicBool) -> Option<Vec<[f32; 3]>> {
-        let mut estimate = estimate.clone();
+    pub(super) fn light_again(&self, mut estimate: Estimate, stop: &AtomicBool) -> Option<Vec<[f32; 3]>> {
         let prior = open_prior(self.observations.mean, OPENNESS);
         let size = self.settings.light_size;
         let rounds = self.settings.coarse_rounds + self.settings.fine_rounds;
@@ -83,7 +82,7 @@ mod tests {
         let mean = scene.mean_light(&truth);
         let begun = vec![[0, 1, 2].map(|c| (mean[c] / even[c]) as f32); truth.len()];
         estimate.light.clone_from(&begun);
-        let found = scene.light_again(&estimate, &AtomicBool::new(false)).unwrap();
+        let found = scene.light_again(estimate.clone(), &AtomicBool::new(false)).unwrap();
         let error = |light: &[[f32; 3]]| -> f64 {
             let of_texel = |texel: usize| {
                 let square: f32 = (0..3).map(|c| (light[texel][c] - truth[texel][c]).powi(2)).sum();
@@ -92,6 +91,6 @@ mod tests {
             (0..truth.len()).map(of_texel).sum::<f64>().sqrt()
         };
         assert!(error(&found) < 0.5 * error(&begun), "{} of {}", error(&found), error(&begun));
-        assert!(scene.light_again(&estimate, &AtomicBool::new(true)).is_none());
+        assert!(scene.light_again(estimate, &AtomicBool::new(true)).is_none());
     }
 }
