@@ -11,7 +11,7 @@ use crate::error::{Error, ErrorKind, Place, Result};
 use std::collections::HashSet;
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use unicode_normalization::UnicodeNormalization;
 
 /// The folder that a file lies in: of a bare name the current one, `.`, which can be listed where an empty path cannot.
@@ -38,22 +38,26 @@ pub fn stem_of(path: &Path) -> String {
 /// A path as it lies on the disk, where names in it may be stored in another form of Unicode than they are written in; the
 /// path itself where there is none.
 pub fn as_stored(path: PathBuf) -> PathBuf {
-    let stored = |path: &Path| -> Option<PathBuf> {
-        let (folder, name) = (path.parent()?, name_of(path));
-        let folder = if folder.as_os_str().is_empty() { folder.into() } else { as_stored(folder.into()) };
-        let same = folder.join(path.file_name()?);
-        if same.exists() {
-            return Some(same);
-        }
-        let entries = std::fs::read_dir(folder_of(&same)).ok()?;
-        let found = entries.filter_map(|entry| Some(entry.ok()?.path())).find(|own| name_of(own) == name)?;
-        Some(folder.join(found.file_name()?))
-    };
     // Plain letters have but one form.
     if path.exists() || path.to_string_lossy().is_ascii() {
         return path;
     }
-    stored(&path).unwrap_or(path)
+    let mut stored = PathBuf::new();
+    for part in path.components() {
+        let same = stored.join(part);
+        stored = match part {
+            Component::Normal(name) if !same.exists() => {
+                let name = composed(&name.to_string_lossy());
+                let entries = std::fs::read_dir(folder_of(&same)).into_iter().flatten();
+                match entries.filter_map(|entry| Some(entry.ok()?.path())).find(|own| name_of(own) == name) {
+                    Some(found) => stored.join(found.file_name().unwrap_or_default()),
+                    None => return path,
+                }
+            }
+            _ => same,
+        };
+    }
+    stored
 }
 
 /// The name of a folder, also of one that its path does not name: `.`, `..`, an empty path. Empty for a root.
@@ -202,6 +206,8 @@ mod tests {
             let found = as_stored(path);
             assert!(found.is_file(), "{found:?}");
             assert!(as_stored(root.join("none\u{e9}.png")).ends_with("none\u{e9}.png"));
+            let again = format!("{0}/../{0}/{written}.png", written.replace(' ', "_"));
+            assert!(as_stored(folder.path().join(again)).is_file());
             std::fs::remove_dir_all(&root).unwrap();
         }
     }

@@ -3,7 +3,7 @@
 use super::arguments::{CompareOptions, Layer, ReadOptions, RelightOptions, RenderOptions};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::export::RunFolder;
-use crate::files::{composed, unrepeated};
+use crate::files::unrepeated;
 use crate::fit::views::{ViewUse, uses_of};
 use crate::image::file;
 use crate::insight::scores::{aggregate, score_halves};
@@ -26,8 +26,9 @@ fn camera_scene(folder: &RunFolder, given: Option<&Path>, typed: &ReadOptions) -
     if path.as_os_str().is_empty() {
         let seed = settings.fit.seed;
         let demo = crate::scene::demo::build(&crate::scene::demo::DemoSettings { seed, ..Default::default() })?;
-        let (mut scene, factor) = (demo.scene, typed.settings().shrink.max(1));
-        scene.views.iter_mut().for_each(|view| view.camera = view.camera.shrunk(factor));
+        let (mut scene, read) = (demo.scene, typed.settings());
+        read.validate()?;
+        scene.views.iter_mut().for_each(|view| view.camera = view.camera.shrunk(read.shrink));
         return Ok((scene, settings));
     }
     let read = typed.over(settings.read.clone());
@@ -42,10 +43,10 @@ fn chosen_views(scene: &Scene, names: &[String], otherwise: impl Fn(&Scene) -> V
     names
         .iter()
         .map(|name| {
-            scene.views.iter().position(|view| view.name == composed(name)).ok_or_else(|| {
+            scene.view_named(name).ok_or_else(|| {
                 Error::new(ErrorKind::InvalidSetting, format!("the scene has no view named {name}"))
                     .at(Place::Setting("views".into()))
-                    .remedy("names are those of the photos without their ending")
+                    .remedy("names are those of the photos, with or without their ending")
             })
         })
         .collect()

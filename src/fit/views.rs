@@ -30,13 +30,13 @@ impl ViewUse {
 
 /// What each view of a scene serves when the named ones are left out.
 pub fn uses_of(scene: &Scene, exclude: &[String]) -> Vec<ViewUse> {
-    let exclude: HashSet<&str> = exclude.iter().map(String::as_str).collect();
-    let of = |view: &crate::scene::View| match (exclude.contains(view.name.as_str()), view.held_out) {
+    let exclude: HashSet<usize> = exclude.iter().filter_map(|name| scene.view_named(name)).collect();
+    let of = |(index, view): (usize, &crate::scene::View)| match (exclude.contains(&index), view.held_out) {
         (true, _) => ViewUse::LeftOut,
         (false, true) => ViewUse::HeldOut,
         (false, false) => ViewUse::Training,
     };
-    scene.views.iter().map(of).collect()
+    scene.views.iter().enumerate().map(of).collect()
 }
 
 /// Indices of the views of a use, rising.
@@ -62,13 +62,38 @@ pub(super) fn training_views(uses: &[ViewUse], settings: &FitSettings) -> Result
 
 /// A warning for each name of a photo to leave out that no photo has.
 pub fn unknown_names(scene: &Scene, exclude: &[String]) -> Vec<Finding> {
-    let known: HashSet<&str> = scene.views.iter().map(|view| view.name.as_str()).collect();
-    let unknown = exclude.iter().filter(|name| !known.contains(name.as_str()));
+    let unknown = exclude.iter().filter(|name| scene.view_named(name).is_none());
     unknown
         .map(|name| {
             Finding::new(Severity::Warning, "exclude-unknown", format!("no photo is named {name}: none was left out"))
                 .at(Place::Setting("exclude".into()))
-                .remedy("names are those of the photos without their ending")
+                .remedy("names are those of the photos, with or without their ending")
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::demo::{DemoSettings, build};
+
+    #[test]
+    fn a_photo_goes_by_its_name_and_by_its_files_in_either_form_of_unicode() {
+        let mut scene =
+            build(&DemoSettings { views: 4, held_out: 1, width: 8, height: 6, map_size: 64, ..Default::default() })
+                .unwrap()
+                .scene;
+        let names = ["caf\u{e9}", "0001", "0001.jpg", "a.b", "z"];
+        for (view, name) in scene.views.iter_mut().zip(names) {
+            (view.name, view.held_out) = (name.into(), false);
+        }
+        let left_out = |typed: &str| views_of(&uses_of(&scene, &[typed.to_owned()]), ViewUse::LeftOut);
+        assert_eq!(left_out("cafe\u{301}"), [0]);
+        assert_eq!(left_out("cafe\u{301}.JPG"), [0]);
+        assert_eq!(left_out("0001.png"), [1]);
+        assert_eq!(left_out("0001.jpg"), [2], "a name that is one goes first");
+        assert_eq!(left_out("a.b.tif"), [3]);
+        assert_eq!(left_out("a"), [0; 0]);
+        assert_eq!(unknown_names(&scene, &["z.exr".into(), "z.txt".into()]).len(), 1);
+    }
 }

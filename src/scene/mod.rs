@@ -22,6 +22,7 @@ pub use read::{read, read_mesh};
 pub use settings::ReadSettings;
 
 use crate::error::{Error, ErrorKind, Finding, Place, Result};
+use crate::files::composed;
 use crate::image::{Image, RgbImage};
 use crate::light::Environment;
 use crate::material::{LobeModel, MaterialMaps};
@@ -78,6 +79,16 @@ impl Scene {
     /// Whether it was read from a folder with a `scene.toml`, where conventions can be named.
     pub fn has_manifest(&self) -> bool {
         self.folder.as_ref().is_some_and(|folder| folder.join(read::manifest::FILE_NAME).is_file())
+    }
+
+    /// Index of the view that a user names: by its name or by its photo's, in either form of Unicode.
+    pub fn view_named(&self, typed: &str) -> Option<usize> {
+        let typed = composed(typed);
+        let named = |wanted: &str| self.views.iter().position(|view| view.name == wanted);
+        named(&typed).or_else(|| {
+            let (stem, ending) = typed.rsplit_once('.')?;
+            read::PHOTO_EXTENSIONS.iter().any(|own| ending.eq_ignore_ascii_case(own)).then(|| named(stem))?
+        })
     }
 
     /// Puts a linear picture in the place of a view's photo; every pixel becomes evidence, except those that are not

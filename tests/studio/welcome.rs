@@ -99,6 +99,7 @@ fn a_scene_is_read_again_in_another_way() {
     studio.frames(4);
     assert!(studio.is_grey("Reload scene"), "nothing differs");
     studio.control("Downsample photos").set_value_accesskit(2.0);
+    studio.control("Unit").set_value_accesskit(0.001);
     studio.frames(2);
     assert!(studio.says("Not applied yet"));
     studio.control("Reload scene").click_accesskit();
@@ -106,4 +107,5 @@ fn a_scene_is_read_again_in_another_way() {
     studio.wait("the scene", |model| model.project.as_ref().is_some_and(|own| own.settings.read.shrink == 2));
     let project = studio.model().project.as_ref().unwrap();
     assert_eq!(project.scene.as_ref().unwrap().views[0].camera.width, 24);
+    assert_eq!(project.settings.read.unit_in_metres, Some(0.001));
 }

@@ -51,6 +51,25 @@ pub fn arrange(command: clap::Command) -> clap::Command {
     })
 }
 
+/// An option of the reader beside a run: where it is not typed, the scene is read as the run read it.
+pub fn beside_a_run(argument: clap::Arg) -> clap::Arg {
+    let help = argument.get_help().map(ToString::to_string).unwrap_or_default();
+    match help.split_once(" [default: ") {
+        Some((told, _)) if argument.get_help_heading() == Some(SCENE) => {
+            argument.help(format!("{told} [default: as the run]"))
+        }
+        _ => argument,
+    }
+}
+
+/// Options of the reader that say what photos show, out of the help of what takes cameras alone. They are still
+/// understood: a scene may not be read without them.
+pub fn of_cameras(argument: clap::Arg) -> clap::Arg {
+    let is_of_photos =
+        ["scene_background", "masks", "encoding", "layer", "unit_in_metres"].contains(&argument.get_id().as_str());
+    argument.hide(is_of_photos)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -136,6 +155,21 @@ mod tests {
         ] {
             assert!(text(name).contains(&format!("[default: {value}]")), "{name}: {}", text(name));
         }
+    }
+
+    #[test]
+    fn beside_a_run_the_help_tells_what_the_run_was_read_by() {
+        let mut all = Arguments::command();
+        all.build();
+        let help = |name: &str| all.find_subcommand(name).unwrap().clone().render_long_help().to_string();
+        for name in ["relight", "render", "compare"] {
+            let text = help(name);
+            assert!(text.contains("[default: as the run]"), "{name}");
+            assert!(!text.contains("[default: 8]"), "{name}");
+            assert_eq!(text.contains("--encoding"), name != "relight");
+        }
+        use clap::Parser;
+        assert!(Arguments::try_parse_from("patina relight r --env noon --encoding linear".split(' ')).is_ok());
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! What can be typed to make pictures of runs and compare pictures. The text of each field is its help.
 
-use super::ReadOptions;
+use super::{ReadOptions, groups};
 use crate::render::path::MAX_BOUNCES;
 use clap::Args;
 use std::path::PathBuf;
@@ -39,6 +39,7 @@ fn blur(text: &str) -> Result<f32, String> {
 
 /// Options of `patina relight`.
 #[derive(Debug, Args)]
+#[command(mut_args(groups::beside_a_run), mut_args(groups::of_cameras))]
 pub struct RelightOptions {
     /// The run folder.
     pub run: PathBuf,
@@ -118,6 +119,7 @@ pub enum Layer {
 
 /// Options of `patina render`.
 #[derive(Debug, Args)]
+#[command(mut_args(groups::beside_a_run))]
 pub struct RenderOptions {
     /// The run folder; or an exchange folder with its truth, to render that.
     pub run: PathBuf,
@@ -158,6 +160,7 @@ pub struct RenderOptions {
 
 /// Options of `patina compare`.
 #[derive(Debug, Args)]
+#[command(mut_args(groups::beside_a_run))]
 pub struct CompareOptions {
     /// The run folder.
     pub run: PathBuf,

@@ -65,11 +65,12 @@ pub use mesh_file::read_mesh;
 pub use understood::{Understood, understand};
 
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
-use crate::files::composed;
+use crate::files::{as_stored, composed};
 use crate::image::file::MaskWay;
 use crate::scene::doctor::pixel_centre;
 use crate::scene::settings::{BackgroundChoice, ColourEncoding, MaskUse, PixelCentre, ReadSettings, Up};
 use crate::scene::{Background, Scene, View, WorldFromSource};
+pub(super) use mask_names::PHOTO_EXTENSIONS;
 use photos::LoadedPhoto;
 use source::{SourceCamera, SourceScene, SourceView};
 use std::path::Path;
@@ -103,7 +104,7 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
     let mut views = choose_views(views, settings.max_views, &folder)?;
     let sizes = photo_size::of_files(&views)?;
     photo_size::fit_to_photos(&mut views, &sizes, &mut findings)?;
-    let mesh = if settings.mesh.is_empty() { mesh } else { settings.mesh.clone() };
+    let mesh = if settings.mesh.is_empty() { mesh } else { settings.mesh.iter().cloned().map(as_stored).collect() };
     if mesh.is_empty() {
         return Err(Error::new(ErrorKind::Missing, "no mesh was found with the photos and cameras")
             .at(Place::File(folder))

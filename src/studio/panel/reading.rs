@@ -63,6 +63,14 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ReadingMemory) {
                 .labelled_by(label.id);
             chosen.layer = (!layer.is_empty()).then_some(layer);
             ui.end_row();
+            let label = ui
+                .label("Unit")
+                .on_hover_text("How many metres a unit of the data set is; 0: what the scene says, if it does");
+            let mut metres = chosen.unit_in_metres.unwrap_or(0.0);
+            let field = DragValue::new(&mut metres).range(0.0..=f64::MAX).speed(0.001).suffix(" m").max_decimals(6);
+            ui.add(field).labelled_by(label.id);
+            chosen.unit_in_metres = (metres > 0.0).then_some(metres);
+            ui.end_row();
             let label = ui.label("Background").on_hover_text("What pixels without surface show");
             let names = [
                 (BackgroundChoice::Auto, "Auto-detect"),
