@@ -45,7 +45,7 @@ pub fn export(arguments: &ExportArguments, json: bool) -> Result<()> {
         textures: arguments.textures,
     };
     let stop = Arc::new(AtomicBool::new(false));
-    super::fit::stop_on_interrupt(Arc::clone(&stop));
+    super::interrupt::stop_on_interrupt(Arc::clone(&stop));
     let exported = run(&options, &stop, &|event| tell(&event, json))?;
     if json {
         println!("{}", serde_json::json!({"event": "exported", "export": exported}));

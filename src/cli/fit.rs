@@ -1,13 +1,14 @@
 //! `patina demo`, `fit` and `resume`: drive a job and show its events.
 
 use super::arguments::{DemoOptions, FitOptions, ResumeOptions};
+use super::interrupt::{stop_on_interrupt, while_opening};
 use super::summary::summarise;
 use crate::error::{Error, ErrorKind, Result};
 use crate::export::RunFolder;
 use crate::export::run_folder::new_run_folder;
 use crate::files::{folder_of, name_of_folder};
 use crate::fit::{FitSettings, Method};
-use crate::job::advance::{Advance, FIRST_RATIO};
+use crate::job::advance::Advance;
 use crate::job::open::{self, OpenStage, Tell};
 use crate::job::prepare::RunSettings;
 use crate::job::{self, Budget, Event, JobHandle, JobOptions, demo, known_maps};
@@ -144,43 +145,16 @@ pub fn resume(options: &ResumeOptions, json: bool) -> Result<()> {
     watch(job, &folder, &stop, json)
 }
 
-/// Raises a flag on Ctrl-C or SIGTERM; a second one ends the program at once. While something is opened, the program ends
-/// within half a second, whatever it is at.
-pub(crate) fn stop_on_interrupt(stop: Arc<AtomicBool>) {
-    // Fails only if a handler exists already, as in tests.
-    let _ = ctrlc::set_handler(move || {
-        if stop.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-        // What is opened may be deep in a file, a tree or an atlas, and nothing is written yet that could be half done.
-        for _ in 0..PATIENCE_ON_OPENING.as_millis() / 20 {
-            if !OPENING.load(Ordering::Relaxed) {
-                return;
-            }
-            std::thread::sleep(std::time::Duration::from_millis(20));
-        }
-        if OPENING.load(Ordering::Relaxed) {
-            eprintln!("stopped before the fit began");
-            std::process::exit(3);
-        }
-    });
-}
-
-/// Whether something is being opened: no file is written meanwhile.
-static OPENING: AtomicBool = AtomicBool::new(false);
-/// How long what is opened is waited for when a stop is asked for.
-const PATIENCE_ON_OPENING: std::time::Duration = std::time::Duration::from_millis(400);
-
 /// Shows how far something is that is opened.
 fn with_bar<T>(json: bool, work: impl FnOnce(Tell) -> Result<T>) -> Result<T> {
     let bar = if json { ProgressBar::hidden() } else { ProgressBar::new(1000) };
     bar.set_style(ProgressStyle::with_template("{msg} [{bar:30}] {percent} %").unwrap_or(ProgressStyle::default_bar()));
-    OPENING.store(true, Ordering::Relaxed);
-    let outcome = work(&|stage: OpenStage, share: f32| {
-        bar.set_message(stage.label());
-        bar.set_position((share * 1000.0) as u64);
+    let outcome = while_opening(|| {
+        work(&|stage: OpenStage, share: f32| {
+            bar.set_message(stage.label());
+            bar.set_position((share * 1000.0) as u64);
+        })
     });
-    OPENING.store(false, Ordering::Relaxed);
     bar.finish_and_clear();
     outcome
 }
@@ -194,7 +168,7 @@ fn watch(job: JobHandle, folder: &RunFolder, stop: &AtomicBool, json: bool) -> R
     let say = |text: String| if bar.is_hidden() { eprintln!("{text}") } else { bar.println(text) };
     let mut last_line = std::time::Instant::now();
     // One share of the whole job, as the window shows it: steps by their seconds, then what comes after them.
-    let mut advance = Advance::new(FIRST_RATIO);
+    let mut advance = Advance::default();
     let outcome = loop {
         if stop.load(Ordering::Relaxed) {
             job.stop();
@@ -212,6 +186,7 @@ fn watch(job: JobHandle, folder: &RunFolder, stop: &AtomicBool, json: bool) -> R
         };
         match &event {
             Event::Progress(progress) => advance.stepped(progress),
+            Event::WithinStep(time) => advance.within_step(time),
             Event::Finishing(stage) => advance.finishing(*stage),
             Event::Finished(_) => advance.finished(),
             _ => {}
@@ -278,6 +253,10 @@ fn line_of(event: &Event, advance: &Advance) -> serde_json::Value {
         }
         Event::Progress(progress) => json!({
             "event": "progress", "progress": progress, "share": advance.share(),
+            "seconds_left_of_job": advance.seconds_left(),
+        }),
+        Event::WithinStep(time) => json!({
+            "event": "within-step", "time": time, "share": advance.share(),
             "seconds_left_of_job": advance.seconds_left(),
         }),
         Event::Finding(finding) => json!({"event": "finding", "finding": finding}),

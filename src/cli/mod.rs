@@ -3,7 +3,7 @@
 //! [`arguments`] is what can be typed, [`check`] prints what was understood of a scene, [`fit`] drives a job and shows its events, [`measured`] is for measured
 //! reflectance, [`object`] is object mode, [`gauge`] moves the scale of a run, [`export`] writes it for other
 //! programs, [`turntable`] belongs to `relight`, `benchmark` to `compare`, [`guide`] prints the guide,
-//! [`completions`] the script for a shell, `hint` answers what was mistyped, [`commands`] holds the rest; `summary` is what is said of a fit that has ended, `say` writes lines where somebody listens, `threads` starts what everything works on.
+//! [`completions`] the script for a shell, `hint` answers what was mistyped, [`commands`] holds the rest; `summary` is what is said of a fit that has ended, `say` writes lines where somebody listens, [`interrupt`] hears Ctrl-C, `threads` starts what everything works on.
 //! Whatever is asked here can be asked of the library in the same words.
 
 /// A line on standard output; lost where nobody listens, see [`say`].
@@ -26,6 +26,7 @@ pub mod fit;
 pub mod gauge;
 pub mod guide;
 mod hint;
+pub mod interrupt;
 pub mod measured;
 pub mod object;
 mod say;

@@ -1,6 +1,6 @@
 //! `patina object`: light and reflectance from photos of one object.
 
-use super::fit::stop_on_interrupt;
+use super::interrupt::stop_on_interrupt;
 use crate::error::{Error, Result};
 use crate::files::unrepeated;
 use crate::job::object::estimate_as_far_as_it_goes;

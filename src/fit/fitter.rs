@@ -25,6 +25,7 @@ use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::light::Environment;
 use crate::material::texels::{PyramidWeights, TexelPyramid, maps_from_texels};
 use crate::material::{LobeModel, MaterialMaps};
+use crate::render::cached::CachedTransport;
 use crate::render::{Parameters, Surface};
 use crate::scene::Scene;
 use std::sync::Arc;
@@ -59,6 +60,8 @@ pub struct Fitter {
     pub(super) solver_photo_level: usize,
     /// What the solver's light is known by; of nothing under Adam and before its first round on the light.
     pub(super) light_known: LightKnown,
+    /// Transport of the surface that was cached before.
+    pub(super) transport: Option<Arc<CachedTransport>>,
     /// What judging views say of the model's freedoms; `None` under Adam and before the maps of full size.
     pub(super) choices: Option<Arc<Choices>>,
     /// What the last maps that the solver made say of tails of lobes; no checkpoint holds it.
@@ -195,6 +198,7 @@ impl Fitter {
             solver: None,
             solver_photo_level: 0,
             light_known: LightKnown::default(),
+            transport: None,
             choices: None,
             tails: None,
             known_maps: None,
@@ -327,6 +331,12 @@ impl Fitter {
         Some(Finding::new(Severity::Warning, "lobes-with-tails", message).remedy(
             "specular and roughness maps are the nearest that Blinn-Phong lobes come to, and their intervals do not know of it; measured surfaces and GGX have such tails: --lobe ggx fits them",
         ))
+    }
+
+    /// Takes transport of this very surface that somebody cached already: where it is what the solver would trace, it begins
+    /// the sooner.
+    pub(crate) fn take_transport(&mut self, transport: Arc<CachedTransport>) {
+        self.transport = Some(transport);
     }
 
     /// What the settings ask for that this scene does not have.

@@ -46,7 +46,7 @@ impl Fitter {
         let is_of_level = |solver: &SolverScene| (self.solver_photo_level, solver.settings.map_size) == level;
         if !self.solver.as_ref().is_some_and(is_of_level) {
             // Photos and maps are other ones; what points of the surface see of each other and of the light is the same.
-            let traced = self.solver.take().map(|solver| solver.transport);
+            let traced = self.solver.take().map(|solver| solver.transport).or_else(|| self.transport.take());
             let (scene, surface) = (&self.scene, &self.surface);
             let targets = targets(scene, &self.training, stage.photo_level);
             self.solver = SolverScene::build(scene, surface, targets, &self.held_out, settings, traced, stop)?;
@@ -63,9 +63,12 @@ impl Fitter {
         let mut estimate = self.lend_estimate(&solver)?;
         let light_size = settings.light_size;
         let views = if settings.exposure { solver.views.clone() } else { Vec::new() };
-        let report = solver.step_watched(step, &mut estimate, stop, &mut |OnTheWay { texels, light, gains }| {
+        // What made the level ready before is no part of the way.
+        let way_began = Instant::now();
+        let report = solver.step_watched(step, &mut estimate, stop, &mut |OnTheWay { texels, light, gains, share }| {
+            let seconds_left = way_began.elapsed().as_secs_f64() * (1.0 / share - 1.0);
             let log_gains = views.iter().copied().zip(log_gains(gains)).collect();
-            watch(&Underway { texels, map_size, light, light_size, log_gains });
+            watch(&Underway { texels, map_size, light, light_size, seconds_left, log_gains });
         });
         if report.is_some() && whole.fixed_maps && self.steps_total() == self.state.step + 1 {
             // Else before maps are made under the light.
@@ -90,6 +93,18 @@ impl Fitter {
         self.figures.keep_errors(&of_views);
         self.state.seconds += began.elapsed().as_secs_f64();
         Ok(StepOutcome::Stepped(self.note(stage, &report, held_out_rmse)))
+    }
+
+    /// Millions of pixels of the photos fitted to that show surface, at full size; before the solver has looked, half of all.
+    pub(crate) fn surface_megapixels(&self) -> f64 {
+        let pixels = |view: &usize| {
+            let camera = &self.scene.views[*view].camera;
+            (camera.width * camera.height) as f64 / 1e6
+        };
+        let all: f64 = self.training.iter().map(pixels).sum();
+        let of_level =
+            |solver: &SolverScene| solver.surface_pixels() as f64 / 1e6 * 4f64.powi(self.solver_photo_level as i32);
+        self.solver.as_ref().map_or(0.5 * all, of_level).min(all)
     }
 
     /// Rounds on the light so far, on all levels.

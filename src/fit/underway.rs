@@ -18,6 +18,8 @@ pub(crate) struct Underway<'a> {
     pub(super) light: &'a [[f32; 3]],
     /// Width and height of the light in texels.
     pub(super) light_size: (usize, usize),
+    /// Seconds until the step is done, by what it took to this place.
+    pub seconds_left: f64,
     /// Views of the scene with the logarithms of their gains; empty where gains are not fitted.
     pub(super) log_gains: Vec<(usize, f32)>,
 }

@@ -1,24 +1,24 @@
 //! How far a job is, from its first step to its report: one share that never goes back, and the seconds that are left; the
 //! same in window and terminal.
 //!
-//! Steps are weighed by the seconds they are expected to take, as the job tells them; what comes after the last step, by
-//! the ratio that finishing had to fitting on this machine before ([`Advance::learned_ratio`], kept between runs).
+//! Steps are weighed by the seconds they are expected to take, as the job tells them; what comes after the last step as well,
+//! times a factor by which it was off on this machine before ([`Advance::learned_factor`], kept between runs).
 
-use super::{FinishingStage, Progress};
+use super::{FinishingStage, Progress, StepTime};
 use std::time::Instant;
 
-/// Seconds of finishing for a second of fitting, where no run has told it yet.
-pub const FIRST_RATIO: f64 = 0.25;
-/// Smallest and largest ratio that is believed.
-const RATIOS: (f64, f64) = (0.02, 4.0);
+/// Smallest and largest factor that is believed.
+const FACTORS: (f64, f64) = (0.1, 10.0);
 /// Share of a step, or of the finishing, that passing time alone may claim.
 const MOST_BY_TIME: f64 = 0.9;
 
 /// How far a job is.
 #[derive(Clone, Debug)]
 pub struct Advance {
-    ratio: f64,
+    factor: f64,
     share: f64,
+    /// Seconds that finishing is expected to take, the factor left out.
+    finishing_seconds: f64,
     /// Seconds of the steps so far, those still expected, and those of one step; when that was told.
     steps: Option<(f64, f64, f64, Instant)>,
     finishing: Option<(FinishingStage, Instant)>,
@@ -27,15 +27,15 @@ pub struct Advance {
 
 impl Default for Advance {
     fn default() -> Self {
-        Advance::new(FIRST_RATIO)
+        Advance::new(1.0)
     }
 }
 
 impl Advance {
-    /// At the start of a job whose finishing is expected to take so many seconds for a second of fitting.
-    pub fn new(ratio: f64) -> Self {
-        let ratio = if ratio.is_finite() { ratio.clamp(RATIOS.0, RATIOS.1) } else { FIRST_RATIO };
-        Advance { ratio, share: 0.0, steps: None, finishing: None, learned: None }
+    /// At the start of a job whose finishing is expected to take so many times what is told of it.
+    pub fn new(factor: f64) -> Self {
+        let factor = if factor.is_finite() { factor.clamp(FACTORS.0, FACTORS.1) } else { 1.0 };
+        Advance { factor, share: 0.0, finishing_seconds: 0.0, steps: None, finishing: None, learned: None }
     }
 
     /// The share of the whole job that is done, in [0, 1]; it never goes back.
@@ -50,8 +50,8 @@ impl Advance {
 
     /// Seconds until the report is written; `None` while nothing is known.
     pub fn seconds_left(&self) -> Option<f64> {
-        let (done, left, _, then) = self.steps?;
-        let finishing = self.ratio * (done + left);
+        let (_, left, _, then) = self.steps?;
+        let finishing = self.factor * self.finishing_seconds;
         let seconds = match &self.finishing {
             Some((_, began)) => finishing - began.elapsed().as_secs_f64(),
             None => left - then.elapsed().as_secs_f64() + finishing,
@@ -59,15 +59,25 @@ impl Advance {
         seconds.is_finite().then_some(seconds.max(0.0))
     }
 
-    /// The ratio that a job which ended has shown; handed out once.
-    pub fn learned_ratio(&mut self) -> Option<f64> {
+    /// The factor that a job which ended has shown; handed out once.
+    pub fn learned_factor(&mut self) -> Option<f64> {
         self.learned.take()
     }
 
     /// A step was done.
     pub fn stepped(&mut self, progress: &Progress) {
-        let (done, left) = (progress.row.seconds, progress.seconds_left);
-        let step = 1.0 / progress.steps_per_second.max(1e-9);
+        if progress.finishing_seconds.is_finite() {
+            self.finishing_seconds = progress.finishing_seconds.max(0.0);
+        }
+        self.take((progress.row.seconds, progress.seconds_left), 1.0 / progress.steps_per_second.max(1e-9));
+    }
+
+    /// A step has come to a place.
+    pub fn within_step(&mut self, time: &StepTime) {
+        self.take((time.seconds, time.seconds_left), time.seconds_left);
+    }
+
+    fn take(&mut self, (done, left): (f64, f64), step: f64) {
         if done.is_finite() && left.is_finite() {
             self.steps = Some((done, left.max(0.0), step, Instant::now()));
             self.claim(done / self.whole(done, left));
@@ -84,8 +94,8 @@ impl Advance {
     /// The report is written.
     pub fn finished(&mut self) {
         self.share = 1.0;
-        if let (Some((done, ..)), Some((_, began))) = (self.steps, self.finishing) {
-            self.learned = Some((began.elapsed().as_secs_f64() / done.max(1e-3)).clamp(RATIOS.0, RATIOS.1));
+        if let (Some((_, began)), true) = (self.finishing, self.finishing_seconds > 0.0) {
+            self.learned = Some((began.elapsed().as_secs_f64() / self.finishing_seconds).clamp(FACTORS.0, FACTORS.1));
         }
     }
 
@@ -98,7 +108,7 @@ impl Advance {
                 self.claim((done + within) / self.whole(done, left));
             }
             Some((_, began)) => {
-                let share = began.elapsed().as_secs_f64() / (self.ratio * (done + left)).max(1e-3);
+                let share = began.elapsed().as_secs_f64() / (self.factor * self.finishing_seconds).max(1e-3);
                 let before = self.before_finishing();
                 self.claim(before + (1.0 - before) * share.min(MOST_BY_TIME));
             }
@@ -106,11 +116,12 @@ impl Advance {
     }
 
     fn whole(&self, done: f64, left: f64) -> f64 {
-        ((done + left.max(0.0)) * (1.0 + self.ratio)).max(1e-9)
+        (done + left.max(0.0) + self.factor * self.finishing_seconds).max(1e-9)
     }
 
     fn before_finishing(&self) -> f64 {
-        1.0 / (1.0 + self.ratio)
+        let Some((done, left, ..)) = self.steps else { return 0.5 };
+        (done + left) / self.whole(done, left)
     }
 
     fn claim(&mut self, share: f64) {
@@ -136,12 +147,12 @@ mod tests {
             surface_rmse: None,
             held_out_rmse: None,
         };
-        Progress { row, steps_total: 10, steps_per_second: 1.0, seconds_left }
+        Progress { row, steps_total: 10, steps_per_second: 1.0, seconds_left, finishing_seconds: 20.0 }
     }
 
     #[test]
     fn the_share_covers_finishing_and_never_goes_back() {
-        let mut advance = Advance::new(0.25);
+        let mut advance = Advance::new(0.5);
         let mut before = 0;
         // The expectation grows on the way: what was shown stays.
         for (seconds, left) in [(10.0, 30.0), (20.0, 20.0), (30.0, 90.0), (40.0, 0.0)] {
@@ -165,7 +176,7 @@ mod tests {
         }
         advance.finished();
         assert_eq!(advance.percent(), 100);
-        assert!(advance.learned_ratio().is_some_and(|ratio| ratio > 0.0) && advance.learned_ratio().is_none());
+        assert!(advance.learned_factor().is_some_and(|factor| factor > 0.0) && advance.learned_factor().is_none());
     }
 
     #[test]
@@ -174,7 +185,10 @@ mod tests {
         assert!(advance.seconds_left().is_none() && advance.percent() == 0);
         advance.stepped(&progress(10.0, 30.0));
         let left = advance.seconds_left().unwrap();
-        assert!((49.0..=50.0).contains(&left), "{left}");
+        assert!((39.0..=40.0).contains(&left), "{left}");
+        advance.within_step(&StepTime { seconds: 12.0, seconds_left: 12.0 });
+        let left = advance.seconds_left().unwrap();
+        assert!((21.0..=22.0).contains(&left) && advance.percent() == 35, "{left}");
         advance.stepped(&progress(f64::NAN, f64::NAN));
         assert!(advance.seconds_left().is_some(), "what is not a number changes nothing");
     }

@@ -110,6 +110,8 @@ pub enum Event {
     },
     /// A step was done.
     Progress(Progress),
+    /// A step that takes long has come to a place.
+    WithinStep(StepTime),
     /// Something the user should know.
     Finding(Finding),
     /// A checkpoint was written.
@@ -184,7 +186,18 @@ pub struct Progress {
     pub steps_total: usize,
     /// Steps a second over the last steps.
     pub steps_per_second: f64,
-    /// Seconds left, from the pace of the current stage and the pixels of the coming ones.
+    /// Seconds until the last step is done, from the pace so far and the pixels of the coming stages.
+    pub seconds_left: f64,
+    /// Seconds that what comes after the last step is expected to take.
+    pub finishing_seconds: f64,
+}
+
+/// How far a step is.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct StepTime {
+    /// Seconds of all steps so far, this one's included.
+    pub seconds: f64,
+    /// Seconds until the last step is done.
     pub seconds_left: f64,
 }
 

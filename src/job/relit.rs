@@ -4,9 +4,12 @@
 //! from the last only in its light costs no ray. A view is traced with one ray a pixel first and shown, and once nothing
 //! else is asked for with as many as the fit takes. Work is done on a pool of its own, which gives way.
 
+use super::kept::{self, Kept};
 use super::newest::Newest;
 use super::{Slot, Wake, background};
 use crate::error::{Error, ErrorKind, Result, text_of_panic};
+use crate::fit::FitSettings;
+use crate::fit::solver::SolverSettings;
 use crate::image::RgbImage;
 use crate::light::Environment;
 use crate::material::texels::texels_from_maps;
@@ -23,12 +26,25 @@ use std::time::Instant;
 
 /// Width and height of the lights that the cache of a window is made for.
 const LIGHT_SIZE: (usize, usize) = (64, 32);
-/// Texels a side of its grid.
+/// Texels a side of its grid, at least.
 const GRID: usize = 192;
 
-/// Traces the cache by which a window relights a surface; `None` when `stop` was raised.
-pub fn transport_of(surface: &Surface, settings: CachedSettings, stop: &AtomicBool) -> Option<CachedTransport> {
-    CachedTransport::build(surface, settings, LIGHT_SIZE, stop)
+/// The cache by which a window relights a surface, from disk where it was traced before; `None` when `stop` was raised.
+pub fn transport_of(
+    surface: &Surface,
+    settings: CachedSettings,
+    kept: &Kept,
+    stop: &AtomicBool,
+) -> Option<CachedTransport> {
+    kept::transport(surface, settings, LIGHT_SIZE, kept, stop)
+}
+
+/// How fine that cache is where fits with these settings are begun and looked at: the one that a fit begins with, if that is
+/// fine enough, so that it is traced once.
+pub fn settings_beside(fit: &FitSettings, max_bounces: usize) -> CachedSettings {
+    let (first, light_size) = SolverSettings::first_cache(fit);
+    let serves = light_size == LIGHT_SIZE && first.grid >= GRID && first.max_bounces == max_bounces && fit.has_lobe();
+    if serves { first } else { settings_of(max_bounces, fit.has_lobe().then_some(fit.lobe)) }
 }
 
 /// How fine that cache is, for surface with a lobe of these microfacets or without one.

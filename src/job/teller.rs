@@ -17,7 +17,7 @@ pub(super) struct Teller {
 impl Teller {
     /// Sends an event without waiting; progress only while the reader keeps up.
     pub fn send(&self, event: Event) {
-        if matches!(event, Event::Progress(_)) && self.events.len() >= MOST_WAITING_EVENTS {
+        if matches!(event, Event::Progress(_) | Event::WithinStep(_)) && self.events.len() >= MOST_WAITING_EVENTS {
             return;
         }
         // Nobody listens any more: the fit goes on, its files are what counts.

@@ -5,46 +5,79 @@ use crate::fit::schedule::{Stage, StageKind};
 
 /// Steps of the same stage whose pace counts.
 const STEPS_OF_PACE: usize = 12;
+/// Seconds that the usual machine has in its favour against the one at hand: the first ones tell little.
+const SECONDS_OF_USUAL: f64 = 0.5;
 
-/// Steps a second over the last steps, and seconds left, after the last of `losses`.
+/// How fast a fit goes, after its last step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pace {
+    /// Steps a second over the last steps.
+    pub steps_per_second: f64,
+    /// Seconds until the last step is done; not a number before the first.
+    pub seconds_left: f64,
+    /// Seconds for what comes after the last step.
+    pub finishing_seconds: f64,
+}
+
+/// The pace after the last of `losses`.
 ///
-/// Steps of the optimiser all take about as long. Those of the solver do not: what is left is weighed by what each kind
-/// costs beside the others, and measured by what was done.
-pub fn pace(plan: &[Stage], losses: &[LossRow]) -> (f64, f64) {
-    let Some(last) = losses.last() else { return (0.0, f64::NAN) };
+/// Steps of the optimiser all take about as long. Those of the solver do not: each is expected to take what it took on a usual machine
+/// for so many million pixels of surface, times how long those so far took beside that.
+pub fn pace(plan: &[Stage], losses: &[LossRow], surface_megapixels: f64) -> Pace {
+    let finishing = FINISHING.0 + FINISHING.1 * surface_megapixels;
+    let Some(last) = losses.last() else {
+        return Pace { steps_per_second: 0.0, seconds_left: f64::NAN, finishing_seconds: finishing };
+    };
     let same_stage = losses.iter().rev().take_while(|row| row.stage == last.stage).take(STEPS_OF_PACE).count();
     let first = losses.len() - same_stage;
     let before = if first > 0 { losses[first - 1].seconds } else { 0.0 };
-    let per_second = same_stage as f64 / (last.seconds - before).max(1e-9);
-    let (mut done, mut left, mut steps_left) = (0.0, 0.0, 0usize);
-    let mut is_of_solver = false;
-    let steps = plan.iter().flat_map(|stage| (0..stage.steps).map(move |step| (stage, step)));
-    for (number, (stage, step)) in steps.enumerate() {
-        if number < losses.len() {
-            done += relative_cost(plan, stage, step);
-            is_of_solver = stage.kind.is_of_solver();
-        } else {
-            left += relative_cost(plan, stage, step);
-            steps_left += 1;
-        }
+    let steps_per_second = same_stage as f64 / (last.seconds - before).max(1e-9);
+
+    let steps: Vec<(&Stage, usize)> =
+        plan.iter().flat_map(|stage| (0..stage.steps).map(move |step| (stage, step))).collect();
+    let (done, left) = steps.split_at(losses.len().min(steps.len()));
+    if !done.last().is_some_and(|(stage, _)| stage.kind.is_of_solver()) {
+        let seconds_left = left.len() as f64 / steps_per_second;
+        return Pace { steps_per_second, seconds_left, finishing_seconds: finishing };
     }
-    let seconds = if is_of_solver { last.seconds / done.max(1e-9) * left } else { steps_left as f64 / per_second };
-    (per_second, seconds)
+    // The first step has the cache in it, which may be there already: it tells nothing.
+    let (mut taken, mut expected) = (SECONDS_OF_USUAL, SECONDS_OF_USUAL);
+    for (pair, (stage, step)) in losses.windows(2).zip(&done[1..]) {
+        taken += pair[1].seconds - pair[0].seconds;
+        expected += usual_seconds(plan, stage, *step, surface_megapixels);
+    }
+    let slowness = taken / expected;
+    let seconds_left =
+        slowness * left.iter().map(|(stage, step)| usual_seconds(plan, stage, *step, surface_megapixels)).sum::<f64>();
+    Pace { steps_per_second, seconds_left, finishing_seconds: slowness * finishing }
 }
 
-/// What a step costs, in rounds on the light at full size: about what was measured.
-fn relative_cost(plan: &[Stage], stage: &Stage, step: usize) -> f64 {
-    let shrunk = 0.5f64.powi(stage.photo_level as i32);
+/// Seconds of all that comes after the last step, most of them for scores: so many, and for each million pixels of surface.
+const FINISHING: (f64, f64) = (6.0, 9.0);
+/// The same of making a level ready, at its pixels.
+const LEVEL: (f64, f64) = (2.0, 4.0);
+/// The same of a round on the light.
+const ROUND: (f64, f64) = (1.0, 0.3);
+/// The same of maps.
+const MAPS: (f64, f64) = (0.2, 8.5);
+/// Seconds of the descent from whole pixels.
+const REFINE: (f64, f64) = (12.0, 14.5);
+/// Seconds of a step of the optimiser, about.
+const OPTIMISER: f64 = 0.3;
+
+/// What a step takes on a machine of two processors, as was measured on captures of .6 to 4 million pixels of surface.
+fn usual_seconds(plan: &[Stage], stage: &Stage, step: usize, surface_megapixels: f64) -> f64 {
+    let megapixels = surface_megapixels * 0.25f64.powi(stage.photo_level as i32);
+    let linear = |(fixed, each): (f64, f64)| fixed + each * megapixels;
     let is_first_of_level =
         step == 0 && plan.iter().find(|own| own.is_of_level_of(stage)).is_some_and(|own| own.kind == stage.kind);
-    // The cache is traced before the first step of a level.
-    let cache = if is_first_of_level && stage.kind.is_of_solver() { 6.0 * shrunk } else { 0.0 };
-    cache
+    let ready = if is_first_of_level && stage.kind.is_of_solver() { linear(LEVEL) } else { 0.0 };
+    ready
         + match stage.kind {
-            StageKind::WideLight | StageKind::NarrowLight => shrunk.sqrt(),
-            StageKind::Maps => 10.0 * shrunk * shrunk.sqrt(),
-            StageKind::Refine => 10.0,
-            StageKind::Diffuse | StageKind::All => 0.3,
+            StageKind::WideLight | StageKind::NarrowLight => linear(ROUND),
+            StageKind::Maps => linear(MAPS),
+            StageKind::Refine => linear(REFINE),
+            StageKind::Diffuse | StageKind::All => OPTIMISER,
         }
 }
 
@@ -54,8 +87,10 @@ mod tests {
     use crate::fit::schedule::stages;
     use crate::fit::{FitSettings, Method};
 
+    const MEGAPIXELS: f64 = 5.0;
+
     /// A history in which each step takes its seconds.
-    fn history(plan: &[Stage], seconds: impl Fn(&Stage, usize) -> f64) -> Vec<LossRow> {
+    fn history(plan: &[Stage], mut seconds: impl FnMut(&Stage, usize) -> f64) -> Vec<LossRow> {
         let steps = plan.iter().flat_map(|stage| (0..stage.steps).map(move |step| (stage, step)));
         let mut now = 0.0;
         let row = |(index, (stage, step)): (usize, (&Stage, usize))| {
@@ -80,8 +115,34 @@ mod tests {
             FitSettings { method: Method::Adam, steps_diffuse: 4, steps_all: 20, levels: 1, ..FitSettings::default() };
         let plan = stages(&settings);
         let whole = history(&plan, |stage, _| if stage.kind == StageKind::Diffuse { 9.0 } else { 0.5 });
-        let (per_second, left) = pace(&plan, &whole[..14]);
-        assert!((per_second - 2.0).abs() < 1e-9 && (left - 5.0).abs() < 1e-9, "{per_second} {left}");
-        assert!(pace(&plan, &[]).1.is_nan());
+        let Pace { steps_per_second, seconds_left, .. } = pace(&plan, &whole[..14], MEGAPIXELS);
+        assert!((steps_per_second - 2.0).abs() < 1e-9 && (seconds_left - 5.0).abs() < 1e-9);
+        assert!(pace(&plan, &[], MEGAPIXELS).seconds_left.is_nan());
+    }
+
+    #[test]
+    fn steps_of_the_solver_are_weighed_by_pixels_and_by_what_was_done() {
+        let plan = stages(&FitSettings { method: Method::Solver, ..FitSettings::default() });
+        let steps: usize = plan.iter().map(|stage| stage.steps).sum();
+        for (slowness, first) in [(1.0, 5.0), (3.0, 0.0), (0.2, 60.0)] {
+            let mut is_first = true;
+            let seconds = |stage: &Stage, step: usize| {
+                let own = slowness * usual_seconds(&plan, stage, step, MEGAPIXELS);
+                own + if std::mem::take(&mut is_first) { first } else { 0.0 }
+            };
+            let whole = history(&plan, seconds);
+            let end = whole.last().unwrap().seconds;
+            for done in steps / 2..steps {
+                let told = pace(&plan, &whole[..done], MEGAPIXELS).seconds_left;
+                let left = end - whole[done - 1].seconds;
+                // The usual machine has some seconds in its favour.
+                assert!((told / left - 1.0).abs() < 0.5, "{slowness} {done}: {told} of {left}");
+            }
+            let told = pace(&plan, &whole[..steps - 1], MEGAPIXELS).seconds_left;
+            let left = end - whole[steps - 2].seconds;
+            assert!((told / left - 1.0).abs() < 0.2, "{slowness}: {told} of {left}");
+        }
+        let first = &history(&plan, |_, _| 1.0)[..1];
+        assert!(pace(&plan, first, 0.1).seconds_left < 0.5 * pace(&plan, first, MEGAPIXELS).seconds_left);
     }
 }

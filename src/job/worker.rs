@@ -5,8 +5,8 @@ use super::outcome;
 use super::prepare::{Prepared, RunSettings};
 use super::save::Saver;
 use super::teller::Teller;
-use super::time_left;
-use super::{Budget, Command, Event, Progress, Slot, Snapshot, SolverTold};
+use super::time_left::{self, Pace};
+use super::{Budget, Command, Event, Progress, Slot, Snapshot, SolverTold, StepTime};
 use crate::error::{Error, ErrorKind, Finding, Result, Severity, text_of_panic};
 use crate::export::RunFolder;
 use crate::fit::underway::{Reached, Underway};
@@ -216,7 +216,11 @@ impl Worker {
         let is_limited = budget.is_some();
         let mut last_snapshot = Instant::now();
         let mut was_shown = false;
+        let (began, before) = (Instant::now(), fitter.state().seconds);
         let mut watch = |underway: &Underway| {
+            // Steps within which something is heard of are the last.
+            let seconds = before + began.elapsed().as_secs_f64();
+            teller.send(Event::WithinStep(StepTime { seconds, seconds_left: underway.seconds_left }));
             if is_limited {
                 *reached = Some(underway.reached());
             }
@@ -355,7 +359,8 @@ impl Worker {
     fn progress(&self, row: LossRow) -> Progress {
         let state = self.fitter.state();
         let steps_total = self.fitter.steps_total();
-        let (steps_per_second, seconds_left) = time_left::pace(&state.plan, &state.losses);
-        Progress { row, steps_total, steps_per_second, seconds_left }
+        let Pace { steps_per_second, seconds_left, finishing_seconds } =
+            time_left::pace(&state.plan, &state.losses, self.fitter.surface_megapixels());
+        Progress { row, steps_total, steps_per_second, seconds_left, finishing_seconds }
     }
 }

@@ -46,6 +46,15 @@ pub fn quantile(values: &[f64], fraction: f64) -> f64 {
     sorted[low] + (sorted[high] - sorted[low]) * (place - low as f64)
 }
 
+/// Median, or 0 of nothing; the values come out in another order.
+pub fn median(values: &mut [f32]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    f64::from(*values.select_nth_unstable_by(middle, f32::total_cmp).1)
+}
+
 /// Standard deviation of each of three normal numbers, from root mean squares of such triples, of which most may be
 /// believed: their median length is 1.538 standard deviations. NaN when empty.
 pub fn deviation_of_triples(root_mean_squares: &[f64]) -> f64 {

@@ -13,8 +13,6 @@ use super::problem::ObjectProblem;
 use crate::light::blur::{BANDS, BlurKernel};
 use std::f64::consts::{PI, TAU};
 
-/// Rows of the light at which this is asked: its finest details are below the smallest blur.
-pub const ROWS: usize = 24;
 /// Directions at which blurred lights are looked at.
 const DIRECTIONS: usize = 24;
 /// A light blurred by an angle is the photo's when it takes away at least this share of its variance.

@@ -12,6 +12,9 @@ use std::sync::Arc;
 
 /// Rows of the light at which starts are tried.
 const COARSE_HEIGHT: usize = 16;
+/// Rows of the light, at most, at which it is asked which of its details the photo tells: the finest are below the smallest
+/// blur.
+const BAND_ROWS: usize = 24;
 /// Pixels with which starts are tried.
 const COARSE_PIXELS: usize = 384;
 
@@ -56,13 +59,13 @@ impl ObjectProblem {
         ObjectProblem::new(views, &coarse).map(|(problem, _)| problem)
     }
 
-    /// The same photos with few pixels and a light of [`bands::ROWS`](super::bands::ROWS) rows at most, to ask which of its
+    /// The same photos with few pixels and a light of few rows, to ask which of its
     /// details they tell.
     ///
     /// # Errors
     /// As [`ObjectProblem::new`].
     pub fn for_bands(views: &[ObjectView], settings: &ObjectSettings) -> Result<Self> {
-        let (rows, pixels) = (super::bands::ROWS, COARSE_PIXELS);
+        let (rows, pixels) = (BAND_ROWS, COARSE_PIXELS);
         let small = ObjectSettings {
             light_height: settings.light_height.min(rows),
             pixels: settings.pixels.min(pixels),

@@ -10,9 +10,10 @@
 //! reflectance's column, and `K = R^2 + W` (`W` the precision of the beliefs), what is left of all blocks is
 //! `G (I - R K^-1 R) G'`, the Schur complement, whose middle has eigenvalues in [0, 1].
 
+use super::eliminate::KeptUnknown;
 use super::normal_equations::NormalEquations;
 use super::plan::Block;
-use super::report::median;
+use crate::math::statistics::median;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, MatRef, Side};
 use glam::Vec3;
@@ -29,19 +30,6 @@ const SPREAD: f64 = 3.0;
 const DARK: f64 = 0.1;
 /// The median is at least this: black photos have none.
 const LEAST_MEDIAN: f64 = 1e-3;
-
-/// A block's reflectance in one channel, with what it has to do with the light.
-#[derive(Clone, Debug, Default)]
-pub struct KeptUnknown {
-    /// Unit direction of the unknown in the rows, over the light's coefficients.
-    pub row: Vec<f32>,
-    /// The right side along that direction.
-    pub side: f64,
-    /// Length of the unknown's column.
-    pub length: f64,
-    /// The reflectance now.
-    pub value: f64,
-}
 
 /// Pairs of neighbouring blocks, as places in a list, and their distance over the usual one.
 pub fn neighbours(blocks: &[&Block]) -> Vec<(usize, usize, f64)> {

@@ -10,6 +10,7 @@
 
 use super::conjugate_gradients::conjugate_gradients;
 use super::estimate::Estimate;
+use super::light_evidence::EvidenceShares;
 use super::light_scale::LightScale;
 use super::neighbours::Neighbours;
 use super::objective::{Learned, Objective};
@@ -31,6 +32,8 @@ pub struct OnTheWay<'a> {
     pub light: &'a [[f32; 3]],
     /// Gain of each view and channel.
     pub gains: &'a [[f32; 3]],
+    /// Share of the whole way by its seconds, in (0, 1]; what comes after it is short.
+    pub share: f64,
 }
 
 /// Hears of each step of a descent that is gone on from.
@@ -41,12 +44,31 @@ pub(super) struct Trace<'a> {
     /// The objective before and after each step.
     steps: Vec<[Objective; 2]>,
     watch: Option<&'a mut Watch<'a>>,
+    /// Shares of the whole way between which the part at hand lies, its number of steps, and those that are done.
+    part: (f64, f64, usize, usize),
 }
 
-impl Trace<'_> {
+impl<'a> Trace<'a> {
+    fn of(watch: Option<&'a mut Watch<'a>>) -> Self {
+        Trace { steps: Vec::new(), watch, part: (0.0, 1.0, 1, 0) }
+    }
+
     /// Of a way that may not be gone on from: nobody hears of it.
     pub(super) fn unseen() -> Self {
-        Trace { steps: Vec::new(), watch: None }
+        Trace::of(None)
+    }
+
+    /// Begins a part of so many steps.
+    fn begin(&mut self, (from, to): (f64, f64), steps: usize) {
+        self.part = (from, to, steps, 0);
+    }
+
+    /// A step is done; the share of the way by then.
+    fn step(&mut self, objective: [Objective; 2]) -> f64 {
+        self.steps.push(objective);
+        let (from, to, steps, done) = &mut self.part;
+        *done += 1;
+        *from + (*to - *from) * (*done as f64 / *steps as f64).min(1.0)
     }
 }
 
@@ -62,6 +84,9 @@ const LAST_STEPS: [Step; 6] = [
     Step { iterations: 12, slopes: Slopes::OfWidths },
     Step { iterations: 24, slopes: Slopes::OfWidths },
 ];
+/// Shares of the seconds of a way with a light at the ends of its parts, as measured on photographs: the first steps, the
+/// choice between the starts, the light once more, the last steps.
+const PARTS: [f64; 4] = [0.16, 0.34, 0.5, 0.92];
 /// Times that a step is halved.
 const HALVINGS: usize = 3;
 /// How far the logarithm of a width may go in one step: farther off its slope is another.
@@ -95,6 +120,8 @@ pub struct Descended {
     pub scaled_specular: Vec<bool>,
     /// The light by then.
     pub light: Vec<[f32; 3]>,
+    /// What its texels are known by; empty where it is the light of the start.
+    pub light_shares: Vec<EvidenceShares>,
 }
 
 /// A place on the way down.
@@ -117,6 +144,7 @@ pub(super) struct Descent<'a> {
     pub(super) pixels: &'a Pixels<'a>,
     pub(super) system: PixelSystem,
     light: Vec<[f32; 3]>,
+    light_shares: Vec<EvidenceShares>,
     lit: Lit,
     /// Largest diffuse reflectance of a texel.
     pub(super) most_diffuse: f32,
@@ -147,30 +175,35 @@ impl SolverScene {
         let pixels = Pixels::of(self);
         let system = PixelSystem::new(&pixels, self.settings.map_size);
         let (light, most_diffuse) = (estimate.light.clone(), self.most_diffuse(lit));
-        let mut descent = Descent { scene: self, pixels: &pixels, system, light, lit, most_diffuse, stop };
+        let mut descent =
+            Descent { scene: self, pixels: &pixels, system, light, light_shares: Vec::new(), lit, most_diffuse, stop };
         let sight = descent.sight(&start, FIRST_STEPS[0].slopes)?;
         let rows = Learned::of(&pixels, &sight, None).rows(&pixels, &sight);
         let diagonal = descent.system.diagonal(Rows { pieces: &sight.pieces, pixels: &rows });
         let shown: Vec<bool> = diagonal.iter().map(|diagonal| diagonal[0] > 0.0).collect();
         let texture_scale = self.choose_texture_scale(&pixels, &sight, (&start, &shown), lit, stop)?;
 
-        let mut trace = Trace { steps: Vec::new(), watch };
+        let mut trace = Trace::of(watch);
+        trace.begin((0.0, PARTS[0]), FIRST_STEPS.len());
         let mut place =
             descent.down(descent.place(&start, sight, (&shown, texture_scale)), &FIRST_STEPS, &mut trace)?;
         if lit == Lit::Yes {
+            trace.begin((PARTS[0], PARTS[1]), 1);
             place = descent.or_plain(place, (&start, &shown, texture_scale), &mut trace)?;
         }
         if lit == Lit::Yes && self.is_scale_open() {
             place = descent.under_light_again(place, estimate, (&shown, texture_scale))?;
         }
+        trace.begin((PARTS[2], PARTS[3]), LAST_STEPS.len());
         let mut place = descent.down(place, &LAST_STEPS, &mut trace)?;
+        trace.begin((PARTS[3], 1.0), FIRST_STEPS.len());
         let scale = (lit == Lit::Yes && self.is_scale_open()).then(|| LightScale::told_by(&place.texels, &shown));
         let scaled_specular = place.texels.iter().map(LightScale::changes_specular).collect();
         if lit == Lit::Yes {
             place = descent.settled(place, scale.unwrap_or(LightScale::NONE), (&shown, texture_scale), &mut trace)?;
         }
 
-        let light = std::mem::take(&mut descent.light);
+        let (light, light_shares) = (descent.light, descent.light_shares);
         let Place { texels, sight, learned, .. } = place;
         let learned = learned?;
         let rows = learned.rows(&pixels, &sight);
@@ -182,7 +215,8 @@ impl SolverScene {
                 errors.add(own.view as usize, row.left.iter().map(|left| f64::from(left * left)).sum::<f64>() / 3.0);
             }
         }
-        Some(Descended { texels, learned, steps: trace.steps, precision, errors, scale, scaled_specular, light })
+        let steps = trace.steps;
+        Some(Descended { texels, learned, steps, precision, errors, scale, scaled_specular, light, light_shares })
     }
 }
 
@@ -210,7 +244,7 @@ impl Descent<'_> {
             },
             ..Estimate::default()
         };
-        self.light = self.scene.light_again(here, self.stop)?;
+        (self.light, self.light_shares) = self.scene.light_again(here, self.stop)?;
         let sight = self.sight(&place.texels, FIRST_STEPS[0].slopes)?;
         Some(Place { learned: place.learned, ..self.place(&place.texels, sight, (shown, texture_scale)) })
     }
@@ -248,15 +282,15 @@ impl Descent<'_> {
         (texels, beliefs): (&[Material<f32>], &Neighbours),
         Learned { gains, .. }: &Learned,
     ) {
-        trace.steps.push(objective);
+        let share = trace.step(objective);
         let Some(watch) = &mut trace.watch else { return };
         if self.most_diffuse <= 1.0 {
-            return watch(OnTheWay { texels, light: &self.light, gains });
+            return watch(OnTheWay { texels, light: &self.light, gains, share });
         }
         let scale = LightScale::told_by(texels, beliefs.shown());
         let light = scale.of_light(&self.light, &self.scene.told_by_background());
         let texels: Vec<Material<f32>> = texels.par_iter().map(|texel| scale.under(texel)).collect();
-        watch(OnTheWay { texels: &texels, light: &light, gains });
+        watch(OnTheWay { texels: &texels, light: &light, gains, share });
     }
 
     /// A place to begin at, around which texture has such a scale.

@@ -5,6 +5,19 @@
 //! `[J; P]`. Projecting by an orthonormal basis keeps the normal matrix positive; subtracting
 //! `A'J (J'J + P'P)^-1 J'A` (the Schur complement of bundle adjustment, which is the same matrix) would not in `f32`.
 
+/// A block's reflectance in one channel, with what it has to do with the light.
+#[derive(Clone, Debug, Default)]
+pub struct KeptUnknown {
+    /// Unit direction of the unknown in the rows, over the light's coefficients.
+    pub row: Vec<f32>,
+    /// The right side along that direction.
+    pub side: f64,
+    /// Length of the unknown's column.
+    pub length: f64,
+    /// The reflectance now.
+    pub value: f64,
+}
+
 /// The rows of a block with its unknowns: filled, then projected in place.
 #[derive(Clone, Debug, Default)]
 pub struct BlockRows {
@@ -20,7 +33,7 @@ pub struct BlockRows {
     /// Columns of the block's unknowns over all rows, column after column.
     columns: Vec<f64>,
     /// The last unknown, as it was taken out: its unit row over the light, its right side, the length of its column.
-    pub kept: super::coupling::KeptUnknown,
+    pub kept: KeptUnknown,
     observation_count: usize,
     unknown_count: usize,
 }

@@ -56,9 +56,6 @@ const IRRADIANCE_SHARE: f32 = 0.5;
 /// each of them left out.
 const LOBE_LIGHT_ERRORS: [f32; 2] = [0.35, 0.18];
 
-/// F0 of common dielectrics: that of a refractive index of 1.5.
-pub(super) const PLAIN_SPECULAR: f32 = 0.04;
-
 /// What is known of a texel before anything was solved.
 pub const START_TEXEL: Material<f32> = Material { diffuse: [0.4; 3], specular: [0.08; 3], log_width: -0.7 };
 

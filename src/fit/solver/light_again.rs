@@ -6,6 +6,7 @@
 //! are taken out of its rows, as in the rounds, and steps of the descent make them good under the new light.
 
 use super::estimate::Estimate;
+use super::light_evidence::EvidenceShares;
 use super::light_round::LEAST_OBSERVATIONS;
 use super::light_shape::{LightShape, bright_texels};
 use super::normal_equations::NormalEquations;
@@ -20,8 +21,13 @@ const ROUNDS: usize = 2;
 const OPENNESS: f64 = 0.5;
 
 impl SolverScene {
-    /// The light by the estimate's maps, which stay, holes filled; as it is where no block has maps. `None` when `stop` was raised.
-    pub(super) fn light_again(&self, mut estimate: Estimate, stop: &AtomicBool) -> Option<Vec<[f32; 3]>> {
+    /// The light by the estimate's maps, which stay, holes filled, and what its texels are known by; the estimate's own where no
+    /// block has maps. `None` when `stop` was raised.
+    pub(super) fn light_again(
+        &self,
+        mut estimate: Estimate,
+        stop: &AtomicBool,
+    ) -> Option<(Vec<[f32; 3]>, Vec<EvidenceShares>)> {
         let prior = open_prior(self.observations.mean, OPENNESS);
         let size = self.settings.light_size;
         let rounds = self.settings.coarse_rounds + self.settings.fine_rounds;
@@ -43,7 +49,7 @@ impl SolverScene {
                 stop,
             )?;
             if done.is_empty() && number == rounds {
-                return Some(estimate.light);
+                return Some((estimate.light, estimate.light_known.shares));
             }
             if done.is_empty() {
                 break;
@@ -53,10 +59,12 @@ impl SolverScene {
             self.add_background(&mut equations, &shape, &estimate.log_gains);
             // How much light there is in all is not asked again.
             let held = self.mean_light(&estimate.light);
-            estimate.light = self.solve_light(&equations, &surface, &shape, held, &estimate, stop)?.0;
+            let (light, known) = self.solve_light(&equations, &surface, &shape, held, &estimate, stop)?;
+            estimate.light = light;
+            estimate.light_known.shares = known.shares;
         }
         self.fill_holes(&mut estimate.light);
-        Some(estimate.light)
+        Some((estimate.light, estimate.light_known.shares))
     }
 }
 
@@ -82,7 +90,8 @@ mod tests {
         let mean = scene.mean_light(&truth);
         let begun = vec![[0, 1, 2].map(|c| (mean[c] / even[c]) as f32); truth.len()];
         estimate.light.clone_from(&begun);
-        let found = scene.light_again(estimate.clone(), &AtomicBool::new(false)).unwrap();
+        let (found, shares) = scene.light_again(estimate.clone(), &AtomicBool::new(false)).unwrap();
+        assert!(shares.len() == found.len() && shares.iter().flatten().any(|&share| share > 0.1));
         let error = |light: &[[f32; 3]]| -> f64 {
             let of_texel = |texel: usize| {
                 let square: f32 = (0..3).map(|c| (light[texel][c] - truth[texel][c]).powi(2)).sum();

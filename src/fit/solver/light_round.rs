@@ -1,8 +1,8 @@
 //! A round on the light: some blocks are solved under the light as it is, and their rows move it. Where maps are given there is
 //! nothing to solve in a block, and its rows are all that it has to say.
 
-use super::coupling::{self, KeptUnknown};
-use super::eliminate::BlockRows;
+use super::coupling;
+use super::eliminate::{BlockRows, KeptUnknown};
 use super::estimate::{Estimate, TexelVariance};
 use super::gains::gains_after;
 use super::light_colour::change_by_highlights;
@@ -13,11 +13,12 @@ use super::light_suns::{GROWTHS, narrow_scales};
 use super::normal_equations::NormalEquations;
 use super::pixel_terms::BlockPrior;
 use super::plan::{self, Block};
-use super::report::{ErrorSums, StepReport, median};
+use super::report::{ErrorSums, StepReport};
 use super::round::{BlockWork, Round, open_prior};
 use super::scene::{BackgroundPixel, SolverScene};
 use crate::material::Material;
 use crate::math::parallel;
+use crate::math::statistics::median;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -10,11 +10,12 @@
 //! reflectances go beyond 1, since under a light that is held too dim bright surface asks for that, and would else be explained by nothing;
 //! then the light is raised until they do not.
 
-use super::estimate::PLAIN_SPECULAR;
 use super::scene::{BackgroundPixel, SolverScene};
 use super::sight::Lit;
 use crate::material::Material;
 
+/// F0 of common dielectrics: that of a refractive index of 1.5.
+pub(super) const PLAIN_SPECULAR: f32 = 0.04;
 /// Microfacet width below which a lobe counts as told from diffuse light: wider ones look much like it.
 const NARROW: f32 = 0.5;
 /// F0 from which on a texel speaks for metal.

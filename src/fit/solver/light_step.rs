@@ -3,8 +3,8 @@
 use super::light_shape::LightShape;
 use super::non_negative::solve_non_negative;
 use super::normal_equations::NormalEquations;
-use super::report::median;
 use crate::math::sphere::solid_angle_of_texel;
+use crate::math::statistics::median;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, MatRef, Side};
 

@@ -8,12 +8,13 @@ use super::lobe_prior::LobePrior;
 use super::lobe_tails::TailSums;
 use super::lobe_tree::LobeSharing;
 use super::plan::Block;
-use super::report::{ErrorSums, StepReport, median};
+use super::report::{ErrorSums, StepReport};
 use super::round::{BlockWork, Round, open_prior};
 use super::scene::SolverScene;
 use super::tile::{TILE, Tile};
 use crate::material::Material;
 use crate::math::parallel;
+use crate::math::statistics::median;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 

@@ -5,8 +5,7 @@
 //! parabola that touches it from above (majorisation; Hunter and Lange 2004), so that a step that makes the parabola less
 //! makes the objective less.
 
-use super::estimate::PLAIN_SPECULAR;
-use super::light_scale::{OF_DIELECTRICS, is_dielectric};
+use super::light_scale::{OF_DIELECTRICS, PLAIN_SPECULAR, is_dielectric};
 use super::pixel_system::{CHUNK, Lanes};
 use crate::material::Material;
 use crate::math::parallel;

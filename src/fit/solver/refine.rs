@@ -5,10 +5,11 @@
 
 use super::descent::{Descended, Watch};
 use super::estimate::{Estimate, START_TEXEL, TexelVariance};
-use super::report::{StepReport, median};
+use super::report::StepReport;
 use super::scene::SolverScene;
 use super::sight::Lit;
 use crate::material::Material;
+use crate::math::statistics::median;
 use std::sync::atomic::AtomicBool;
 
 /// Standard deviations of a lobe that was taken over from its neighbourhood: of F0, and of the logarithm of the width.
@@ -36,6 +37,9 @@ impl SolverScene {
         if let Some(scale) = found.scale {
             estimate.scale_variances(&scale, &found.scaled_specular);
             estimate.light.clone_from(&found.light);
+            if !found.light_shares.is_empty() {
+                estimate.light_known.shares.clone_from(&found.light_shares);
+            }
         }
         if self.settings.exposure {
             estimate.log_gains = log_gains(&found.learned.gains);

@@ -145,12 +145,3 @@ impl SolverScene {
         CachedTransport::interpolate(values, view, &view.points[observation.point as usize])
     }
 }
-
-/// Median, or 0 of nothing.
-pub fn median(values: &mut [f32]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    f64::from(*values.select_nth_unstable_by(middle, f32::total_cmp).1)
-}

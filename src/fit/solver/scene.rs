@@ -9,10 +9,11 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::fit::targets::Target;
 use crate::math::sphere::{BilinearTap, tap_of_direction};
 use crate::render::Surface;
-use crate::render::cached::{CachedSettings, CachedTransport, FootprintSettings, ViewFootprints};
+use crate::render::cached::{CachedTransport, FootprintSettings, ViewFootprints};
 use crate::scene::{Background, Camera, PixelState, Scene};
 use glam::Vec2;
 use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Most pixels of the held-out views together: beyond that one in so many is looked at.
@@ -56,7 +57,7 @@ pub struct SolverScene {
     /// Their cameras, of the size they are fitted at.
     pub cameras: Vec<Camera>,
     /// The cache.
-    pub transport: CachedTransport,
+    pub transport: Arc<CachedTransport>,
     /// Footprints of the views: those of the observations, no others.
     pub footprints: Vec<ViewFootprints>,
     /// How they were traced.
@@ -91,20 +92,11 @@ impl SolverScene {
         targets: Vec<Target>,
         held_out: &[Target],
         settings: SolverSettings,
-        traced: Option<CachedTransport>,
+        traced: Option<Arc<CachedTransport>>,
         stop: &AtomicBool,
     ) -> Result<Option<Self>> {
-        let cached = CachedSettings {
-            grid: settings.grid.min(settings.map_size),
-            bounce_rays: settings.bounce_rays,
-            surface_rows: CachedSettings::default().surface_rows,
-            max_bounces: settings.max_bounces,
-            fine_shadows: true,
-            lobe_strength: 1.0,
-            lobe: settings.lobe,
-            seed: settings.seed,
-        };
-        let build = || CachedTransport::build(surface, cached, settings.light_size, stop);
+        let cached = settings.cached();
+        let build = || CachedTransport::build(surface, cached, settings.light_size, stop).map(Arc::new);
         let Some(transport) = traced.filter(|own| own.is_of(&cached, settings.light_size)).or_else(build) else {
             return Ok(None);
         };
@@ -176,6 +168,13 @@ impl SolverScene {
             held_out,
             held_out_pixels,
         }))
+    }
+}
+
+impl SolverScene {
+    /// Number of pixels that show surface, as far as they are kept.
+    pub fn surface_pixels(&self) -> usize {
+        self.observations.list.len() + self.edges.iter().map(|view| view.pixels.len()).sum::<usize>()
     }
 }
 

@@ -9,7 +9,8 @@
 use super::agreement::SquareGains;
 use super::choice::clustered::ClusteredMean;
 use super::descent::{Descent, FIRST_STEPS, Place, Trace, difference};
-use super::estimate::{PLAIN_SPECULAR, START_TEXEL};
+use super::estimate::START_TEXEL;
+use super::light_scale::PLAIN_SPECULAR;
 use super::objective::Learned;
 use super::sight::{Sight, Slopes};
 use crate::material::Material;

@@ -1,7 +1,9 @@
 //! What can be chosen in the solver.
 
+use crate::fit::schedule::stages;
 use crate::fit::settings::{BackgroundEvidence, Choosing, FitSettings};
 use crate::material::LobeModel;
+use crate::render::cached::CachedSettings;
 
 /// Settings of the solver.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,6 +74,27 @@ impl SolverSettings {
             seed: settings.seed,
             ..any
         }
+    }
+
+    /// How fine the cache is, and how far it reaches.
+    pub fn cached(&self) -> CachedSettings {
+        CachedSettings {
+            grid: self.grid.min(self.map_size),
+            bounce_rays: self.bounce_rays,
+            max_bounces: self.max_bounces,
+            fine_shadows: true,
+            lobe_strength: 1.0,
+            lobe: self.lobe,
+            seed: self.seed,
+            ..CachedSettings::default()
+        }
+    }
+
+    /// The cache that a fit begins with, and the size of its lights: before all else it is traced.
+    pub fn first_cache(settings: &FitSettings) -> (CachedSettings, (usize, usize)) {
+        let map_size = stages(settings).first().map_or(settings.map_size, |stage| stage.map_size);
+        let solver = SolverSettings { map_size, ..SolverSettings::of(settings) };
+        (solver.cached(), solver.light_size)
     }
 }
 

@@ -1,7 +1,7 @@
 //! What opening a scene takes long to make, kept on disk, so that opening it again takes seconds.
 //!
 //! [`atlas`](self::atlas()) keeps charts, [`check`](self::check()) the verdict on a scene, [`photograph`] the pictures of the
-//! built-in scene; each looks into a [`Kept`] folder first and makes what is not there. A result is found by its content:
+//! built-in scene, [`transport`](self::transport()) what relights a surface; each looks into a [`Kept`] folder first and makes what is not there. A result is found by its content:
 //! by the digest of all that it is made of and of the program that makes it ([`program`]). So no result is ever stale, two
 //! scenes with one mesh share their atlas, and a folder that was moved is known again.
 //!
@@ -15,11 +15,13 @@ mod findings;
 mod pictures;
 #[cfg(test)]
 mod tests;
+mod transport;
 
 pub use crate::files::kept::Kept;
 pub use atlas::atlas;
 pub use check::check;
 pub use pictures::photograph;
+pub use transport::transport;
 
 use crate::files::digest::{Digest, Digester};
 use std::path::PathBuf;

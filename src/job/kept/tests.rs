@@ -1,10 +1,14 @@
 //! What comes from disk is what is made, and what is no whole result of this program is made anew.
 
-use super::{Kept, atlas, check, in_folder, pictures};
+use super::{Kept, atlas, check, in_folder, pictures, transport};
 use crate::atlas::{AtlasSettings, KeepUv, build};
 use crate::error::Result;
 use crate::job::demo;
 use crate::math::random::SequentialRandom;
+use crate::render::Surface;
+use crate::render::cached::traced::Traced;
+use crate::render::cached::visibility::Visibility;
+use crate::render::cached::{CachedSettings, CachedTransport};
 use crate::scene::demo::DemoSettings;
 use crate::scene::{Scene, doctor};
 use std::path::{Path, PathBuf};
@@ -33,6 +37,10 @@ fn rebuilt() -> AtlasSettings {
 fn file_of(folder: &Path, kind: &str) -> PathBuf {
     let mut files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     files.find(|path| path.file_name().unwrap().to_string_lossy().starts_with(kind)).unwrap()
+}
+
+fn is_kept(entry: &std::fs::DirEntry) -> bool {
+    entry.path().extension().is_some_and(|ending| ending == "kept")
 }
 
 /// Damages the file of an entry in many ways, one after another, and has the result computed each time.
@@ -143,6 +151,64 @@ fn pictures_from_disk_are_those_that_are_rendered() {
         Err(crate::Error::new(crate::ErrorKind::Stopped, ""))
     });
     assert!(failed.is_err(), "a picture that was stopped is not kept");
+}
+
+#[test]
+fn transport_from_disk_is_the_one_that_is_traced() {
+    let folder = tempfile::tempdir().unwrap();
+    let kept = in_folder(folder.path().into());
+    let surface = Surface::new(small_scene().mesh).unwrap();
+    let deep = CachedSettings { grid: 24, bounce_rays: 5, ..CachedSettings::default() };
+    let kinds =
+        [deep, CachedSettings { max_bounces: 1, ..deep }, CachedSettings { lobe_strength: 0.0, seed: 2, ..deep }];
+    let traced = |settings, kept: &Kept| {
+        let mut made = super::transport(&surface, settings, (16, 8), kept, &GO).unwrap();
+        let seconds = std::mem::take(&mut made.bounce_seconds);
+        (format!("{made:?}"), seconds)
+    };
+    for (which, settings) in kinds.into_iter().enumerate() {
+        let (expected, _) = traced(settings, &Kept::nowhere());
+        let (first, seconds) = traced(settings, &kept);
+        let (again, kept_seconds) = traced(settings, &kept);
+        assert!(first == expected && again == expected, "{settings:?}");
+        assert!(seconds > 0.0 || settings.max_bounces == 1);
+        assert_eq!(kept_seconds, 0.0, "the second time it is read");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().flatten().filter(is_kept).count(), which + 1);
+    }
+    std::fs::remove_dir_all(folder.path()).unwrap();
+    let (expected, _) = traced(deep, &kept);
+    each_damage(&file_of(folder.path(), transport::KIND), &mut |what| {
+        assert_eq!(traced(deep, &kept).0, expected, "{what}");
+    });
+    assert!(super::transport(&surface, kinds[2], (16, 8), &kept, &AtomicBool::new(true)).is_none());
+    assert_eq!(
+        std::fs::read_dir(folder.path()).unwrap().flatten().filter(is_kept).count(),
+        1,
+        "what was stopped is not kept"
+    );
+
+    let made = CachedTransport::build(&surface, deep, (16, 8), &GO).unwrap();
+    let CachedTransport { basis, grid, visibility, bounces, surroundings, .. } = &made;
+    let parts = || Traced {
+        visibility: visibility.clone(),
+        bounces: bounces.clone(),
+        surroundings: surroundings.clone(),
+        bounce_seconds: 0.0,
+    };
+    let read = |bytes: &[u8], settings| transport::unpacked(bytes, &settings, (grid, basis)).is_some();
+    let body = transport::packed(&parts()).unwrap();
+    assert!(read(&body, deep) && !read(&body, kinds[1]) && !read(&[], deep));
+    let fewer = Traced { visibility: Visibility { shares: vec![0; 8], ..visibility.clone() }, ..parts() };
+    assert!(!read(&transport::packed(&fewer).unwrap(), deep));
+    let mut random = SequentialRandom::new(6);
+    for _ in 0..300 {
+        let place = (random.next_number() * body.len() as f32) as usize % body.len();
+        assert!(!read(&body[..place], deep), "cut at {place}");
+        let mut changed = body.clone();
+        changed[place] = (random.next_number() * 256.0) as u8;
+        // Another number may be as good; nothing may panic.
+        read(&changed, deep);
+    }
 }
 
 /// A file with a right checksum that is nonsense all the same, as no build of this program writes it.

@@ -2,7 +2,7 @@
 //! and `patina-lab bench tracer`.
 
 use crate::cli::arguments::ReadOptions;
-use crate::cli::fit::stop_on_interrupt;
+use crate::cli::interrupt::stop_on_interrupt;
 use crate::error::{Error, Result};
 use crate::lab::contest::entry::{self, EntryOptions};
 use crate::lab::contest::{self, ContestOptions, Contestant, all};

@@ -1,7 +1,7 @@
 //! `patina-lab audit` and `patina-lab bench`.
 
 use super::arguments::{AuditOptions, BenchOptions, BenchStudioOptions, FuzzOptions, NightlyOptions};
-use crate::cli::fit::stop_on_interrupt;
+use crate::cli::interrupt::stop_on_interrupt;
 use crate::error::{Error, ErrorKind, Result};
 use crate::lab::audit::{AuditSettings, built_in, gradients};
 use crate::lab::{fuzz, scale};
@@ -109,12 +109,15 @@ pub fn bench_studio(options: &BenchStudioOptions, json: bool) -> Result<()> {
             // What was fitted is relit: a scene of photos has no other maps.
             to_relight.extend(path.map(|_| Some(run)));
         }
+        // What was measured stays, whatever becomes of the rest.
+        report.write(&options.output)?;
     }
     let is_relit = to_relight.len() > 1;
     to_relight.extend(named.filter(|_| !is_relit).map(|path| Some(path.to_path_buf())));
     if asked(BenchPart::Relight) {
         for path in &to_relight {
             report.relight.extend(bench::relight::measure(path.as_deref(), options.quick, &*tell)?);
+            report.write(&options.output)?;
         }
     }
     let _ = std::fs::remove_dir_all(bench::scratch(&options.output, "starting"));

@@ -1,7 +1,7 @@
 //! `patina-lab measured`: what is done with many tables at once, and the training of the neural model.
 
 use super::neural::NeuralTask;
-use crate::cli::fit::stop_on_interrupt;
+use crate::cli::interrupt::stop_on_interrupt;
 use crate::cli::measured::{Fitted, Source, light_of, report_fit, table_of, tell_written};
 use crate::error::Result;
 use crate::image::file;

@@ -1,6 +1,6 @@
 //! `patina-lab measured`: trains the neural model of reflectance, draws the map of its codes, times it, tries it.
 
-use crate::cli::fit::stop_on_interrupt;
+use crate::cli::interrupt::stop_on_interrupt;
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::files::write_bytes;
 use crate::lab::neural::run::{Sitting, train};

@@ -1,6 +1,6 @@
 //! `patina-lab readers` and `patina-lab pipelines`: this program beside others.
 
-use crate::cli::fit::stop_on_interrupt;
+use crate::cli::interrupt::stop_on_interrupt;
 use crate::error::Result;
 use crate::lab::bar_table::BarTable;
 use crate::lab::pipelines::{self, PipelineOptions};

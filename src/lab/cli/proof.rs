@@ -1,6 +1,6 @@
 //! `patina-lab proof`.
 
-use crate::cli::fit::stop_on_interrupt;
+use crate::cli::interrupt::stop_on_interrupt;
 use crate::error::{Error, ErrorKind, Result};
 use crate::lab::proof::{self, ProofOptions};
 use std::sync::Arc;

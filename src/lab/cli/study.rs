@@ -1,7 +1,7 @@
 //! `patina-lab study`: sittings of studies, and the tables of what they left.
 
 use super::arguments::MvclOptions;
-use crate::cli::fit::stop_on_interrupt;
+use crate::cli::interrupt::stop_on_interrupt;
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::lab::consistency::{self, StudyOptions};
 use crate::lab::object_study;

@@ -24,7 +24,7 @@ pub struct Glance {
     pub began: Instant,
     /// When the adapter was done with it; `None` until then.
     pub presented: Option<Instant>,
-    /// Seconds for which the window's thread was at it and heard nobody; `None` until it is done.
+    /// Seconds for which the window's thread was at it and heard nobody, until the drawing was handed on; `None` before.
     pub busy_seconds: Option<f64>,
     /// The state of the fit.
     pub status: FitStatus,
@@ -125,9 +125,9 @@ impl Shared {
         self.news.notify_all();
     }
 
-    fn done(&self, frame: u64, busy_seconds: f64) {
+    fn done(&self, frame: u64, began: Option<Instant>) {
         if let Some(glance) = self.lock().glances.iter_mut().rev().find(|glance| glance.frame == frame) {
-            glance.busy_seconds = Some(busy_seconds);
+            glance.busy_seconds = began.map(|began| began.elapsed().as_secs_f64());
         }
     }
 
@@ -183,6 +183,8 @@ impl Driven {
 
 impl eframe::App for Driven {
     fn raw_input_hook(&mut self, context: &egui::Context, raw_input: &mut egui::RawInput) {
+        // Not from the news of a frame that was never drawn, as of a window that is hidden.
+        self.began = Some(Instant::now());
         let mut state = self.shared.lock();
         raw_input.events.append(&mut state.events);
         if let Some((orbiting, angle)) = &mut state.orbiting {
@@ -195,7 +197,6 @@ impl eframe::App for Driven {
     }
 
     fn logic(&mut self, context: &egui::Context, frame: &mut eframe::Frame) {
-        self.began.get_or_insert_with(Instant::now);
         let orders = std::mem::take(&mut self.shared.lock().orders);
         for order in orders {
             order(&mut self.studio, context);
@@ -206,16 +207,15 @@ impl eframe::App for Driven {
     fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
         let number = self.glance(Instant::now());
         self.studio.ui(ui, frame);
-        if let Some(began) = self.began.take() {
-            self.shared.done(number, began.elapsed().as_secs_f64());
-        }
+        let began = self.began.take();
         if frame.wgpu_render_state().is_some() {
             let (shared, stage) = (Arc::clone(&self.shared), self.studio.memory.stage.stage.clone());
-            let mark = FrameMark { shared, stage, number };
+            let mark = FrameMark { shared, stage, number, began };
             // Somewhere on the screen: it draws nothing.
             let corner = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(2.0, 2.0));
             ui.painter().add(egui_wgpu::Callback::new_paint_callback(corner, mark));
         } else {
+            self.shared.done(number, began);
             self.shared.presented(number, Instant::now());
         }
         if self.shared.lock().orbiting.is_some() {
@@ -235,6 +235,8 @@ struct FrameMark {
     shared: Arc<Shared>,
     stage: Option<Stage>,
     number: u64,
+    /// When the frame began to take in news.
+    began: Option<Instant>,
 }
 
 impl egui_wgpu::CallbackTrait for FrameMark {
@@ -249,6 +251,8 @@ impl egui_wgpu::CallbackTrait for FrameMark {
             let status = stage.status();
             self.shared.drawn(self.number, status.scenes_drawn, status.is_light_uploading);
         }
+        // What was drawn is cut into triangles and uploaded by now.
+        self.shared.done(self.number, self.began);
         let (shared, number) = (Arc::clone(&self.shared), self.number);
         encoder.on_submitted_work_done(move || shared.presented(number, Instant::now()));
         Vec::new()

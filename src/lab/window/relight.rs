@@ -7,6 +7,7 @@
 use crate::error::{Error, ErrorKind, Result};
 use crate::export::RunFolder;
 use crate::image::RgbImage;
+use crate::job::kept::Kept;
 use crate::job::pictures::{light_of, matched, parameters_with};
 use crate::job::relit;
 use crate::light::Environment;
@@ -123,7 +124,8 @@ pub fn measure(path: Option<&Path>, is_quick: bool, tell: &dyn Fn(&str)) -> Resu
     tell(&format!("caching light transport: {}", own.name));
     let began = Instant::now();
     let transport =
-        relit::transport_of(&own.surface, relit::settings_of(BOUNCES, Some(own.lobe)), &stop).ok_or_else(stopped)?;
+        relit::transport_of(&own.surface, relit::settings_of(BOUNCES, Some(own.lobe)), &Kept::nowhere(), &stop)
+            .ok_or_else(stopped)?;
     let cache_seconds = began.elapsed().as_secs_f64();
     let map_size = own.maps.diffuse.width();
     let texels = texels_from_maps(&own.maps);

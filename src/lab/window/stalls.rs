@@ -1,8 +1,8 @@
 //! For how long the window hears nobody: while a scene is opened, and from Start on.
 //!
 //! Its thread takes in news, lays out panels and hands the drawing on; while it does, it hears no key. What counts is the
-//! longest of these times over all frames, each from its first news to its end, the wait for an adapter that is behind
-//! included.
+//! longest of these times over all frames, each from its news until its drawing is handed on, the wait for an adapter
+//! that is behind included.
 
 use super::person::Person;
 use super::scenes::BenchScene;

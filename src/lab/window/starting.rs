@@ -85,9 +85,9 @@ fn watched(path: Option<&Path>, folder: &Path) -> Result<(StartingRow, PathBuf)>
     let store = Store::at(Some(folder.join("studio-settings.json")));
     let mut model = Model::new(store, Arc::new(|| {}));
     model.preferences.runs_folder = folder.join("runs");
-    // Nothing is relit meanwhile: what draws is no part of this.
+    // A person looks first. Nothing is relit after that: what draws is no part of this.
+    until_ready(&mut model, path, |project, _| project.transport.is_none())?;
     model.switches.traced = false;
-    until_ready(&mut model, path, |_, _| false)?;
     model.start_fit();
     let began = Instant::now();
     let (mut pictures, mut notes, mut steps_end) = (Vec::new(), Vec::<Note>::new(), None);

@@ -4,7 +4,7 @@
 //! over its rays, of the radiance `B` of the points they hit; rays that escape or meet a back face bring nothing. Rows
 //! sum to at most 1 by construction, so the series of bounces converges for reflectances below 1.
 
-use super::points::VisibilityGrid;
+use super::points::{VisibilityGrid, are_lists};
 use crate::math::frame::sample_cosine_hemisphere;
 use crate::math::parallel;
 use crate::math::random::{SampleStream, StreamKey};
@@ -47,33 +47,45 @@ impl BounceMatrix {
             targets.sort_unstable();
             targets
         });
-        BounceMatrix::new(rows, grid.points.len(), 1.0 / (side * side) as f32)
+        let (mut offsets, mut targets) = (vec![0u32], Vec::with_capacity(rows.iter().map(Vec::len).sum()));
+        for row in rows {
+            targets.extend(row);
+            offsets.push(targets.len() as u32);
+        }
+        BounceMatrix::new(offsets, targets, side * side)
     }
 
-    fn new(rows: Vec<Vec<u32>>, points: usize, share: f32) -> Self {
-        let mut offsets = vec![0u32];
-        let mut targets = Vec::new();
+    /// The matrix whose rows begin at `offsets` in a list of the points that are seen, by so many rays from each of so many
+    /// points. `None` where these are no rows.
+    pub fn of_rows(offsets: Vec<u32>, targets: Vec<u32>, rays: usize, points: usize) -> Option<Self> {
+        let is_whole = are_lists(&offsets, targets.iter().copied(), points) && rays > 0;
+        is_whole.then(|| BounceMatrix::new(offsets, targets, rays))
+    }
+
+    /// What [`BounceMatrix::of_rows`] takes.
+    pub fn rows(&self) -> (&[u32], &[u32]) {
+        (&self.offsets, &self.targets)
+    }
+
+    fn new(offsets: Vec<u32>, targets: Vec<u32>, rays: usize) -> Self {
+        let points = offsets.len() - 1;
         let mut transposed_offsets = vec![0u32; points + 1];
-        for row in &rows {
-            targets.extend_from_slice(row);
-            offsets.push(targets.len() as u32);
-            for &target in row {
-                transposed_offsets[target as usize + 1] += 1;
-            }
+        for &target in &targets {
+            transposed_offsets[target as usize + 1] += 1;
         }
         for point in 0..points {
             transposed_offsets[point + 1] += transposed_offsets[point];
         }
         let mut next = transposed_offsets.clone();
         let mut sources = vec![0u32; targets.len()];
-        for (source, row) in rows.iter().enumerate() {
-            for &target in row {
+        for source in 0..points {
+            for &target in &targets[offsets[source] as usize..offsets[source + 1] as usize] {
                 let place = &mut next[target as usize];
                 sources[*place as usize] = source as u32;
                 *place += 1;
             }
         }
-        BounceMatrix { offsets, targets, transposed_offsets, sources, share }
+        BounceMatrix { offsets, targets, transposed_offsets, sources, share: 1.0 / rays as f32 }
     }
 
     /// `K B`: the light of other surfaces that a white Lambert surface would send back.
@@ -136,9 +148,19 @@ mod tests {
     #[test]
     fn the_transpose_is_one() {
         let mut random = SequentialRandom::new(4);
-        let rows: Vec<Vec<u32>> =
-            (0..50).map(|_| (0..random.below(9)).map(|_| random.below(50) as u32).collect()).collect();
-        let matrix = BounceMatrix::new(rows, 50, 0.125);
+        let (mut offsets, mut targets) = (vec![0], Vec::new());
+        for _ in 0..50 {
+            targets.extend((0..random.below(9)).map(|_| random.below(50) as u32));
+            offsets.push(targets.len() as u32);
+        }
+        let matrix = BounceMatrix::of_rows(offsets.clone(), targets.clone(), 8, 50).unwrap();
+        assert_eq!(matrix.rows(), (offsets.as_slice(), targets.as_slice()));
+        let is_matrix = |offsets: &[u32], targets: &[u32]| {
+            BounceMatrix::of_rows(offsets.to_vec(), targets.to_vec(), 8, 50).is_some()
+        };
+        assert!(is_matrix(&offsets, &targets) && is_matrix(&[0; 51], &[]));
+        assert!(!is_matrix(&offsets[1..], &targets) && !is_matrix(&offsets, &targets[1..]) && !is_matrix(&[], &[]));
+        assert!(!is_matrix(&offsets, &vec![50; targets.len()]), "no such point");
         let mut values = || (0..50).map(|_| [(); 3].map(|()| random.next_number())).collect::<Vec<[f32; 3]>>();
         let (x, y) = (values(), values());
         let dot = |a: &[[f32; 3]], b: &[[f32; 3]]| -> f64 {

@@ -8,7 +8,7 @@
 //! 4. [`bounce`]: light between surfaces as a sparse matrix with its transpose; [`surroundings`] and
 //!    [`seen_light`]: the same as lobes see it.
 //! 5. [`footprint`]: what a camera sees, as shading points with lists of texels.
-//! 6. [`transport`]: all of it together, and the radiance it gives. Sums run on several numbers at a time
+//! 6. [`traced`] is what rays find out; [`transport`]: all of it together, and the radiance it gives. Sums run on several numbers at a time
 //!    (`math::vector`).
 //!
 //! For fixed roughness the result is linear in the light; for fixed light and roughness it is linear in diffuse and
@@ -33,7 +33,9 @@ pub mod lobe_place;
 pub mod lobe_sum;
 pub mod points;
 pub mod seen_light;
+pub mod settings;
 pub mod surroundings;
+pub mod traced;
 pub mod transport;
 pub mod visibility;
 
@@ -44,4 +46,5 @@ pub use footprint::{FootprintSettings, ShadingPoint, ViewFootprints};
 pub use light_basis::LightPlanes;
 pub use points::VisibilityGrid;
 pub use seen_light::{SeenLight, SeenRows};
-pub use transport::{CachedSettings, CachedTransport, PointLight};
+pub use settings::CachedSettings;
+pub use transport::{CachedTransport, PointLight};

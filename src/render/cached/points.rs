@@ -183,6 +183,16 @@ impl PointTap {
     }
 }
 
+/// Lists one after another: `offsets` says where each begins, and where the last ends. Whether there is one for each of so
+/// many points and all that they hold are points.
+pub(super) fn are_lists(offsets: &[u32], of_points: impl ExactSizeIterator<Item = u32>, points: usize) -> bool {
+    offsets.len() == points + 1
+        && offsets[0] == 0
+        && offsets.is_sorted()
+        && offsets[points] as usize == of_points.len()
+        && of_points.into_iter().all(|point| (point as usize) < points)
+}
+
 /// Barycentric coordinates (u, v) of the place of a triangle nearest to a point, and the squared distance.
 fn nearest_on_triangle([a, b, c]: [DVec2; 3], point: DVec2) -> Option<(f64, f64, f64)> {
     let area = (b - a).perp_dot(c - a);

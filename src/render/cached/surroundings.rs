@@ -7,7 +7,7 @@
 
 use super::bounce::point_hit;
 use super::light_basis::LightBasis;
-use super::points::VisibilityGrid;
+use super::points::{VisibilityGrid, are_lists};
 use super::visibility::Visibility;
 use crate::math::parallel;
 use crate::math::sphere::direction_of_texel;
@@ -16,7 +16,8 @@ use glam::Vec3;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A cell of the light that a point does not see wholly, and the point of the grid that hides it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 pub struct Hiding {
     /// Row-major cell.
     pub cell: u32,
@@ -89,6 +90,25 @@ impl Surroundings {
             offsets.push(hidings.len() as u32);
         }
         Surroundings { cells, offsets, hidings }
+    }
+
+    /// The lists of so many points, which begin at `offsets` in one of all, over cells of `side` x `side` hats. `None` where
+    /// these are no such lists.
+    pub fn of_lists(
+        offsets: Vec<u32>,
+        hidings: Vec<Hiding>,
+        (basis, side): (&LightBasis, usize),
+        points: usize,
+    ) -> Option<Self> {
+        let cells = Cells { side: side.max(1), width: basis.width, height: basis.height };
+        let is_whole = are_lists(&offsets, hidings.iter().map(|own| own.point), points)
+            && hidings.iter().all(|own| (own.cell as usize) < cells.count());
+        is_whole.then_some(Surroundings { cells, offsets, hidings })
+    }
+
+    /// What [`Surroundings::of_lists`] takes.
+    pub fn lists(&self) -> (&[u32], &[Hiding]) {
+        (&self.offsets, &self.hidings)
     }
 
     /// What hides the light from a point.

@@ -10,50 +10,15 @@ use super::lobe_place::{LobePlace, LobeSums, wide_from, width_through};
 use super::lobe_sum::{lobe_alone, lobe_with_derivative};
 use super::points::{VisibilityGrid, VisibilityPoint};
 use super::seen_light::{SeenLight, SeenRows};
+use super::settings::CachedSettings;
 use super::surroundings::Surroundings;
+use super::traced::Traced;
 use super::visibility::Visibility;
 use crate::material::{LobeModel, Material};
 use crate::math::parallel;
 use crate::render::Surface;
 use glam::Vec3;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
-
-/// How fine the cache is. Its error against the path tracer falls as these rise.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CachedSettings {
-    /// Width and height in texels of the grid over the atlas on which visibility is kept.
-    pub grid: usize,
-    /// Rays from each of its points to other surface.
-    pub bounce_rays: usize,
-    /// Cells of the light from pole to pole, at most: in each of them lobes see one point of other surface.
-    pub surface_rows: usize,
-    /// Number of surface hits on the longest path: 1 is direct light only.
-    pub max_bounces: usize,
-    /// Whether four rays look at a texel of the light that an edge of a shadow crosses, and not one.
-    pub fine_shadows: bool,
-    /// Strength of the specular lobe as a whole, in [0, 1].
-    pub lobe_strength: f32,
-    /// The microfacets of the lobe.
-    pub lobe: LobeModel,
-    /// Seed of the rays to other surface.
-    pub seed: u64,
-}
-
-impl Default for CachedSettings {
-    fn default() -> Self {
-        CachedSettings {
-            grid: 256,
-            bounce_rays: 64,
-            surface_rows: 16,
-            max_bounces: 3,
-            fine_shadows: true,
-            lobe_strength: 1.0,
-            lobe: LobeModel::BlinnPhong,
-            seed: 1,
-        }
-    }
-}
+use std::sync::atomic::AtomicBool;
 
 /// Visibility, light between surfaces, and integrals of the light's hats: all that rays are needed for.
 #[derive(Clone, Debug)]
@@ -97,19 +62,22 @@ impl CachedTransport {
         light_size: (usize, usize),
         stop: &AtomicBool,
     ) -> Option<Self> {
+        Self::of_traced(surface, settings, light_size, |places| Traced::trace(surface, &settings, places, stop))
+    }
+
+    /// The same of what was `traced` for this grid and these hats; `None` where that is.
+    pub fn of_traced(
+        surface: &Surface,
+        settings: CachedSettings,
+        light_size: (usize, usize),
+        traced: impl FnOnce((&VisibilityGrid, &LightBasis)) -> Option<Traced>,
+    ) -> Option<Self> {
         let basis = LightBasis::new(light_size.0, light_size.1);
         let joined_basis = basis.with_rows_joined();
         let grid = VisibilityGrid::new(surface, settings.grid);
-        let visibility = Visibility::trace(surface, &grid, &basis, settings.fine_shadows, stop)?;
-        let began = Instant::now();
-        let bounces = (settings.max_bounces > 1)
-            .then(|| BounceMatrix::trace(surface, &grid, settings.bounce_rays, settings.seed, stop));
-        let side = basis.height.div_ceil(settings.surface_rows.max(1));
-        let surroundings = (settings.max_bounces > 1 && settings.lobe_strength > 0.0)
-            .then(|| Surroundings::trace(surface, &grid, &basis, &visibility, side, stop));
-        let bounce_seconds = began.elapsed().as_secs_f64();
+        let Traced { visibility, bounces, surroundings, bounce_seconds } = traced((&grid, &basis))?;
         let albedo = lobe_albedo(settings.lobe);
-        let made = CachedTransport {
+        Some(CachedTransport {
             settings,
             basis,
             joined_basis,
@@ -119,8 +87,7 @@ impl CachedTransport {
             surroundings,
             bounce_seconds,
             albedo,
-        };
-        (!stop.load(Ordering::Relaxed)).then_some(made)
+        })
     }
 
     /// Whether it is the one that is built with these settings for lights of this size.

@@ -78,7 +78,7 @@ pub struct FitControl {
 
 impl FitControl {
     /// Takes over a job that was just started.
-    pub fn begin(&mut self, job: JobHandle, folder: RunFolder, settings: FitSettings, finishing_ratio: f64) {
+    pub fn begin(&mut self, job: JobHandle, folder: RunFolder, settings: FitSettings, finishing_factor: f64) {
         *self = FitControl {
             job: Some(job),
             status: FitStatus::Running,
@@ -87,7 +87,7 @@ impl FitControl {
             snapshot: self.snapshot.take(),
             settings_in_force: Some(settings.clone()),
             settings_confirmed: Some(settings),
-            advance: Advance::new(finishing_ratio),
+            advance: Advance::new(finishing_factor),
             ..FitControl::default()
         };
     }
@@ -194,6 +194,7 @@ impl FitControl {
                 self.advance.stepped(&progress);
                 self.progress = Some(progress);
             }
+            Event::WithinStep(time) => self.advance.within_step(&time),
             Event::Finding(finding) => log.add(Message::from(&finding)),
             Event::Checkpoint(_) => self.last_checkpoint = Some(Instant::now()),
             // What was sent before the job heard of the stop changes nothing.

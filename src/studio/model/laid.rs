@@ -80,11 +80,9 @@ impl Model {
 
     /// Traces the cache that relights what is open, beside the window, unless it is there already.
     pub fn cache_transport(&mut self) {
-        let lobe = self.edits.fit.has_lobe().then_some(self.edits.fit.lobe);
-        let max_bounces = self.picture_settings(1).max_bounces;
+        let wanted = relit::settings_beside(&self.edits.fit, self.picture_settings(1).max_bounces);
         let Some(project) = &self.project else { return };
         let Some(surface) = project.surface.clone().filter(|_| self.switches.traced) else { return };
-        let wanted = relit::settings_of(max_bounces, lobe);
         let is_there = project
             .transport
             .as_ref()
@@ -92,8 +90,9 @@ impl Model {
         if is_there || self.tasks.is_running(&TaskKind::CachingTransport) {
             return;
         }
+        let kept = self.kept.clone();
         self.tasks.spawn(TaskKind::CachingTransport, move |context| {
-            let transport = relit::transport_of(&surface, wanted, &context.stop);
+            let transport = relit::transport_of(&surface, wanted, &kept, &context.stop);
             let stopped = || Error::new(ErrorKind::Stopped, "stopped while light transport was cached");
             let transport = Arc::new(transport.ok_or_else(stopped)?);
             Ok(Done::TransportCached(Box::new(CachedOf { surface, transport })))

@@ -293,8 +293,8 @@ impl Model {
         let was_live = self.fit.status.is_live();
         changed |= self.fit.poll(&mut self.log);
         self.card |= was_live && self.fit.status == FitStatus::Finished;
-        if let Some(ratio) = self.fit.advance.learned_ratio() {
-            self.preferences.finishing_ratio = 0.5 * (self.preferences.finishing_ratio + ratio);
+        if let Some(factor) = self.fit.advance.learned_factor() {
+            self.preferences.finishing_factor = 0.5 * (self.preferences.finishing_factor + factor);
         }
         changed |= self.poll_object();
         self.take_back_refused();

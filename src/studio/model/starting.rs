@@ -70,6 +70,7 @@ impl Model {
         // The atlas keeps its charts apart at the size it was made for; other map sizes need another atlas.
         let same_atlas = project.settings.fit.map_size == settings.fit.map_size || project.is_run;
         let (options, kept) = (self.job_options(), self.kept.clone());
+        let cached = project.transport.clone();
         self.tasks.spawn(TaskKind::Starting, move |context| {
             let folder = RunFolder::create(&path)?;
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
@@ -77,7 +78,10 @@ impl Model {
                 true => Prepared { scene, surface, quality, findings, timings },
                 false => prepare_with(scene, findings, &settings, timings, &kept, &context.stop, &tell)?,
             };
-            let (prepared, fitter, settings) = open::begin(prepared, settings, &context.stop, &tell)?;
+            let (prepared, mut fitter, settings) = open::begin(prepared, settings, &context.stop, &tell)?;
+            if let Some(cached) = cached.filter(|own| Arc::ptr_eq(&own.surface, &prepared.surface)) {
+                fitter.take_transport(cached.transport());
+            }
             let started = Started::new(prepared, fitter, settings, folder, options)?;
             Ok(Done::FitStarted(Box::new(started)))
         });
@@ -153,7 +157,7 @@ impl Model {
         // A failure of the fit before is past.
         self.log.dismiss();
         self.log.note_of_file(format!("Output folder: {}", folder.path().display()), folder.path());
-        self.fit.begin(job, folder, settings, self.preferences.finishing_ratio);
+        self.fit.begin(job, folder, settings, self.preferences.finishing_factor);
         self.activate = Some(Panel::Curves);
     }
 

@@ -80,8 +80,8 @@ pub struct Preferences {
     pub follow: Follow,
     /// Whose hand movements the viewport follows.
     pub navigation: Navigation,
-    /// Seconds of finishing for a second of fitting on this machine, as learned from former runs.
-    pub finishing_ratio: f64,
+    /// How many times as long as expected finishing takes on this machine, as learned from former runs.
+    pub finishing_factor: f64,
     /// Seconds a path of a render took on this machine, as learned from former renders; `None` before the first.
     pub seconds_per_path: Option<f64>,
     /// The run that was in progress when this was written; a later start finds it here after a crash.
@@ -115,7 +115,7 @@ impl Default for Preferences {
             object_layout: String::new(),
             follow: Follow::Live,
             navigation: Navigation::default(),
-            finishing_ratio: crate::job::advance::FIRST_RATIO,
+            finishing_factor: 1.0,
             seconds_per_path: None,
             running: None,
         }
