@@ -169,6 +169,10 @@ fn watch(job: JobHandle, folder: &RunFolder, stop: &AtomicBool, json: bool) -> R
     let mut last_line = std::time::Instant::now();
     // One share of the whole job, as the window shows it: steps by their seconds, then what comes after them.
     let mut advance = Advance::default();
+    let left_in_words = |advance: &Advance, otherwise: f64| {
+        crate::insight::report::number::duration(advance.seconds_left().unwrap_or(otherwise))
+    };
+    let mut residuals = String::new();
     let outcome = loop {
         if stop.load(Ordering::Relaxed) {
             job.stop();
@@ -201,18 +205,17 @@ fn watch(job: JobHandle, folder: &RunFolder, stop: &AtomicBool, json: bool) -> R
                 bar.set_prefix(row.stage.clone());
                 let held_out = row.held_out_rmse.map_or(String::new(), |rms| format!(", held-out residual {rms:.4}"));
                 // Of the pixels and the level of this step: another measure than the RMSE of whole photos at the end.
-                let residual = row.image_loss.max(0.0).sqrt();
-                let seconds_left = advance.seconds_left().unwrap_or(progress.seconds_left);
-                let left = crate::insight::report::number::duration(seconds_left);
-                bar.set_message(format!("{left} left, residual (RMS) {residual:.4}{held_out}"));
+                residuals = format!(", residual (RMS) {:.4}{held_out}", row.image_loss.max(0.0).sqrt());
+                let left = left_in_words(&advance, progress.seconds_left);
+                bar.set_message(format!("{left} left{residuals}"));
                 // Without a terminal a bar shows nothing: a line now and then does.
                 if !json && bar.is_hidden() && (last_line.elapsed().as_secs() >= 5 || row.held_out_rmse.is_some()) {
-                    eprintln!(
-                        "{} step {} of {}: residual (RMS) {residual:.4}{held_out}, {left} left",
-                        row.stage, row.step, progress.steps_total
-                    );
+                    eprintln!("{} step {} of {}: {left} left{residuals}", row.stage, row.step, progress.steps_total);
                     last_line = std::time::Instant::now();
                 }
+            }
+            Event::WithinStep(time) => {
+                bar.set_message(format!("{} left{residuals}", left_in_words(&advance, time.seconds_left)));
             }
             Event::Finding(finding) if !json => say(finding.to_string()),
             Event::Refused(error) if !json => say(format!("refused: {error}")),
@@ -266,7 +269,10 @@ fn line_of(event: &Event, advance: &Advance) -> serde_json::Value {
         Event::Paused => json!({"event": "paused"}),
         Event::Resumed => json!({"event": "resumed"}),
         Event::Finishing(stage) => {
-            json!({"event": "finishing", "what": stage.label(), "share": advance.share()})
+            json!({
+                "event": "finishing", "what": stage.label(), "share": advance.share(),
+                "seconds_left_of_job": advance.seconds_left(),
+            })
         }
         Event::Finished(data) => {
             json!({"event": "finished", "aggregates": data.aggregates, "truth": data.truth, "timings": data.timings})

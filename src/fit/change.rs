@@ -88,6 +88,7 @@ impl Fitter {
         if settings.method == Method::Automatic {
             settings.method = self.settings.method;
         }
+        self.scene.spell_names(&mut settings.exclude);
         settings.validate()?;
         let changed: Vec<String> = self.settings.differences(&settings).into_iter().map(|(name, _, _)| name).collect();
         if let Some(name) = changed.iter().find(|name| reach_of(name) == Some(Reach::Fit)) {

@@ -174,11 +174,7 @@ impl Fitter {
 
     fn prepare(scene: Arc<Scene>, surface: Arc<Surface>, mut settings: FitSettings) -> Result<Self> {
         settings.validate()?;
-        for typed in &mut settings.exclude {
-            if let Some(view) = scene.view_named(typed) {
-                typed.clone_from(&scene.views[view].name);
-            }
-        }
+        scene.spell_names(&mut settings.exclude);
         let uses = uses_of(&scene, &settings.exclude);
         let training = training_views(&uses, &settings)?;
         evidence::check(&scene, &training, &settings)?;

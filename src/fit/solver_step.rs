@@ -39,8 +39,7 @@ impl Fitter {
         let check_choices = whole.check_choices && last_maps.is_some_and(|last| last.is_of_level_of(stage));
         let is_last = last_maps == Some(stage);
         // The grid is not halved with the maps: light that reaches points too far apart bounds what small maps can show.
-        // Maps that are kept stay whole in the state; the solver looks at them by the size of its photos.
-        let map_size = if whole.fixed_maps { stage.map_size >> stage.photo_level } else { stage.map_size };
+        let map_size = whole.map_size_of(stage);
         let settings = SolverSettings { map_size, check_choices, ..whole };
         let level = (stage.photo_level, map_size);
         let is_of_level = |solver: &SolverScene| (self.solver_photo_level, solver.settings.map_size) == level;

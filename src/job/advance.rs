@@ -66,18 +66,19 @@ impl Advance {
 
     /// A step was done.
     pub fn stepped(&mut self, progress: &Progress) {
-        if progress.finishing_seconds.is_finite() {
-            self.finishing_seconds = progress.finishing_seconds.max(0.0);
-        }
-        self.take((progress.row.seconds, progress.seconds_left), 1.0 / progress.steps_per_second.max(1e-9));
+        let Progress { row, seconds_left, finishing_seconds, steps_per_second, .. } = progress;
+        self.take((row.seconds, *seconds_left, *finishing_seconds), 1.0 / steps_per_second.max(1e-9));
     }
 
     /// A step has come to a place.
     pub fn within_step(&mut self, time: &StepTime) {
-        self.take((time.seconds, time.seconds_left), time.seconds_left);
+        self.take((time.seconds, time.seconds_left, time.finishing_seconds), time.seconds_left);
     }
 
-    fn take(&mut self, (done, left): (f64, f64), step: f64) {
+    fn take(&mut self, (done, left, finishing): (f64, f64, f64), step: f64) {
+        if finishing.is_finite() {
+            self.finishing_seconds = finishing.max(0.0);
+        }
         if done.is_finite() && left.is_finite() {
             self.steps = Some((done, left.max(0.0), step, Instant::now()));
             self.claim(done / self.whole(done, left));
@@ -186,9 +187,13 @@ mod tests {
         advance.stepped(&progress(10.0, 30.0));
         let left = advance.seconds_left().unwrap();
         assert!((39.0..=40.0).contains(&left), "{left}");
-        advance.within_step(&StepTime { seconds: 12.0, seconds_left: 12.0 });
+        advance.within_step(&StepTime { seconds: 12.0, seconds_left: 12.0, finishing_seconds: 20.0 });
         let left = advance.seconds_left().unwrap();
         assert!((21.0..=22.0).contains(&left) && advance.percent() == 35, "{left}");
+        // A fit that is taken up within its last step tells nothing else before.
+        let mut taken_up = Advance::default();
+        taken_up.within_step(&StepTime { seconds: 30.0, seconds_left: 10.0, finishing_seconds: 40.0 });
+        assert!((49.0..=50.0).contains(&taken_up.seconds_left().unwrap()) && taken_up.percent() == 37);
         advance.stepped(&progress(f64::NAN, f64::NAN));
         assert!(advance.seconds_left().is_some(), "what is not a number changes nothing");
     }

@@ -199,6 +199,8 @@ pub struct StepTime {
     pub seconds: f64,
     /// Seconds until the last step is done.
     pub seconds_left: f64,
+    /// Seconds that what comes after it is expected to take.
+    pub finishing_seconds: f64,
 }
 
 /// Maps and light at a step.

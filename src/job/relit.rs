@@ -8,8 +8,8 @@ use super::kept::{self, Kept};
 use super::newest::Newest;
 use super::{Slot, Wake, background};
 use crate::error::{Error, ErrorKind, Result, text_of_panic};
-use crate::fit::FitSettings;
 use crate::fit::solver::SolverSettings;
+use crate::fit::{FitSettings, Method};
 use crate::image::RgbImage;
 use crate::light::Environment;
 use crate::material::texels::texels_from_maps;
@@ -26,8 +26,10 @@ use std::time::Instant;
 
 /// Width and height of the lights that the cache of a window is made for.
 const LIGHT_SIZE: (usize, usize) = (64, 32);
-/// Texels a side of its grid, at least.
+/// Texels a side of its grid.
 const GRID: usize = 192;
+/// The same of a fit's own cache that is taken for it, at most: each texel more is lit anew with every light.
+const LARGEST_GRID: usize = 256;
 
 /// The cache by which a window relights a surface, from disk where it was traced before; `None` when `stop` was raised.
 pub fn transport_of(
@@ -39,11 +41,15 @@ pub fn transport_of(
     kept::transport(surface, settings, LIGHT_SIZE, kept, stop)
 }
 
-/// How fine that cache is where fits with these settings are begun and looked at: the one that a fit begins with, if that is
-/// fine enough, so that it is traced once.
+/// How fine that cache is where fits with these settings are begun and looked at: the one that a fit by the solver begins
+/// with, where it is about as fine, so that it is traced once.
 pub fn settings_beside(fit: &FitSettings, max_bounces: usize) -> CachedSettings {
     let (first, light_size) = SolverSettings::first_cache(fit);
-    let serves = light_size == LIGHT_SIZE && first.grid >= GRID && first.max_bounces == max_bounces && fit.has_lobe();
+    let serves = fit.method == Method::Solver
+        && fit.has_lobe()
+        && light_size == LIGHT_SIZE
+        && (GRID..=LARGEST_GRID).contains(&first.grid)
+        && first.max_bounces == max_bounces;
     if serves { first } else { settings_of(max_bounces, fit.has_lobe().then_some(fit.lobe)) }
 }
 

@@ -48,6 +48,7 @@ pub fn start_with(
     let snapshot = Arc::new(Slot::default());
     let stop = Arc::new(AtomicBool::new(false));
     let teller = Teller { events: event_sender, wake: options.wake };
+    let first_of_session = fitter.state().step;
     let worker = Worker {
         fitter,
         settings,
@@ -62,6 +63,7 @@ pub fn start_with(
         paused: false,
         steps_asked: 0,
         reached: None,
+        first_of_session,
     };
     let thread = std::thread::Builder::new()
         .name("patina-fit".into())
@@ -102,6 +104,13 @@ struct Worker {
     steps_asked: usize,
     /// Where the last step was when its time was up.
     reached: Option<Reached>,
+    /// Steps that were done before this job.
+    first_of_session: usize,
+}
+
+fn pace_of(fitter: &Fitter, first_of_session: usize) -> Pace {
+    let state = fitter.state();
+    time_left::pace(&state.plan, &state.losses, first_of_session, fitter.surface_megapixels())
 }
 
 impl Worker {
@@ -211,16 +220,19 @@ impl Worker {
     /// One step; where the time is limited, it is dropped when that is up, but for what it had reached.
     /// Also whether something within it was shown.
     fn step(&mut self) -> Result<(StepOutcome, bool)> {
-        let Worker { fitter, budget, stop, snapshot, teller, reached, .. } = self;
+        let Worker { fitter, budget, stop, snapshot, teller, reached, first_of_session, .. } = self;
         *reached = None;
         let is_limited = budget.is_some();
         let mut last_snapshot = Instant::now();
         let mut was_shown = false;
         let (began, before) = (Instant::now(), fitter.state().seconds);
+        let Pace { seconds_after_next, finishing_seconds, .. } = pace_of(fitter, *first_of_session);
         let mut watch = |underway: &Underway| {
-            // Steps within which something is heard of are the last.
             let seconds = before + began.elapsed().as_secs_f64();
-            teller.send(Event::WithinStep(StepTime { seconds, seconds_left: underway.seconds_left }));
+            // Nothing is known of what comes after where no step was done before.
+            let seconds_left =
+                underway.seconds_left + if seconds_after_next.is_finite() { seconds_after_next } else { 0.0 };
+            teller.send(Event::WithinStep(StepTime { seconds, seconds_left, finishing_seconds }));
             if is_limited {
                 *reached = Some(underway.reached());
             }
@@ -357,10 +369,9 @@ impl Worker {
     }
 
     fn progress(&self, row: LossRow) -> Progress {
-        let state = self.fitter.state();
         let steps_total = self.fitter.steps_total();
-        let Pace { steps_per_second, seconds_left, finishing_seconds } =
-            time_left::pace(&state.plan, &state.losses, self.fitter.surface_megapixels());
+        let Pace { steps_per_second, seconds_left, finishing_seconds, .. } =
+            pace_of(&self.fitter, self.first_of_session);
         Progress { row, steps_total, steps_per_second, seconds_left, finishing_seconds }
     }
 }

@@ -91,6 +91,15 @@ impl Scene {
         })
     }
 
+    /// Puts the names of views in the place of those that a user has for them; unknown ones stay.
+    pub fn spell_names(&self, typed: &mut [String]) {
+        for typed in typed {
+            if let Some(view) = self.view_named(typed) {
+                typed.clone_from(&self.views[view].name);
+            }
+        }
+    }
+
     /// Puts a linear picture in the place of a view's photo; every pixel becomes evidence, except those that are not
     /// finite.
     ///

@@ -5,9 +5,11 @@
 use super::common::*;
 use patina::export::RunFolder;
 use patina::fit::settings::{BackgroundEvidence, Start};
+use patina::fit::solver::SolverSettings;
 use patina::fit::{FitSettings, Fitter, Method, StepOutcome, checkpoint};
-use patina::job::{Event, JobOptions, RunSettings};
+use patina::job::{Event, JobOptions, RunSettings, relit};
 use patina::render::Surface;
+use patina::render::cached::{CachedSettings, CachedTransport};
 use patina::scene::{Background, Scene};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
@@ -65,6 +67,35 @@ fn it_explains_the_photos_and_views_it_never_saw() {
     let figures = &fitter.figures().view_rmse;
     assert!(figures.iter().all(|rmse| rmse.is_some_and(|rmse| rmse < 0.1)), "{figures:?}");
     assert!(state.non_finite.is_empty());
+}
+
+#[test]
+fn transport_that_was_cached_before_serves_where_it_is_the_fits_own() {
+    let (_, surface) = scene();
+    let settings = FitSettings { solver_rounds: 2, ..base() };
+    let mut whole = new_fitter(&settings);
+    run(&mut whole).unwrap();
+    let (own, light_size) = SolverSettings::first_cache(&settings);
+    for (cached, serves) in [(own, true), (CachedSettings { seed: 7, ..own }, false)] {
+        let transport = Arc::new(CachedTransport::build(&surface, cached, light_size, &GO).unwrap());
+        let mut fitter = new_fitter(&settings);
+        fitter.take_transport(Arc::clone(&transport));
+        fitter.step(&GO).unwrap();
+        assert_eq!(Arc::strong_count(&transport) > 1, serves);
+        run(&mut fitter).unwrap();
+        assert!(without_seconds(fitter.state()) == without_seconds(whole.state()));
+    }
+    // A window's cache is that of a fit by the solver with photos of usual size, and coarser ones have their own.
+    let fit = FitSettings { method: Method::Solver, ..FitSettings::default() };
+    assert_eq!(relit::settings_beside(&fit, fit.bounces), SolverSettings::first_cache(&fit).0);
+    for other in [
+        FitSettings { solver_grid: 128, ..fit.clone() },
+        FitSettings { solver_grid: 1024, map_size: 1024, ..fit.clone() },
+        FitSettings { method: Method::Adam, ..fit.clone() },
+    ] {
+        let expected = relit::settings_of(other.bounces, Some(other.lobe));
+        assert_eq!(relit::settings_beside(&other, other.bounces), expected);
+    }
 }
 
 #[test]

@@ -55,8 +55,8 @@ pub fn arrange(command: clap::Command) -> clap::Command {
 pub fn beside_a_run(argument: clap::Arg) -> clap::Arg {
     let help = argument.get_help().map(ToString::to_string).unwrap_or_default();
     match help.split_once(" [default: ") {
-        Some((told, _)) if argument.get_help_heading() == Some(SCENE) => {
-            argument.help(format!("{told} [default: as the run]"))
+        Some((told, otherwise)) if argument.get_help_heading() == Some(SCENE) => {
+            argument.help(format!("{told} [default: as the run; else {otherwise}"))
         }
         _ => argument,
     }
@@ -164,7 +164,7 @@ mod tests {
         let help = |name: &str| all.find_subcommand(name).unwrap().clone().render_long_help().to_string();
         for name in ["relight", "render", "compare"] {
             let text = help(name);
-            assert!(text.contains("[default: as the run]"), "{name}");
+            assert!(text.contains("[default: as the run; else 8]"), "{name}");
             assert!(!text.contains("[default: 8]"), "{name}");
             assert_eq!(text.contains("--encoding"), name != "relight");
         }

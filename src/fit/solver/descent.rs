@@ -39,18 +39,27 @@ pub struct OnTheWay<'a> {
 /// Hears of each step of a descent that is gone on from.
 pub type Watch<'a> = dyn FnMut(OnTheWay) + 'a;
 
+/// A part of a way.
+struct Part {
+    /// Shares of the whole way by its seconds, at its beginning and end.
+    from: f64,
+    to: f64,
+    /// How long its steps are beside each other, in all, and those that are done.
+    weight: f64,
+    done: f64,
+}
+
 /// What a descent leaves on its way.
 pub(super) struct Trace<'a> {
     /// The objective before and after each step.
     steps: Vec<[Objective; 2]>,
     watch: Option<&'a mut Watch<'a>>,
-    /// Shares of the whole way between which the part at hand lies, its number of steps, and those that are done.
-    part: (f64, f64, usize, usize),
+    part: Part,
 }
 
 impl<'a> Trace<'a> {
     fn of(watch: Option<&'a mut Watch<'a>>) -> Self {
-        Trace { steps: Vec::new(), watch, part: (0.0, 1.0, 1, 0) }
+        Trace { steps: Vec::new(), watch, part: Part { from: 0.0, to: 1.0, weight: 1.0, done: 0.0 } }
     }
 
     /// Of a way that may not be gone on from: nobody hears of it.
@@ -58,17 +67,17 @@ impl<'a> Trace<'a> {
         Trace::of(None)
     }
 
-    /// Begins a part of so many steps.
-    fn begin(&mut self, (from, to): (f64, f64), steps: usize) {
-        self.part = (from, to, steps, 0);
+    /// Begins a part whose steps have this weight in all.
+    fn begin(&mut self, (from, to): (f64, f64), weight: f64) {
+        self.part = Part { from, to, weight, done: 0.0 };
     }
 
-    /// A step is done; the share of the way by then.
-    fn step(&mut self, objective: [Objective; 2]) -> f64 {
+    /// A step of such a weight is done; the share of the way by then.
+    fn step(&mut self, objective: [Objective; 2], weight: f64) -> f64 {
         self.steps.push(objective);
-        let (from, to, steps, done) = &mut self.part;
-        *done += 1;
-        *from + (*to - *from) * (*done as f64 / *steps as f64).min(1.0)
+        let Part { from, to, weight: whole, done } = &mut self.part;
+        *done += weight;
+        *from + (*to - *from) * (*done / *whole).min(1.0)
     }
 }
 
@@ -86,7 +95,7 @@ const LAST_STEPS: [Step; 6] = [
 ];
 /// Shares of the seconds of a way with a light at the ends of its parts, as measured on photographs: the first steps, the
 /// choice between the starts, the light once more, the last steps.
-const PARTS: [f64; 4] = [0.16, 0.34, 0.5, 0.92];
+const ENDS_OF_PARTS: [f64; 4] = [0.16, 0.34, 0.5, 0.92];
 /// Times that a step is halved.
 const HALVINGS: usize = 3;
 /// How far the logarithm of a width may go in one step: farther off its slope is another.
@@ -100,6 +109,17 @@ pub(super) struct Step {
     /// What moves. With widths, lobes are integrated anew after it, and light between surfaces follows; without, pixels are
     /// linear in the texels, and no integral is needed.
     pub(super) slopes: Slopes,
+}
+
+impl Step {
+    /// How long it takes beside others, about: with widths, lobes are integrated anew before and after.
+    fn weight(self) -> f64 {
+        if self.slopes == Slopes::OfWidths { 4.0 } else { 1.0 }
+    }
+}
+
+fn weight_of(steps: &[Step]) -> f64 {
+    steps.iter().map(|step| step.weight()).sum()
 }
 
 /// Where a descent ended.
@@ -184,19 +204,22 @@ impl SolverScene {
         let texture_scale = self.choose_texture_scale(&pixels, &sight, (&start, &shown), lit, stop)?;
 
         let mut trace = Trace::of(watch);
-        trace.begin((0.0, PARTS[0]), FIRST_STEPS.len());
+        // Most of it goes into looking at all pixels.
+        trace.begin((0.75 * ENDS_OF_PARTS[0], ENDS_OF_PARTS[0]), weight_of(&FIRST_STEPS));
         let mut place =
             descent.down(descent.place(&start, sight, (&shown, texture_scale)), &FIRST_STEPS, &mut trace)?;
         if lit == Lit::Yes {
-            trace.begin((PARTS[0], PARTS[1]), 1);
+            trace.begin((ENDS_OF_PARTS[0], ENDS_OF_PARTS[1]), 1.0);
             place = descent.or_plain(place, (&start, &shown, texture_scale), &mut trace)?;
         }
         if lit == Lit::Yes && self.is_scale_open() {
             place = descent.under_light_again(place, estimate, (&shown, texture_scale))?;
         }
-        trace.begin((PARTS[2], PARTS[3]), LAST_STEPS.len());
+        // Where the scale is given, nothing was done between.
+        let from = ENDS_OF_PARTS[if self.is_scale_open() { 2 } else { 1 }];
+        trace.begin((from, ENDS_OF_PARTS[3]), weight_of(&LAST_STEPS));
         let mut place = descent.down(place, &LAST_STEPS, &mut trace)?;
-        trace.begin((PARTS[3], 1.0), FIRST_STEPS.len());
+        trace.begin((ENDS_OF_PARTS[3], 1.0), weight_of(&FIRST_STEPS));
         let scale = (lit == Lit::Yes && self.is_scale_open()).then(|| LightScale::told_by(&place.texels, &shown));
         let scaled_specular = place.texels.iter().map(LightScale::changes_specular).collect();
         if lit == Lit::Yes {
@@ -281,8 +304,9 @@ impl Descent<'_> {
         objective: [Objective; 2],
         (texels, beliefs): (&[Material<f32>], &Neighbours),
         Learned { gains, .. }: &Learned,
+        weight: f64,
     ) {
-        let share = trace.step(objective);
+        let share = trace.step(objective, weight);
         let Some(watch) = &mut trace.watch else { return };
         if self.most_diffuse <= 1.0 {
             return watch(OnTheWay { texels, light: &self.light, gains, share });
@@ -329,7 +353,7 @@ impl Descent<'_> {
                 }
                 share *= 0.5;
             }
-            self.leave(trace, [before, after], (&texels, &beliefs), &by);
+            self.leave(trace, [before, after], (&texels, &beliefs), &by, step.weight());
             learned = Some(by);
         }
         Some(Place { texels, sight, learned, beliefs, is_exact })

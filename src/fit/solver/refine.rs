@@ -202,10 +202,12 @@ pub(super) mod tests {
         let before = solver.estimate.texels.clone();
         let Solver { scene, estimate } = &mut solver;
         let report = {
-            let mut seen = Vec::new();
+            let (mut seen, mut shares) = (Vec::new(), Vec::new());
             let report = scene.refine(estimate, &never, &mut |way| {
                 seen.push((way.texels.to_vec(), way.light.to_vec()));
+                shares.push(way.share);
             });
+            assert!(shares.is_sorted() && shares[0] > 0.0 && shares.last() == Some(&1.0), "{shares:?}");
             // Each step was told of, and the last with what stays; texels that no pixel shows are filled after it.
             let (texels, light) = seen.last().unwrap();
             assert_eq!((seen.len(), light), (found.steps.len(), &estimate.light));

@@ -44,7 +44,7 @@ impl Descent<'_> {
         if after.total() >= before.total() {
             return Some(found);
         }
-        self.leave(trace, [before, after], (&mixed.texels, &mixed.beliefs), &by);
+        self.leave(trace, [before, after], (&mixed.texels, &mixed.beliefs), &by, 1.0);
         Some(mixed)
     }
 

@@ -1,6 +1,6 @@
 //! What can be chosen in the solver.
 
-use crate::fit::schedule::stages;
+use crate::fit::schedule::{Stage, stages};
 use crate::fit::settings::{BackgroundEvidence, Choosing, FitSettings};
 use crate::material::LobeModel;
 use crate::render::cached::CachedSettings;
@@ -76,6 +76,12 @@ impl SolverSettings {
         }
     }
 
+    /// Width and height of the maps of a stage. Maps that are kept stay whole in the state; the solver looks at them by the
+    /// size of its photos.
+    pub fn map_size_of(&self, stage: &Stage) -> usize {
+        if self.fixed_maps { stage.map_size >> stage.photo_level } else { stage.map_size }
+    }
+
     /// How fine the cache is, and how far it reaches.
     pub fn cached(&self) -> CachedSettings {
         CachedSettings {
@@ -92,8 +98,9 @@ impl SolverSettings {
 
     /// The cache that a fit begins with, and the size of its lights: before all else it is traced.
     pub fn first_cache(settings: &FitSettings) -> (CachedSettings, (usize, usize)) {
-        let map_size = stages(settings).first().map_or(settings.map_size, |stage| stage.map_size);
-        let solver = SolverSettings { map_size, ..SolverSettings::of(settings) };
+        let solver = SolverSettings::of(settings);
+        let map_size = stages(settings).first().map_or(settings.map_size, |stage| solver.map_size_of(stage));
+        let solver = SolverSettings { map_size, ..solver };
         (solver.cached(), solver.light_size)
     }
 }

@@ -24,7 +24,7 @@ pub struct Glance {
     pub began: Instant,
     /// When the adapter was done with it; `None` until then.
     pub presented: Option<Instant>,
-    /// Seconds for which the window's thread was at it and heard nobody, until the drawing was handed on; `None` before.
+    /// Seconds for which the window's thread was at it and heard nobody, until it began to hand the drawing on; `None` before.
     pub busy_seconds: Option<f64>,
     /// The state of the fit.
     pub status: FitStatus,
@@ -207,7 +207,7 @@ impl eframe::App for Driven {
     fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
         let number = self.glance(Instant::now());
         self.studio.ui(ui, frame);
-        let began = self.began.take();
+        let began = self.began;
         if frame.wgpu_render_state().is_some() {
             let (shared, stage) = (Arc::clone(&self.shared), self.studio.memory.stage.stage.clone());
             let mark = FrameMark { shared, stage, number, began };
@@ -251,8 +251,6 @@ impl egui_wgpu::CallbackTrait for FrameMark {
             let status = stage.status();
             self.shared.drawn(self.number, status.scenes_drawn, status.is_light_uploading);
         }
-        // What was drawn is cut into triangles and uploaded by now.
-        self.shared.done(self.number, self.began);
         let (shared, number) = (Arc::clone(&self.shared), self.number);
         encoder.on_submitted_work_done(move || shared.presented(number, Instant::now()));
         Vec::new()
@@ -264,5 +262,7 @@ impl egui_wgpu::CallbackTrait for FrameMark {
         _pass: &mut wgpu::RenderPass<'static>,
         _resources: &egui_wgpu::CallbackResources,
     ) {
+        // What was drawn is uploaded, and there is a picture to draw into: one waits for it where the adapter is behind.
+        self.shared.done(self.number, self.began);
     }
 }

@@ -6,15 +6,17 @@
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::export::RunFolder;
+use crate::fit::{FitSettings, Method};
 use crate::image::RgbImage;
 use crate::job::kept::Kept;
 use crate::job::pictures::{light_of, matched, parameters_with};
+use crate::job::prepare::RunSettings;
 use crate::job::relit;
 use crate::light::Environment;
 use crate::material::texels::texels_from_maps;
 use crate::material::{LobeModel, MaterialMaps};
 use crate::render::Surface;
-use crate::render::cached::{CachedTransport, FootprintSettings};
+use crate::render::cached::{CachedSettings, CachedTransport, FootprintSettings};
 use crate::render::picture::{PictureSettings, render};
 use crate::render::relight::RelitView;
 use crate::scene::{ReadSettings, demo};
@@ -69,6 +71,11 @@ impl RelightRow {
     }
 }
 
+/// The cache of a window beside a fit by the solver.
+fn beside_a_fit(fit: FitSettings) -> CachedSettings {
+    relit::settings_beside(&FitSettings { method: Method::Solver, ..fit }, BOUNCES)
+}
+
 /// What is relit.
 struct Subject {
     name: String,
@@ -77,6 +84,8 @@ struct Subject {
     environment: Environment,
     lobe: LobeModel,
     eye: OrbitEye,
+    /// As the window has them beside it.
+    cached: CachedSettings,
 }
 
 impl Subject {
@@ -87,7 +96,8 @@ impl Subject {
         let surface = Surface::new(scene.mesh.clone())?;
         let eye = OrbitEye::around(subject(surface.mesh(), Some(&scene)));
         let (maps, environment, lobe) = (truth.maps, truth.environment, LobeModel::BlinnPhong);
-        Ok(Subject { name: "demo".into(), surface, maps, environment, lobe, eye })
+        let cached = beside_a_fit(FitSettings { lobe, ..FitSettings::default() });
+        Ok(Subject { name: "demo".into(), surface, maps, environment, lobe, eye, cached })
     }
 
     /// A run folder, or an exchange folder with its truth.
@@ -99,7 +109,8 @@ impl Subject {
             let surface = Surface::new(result.mesh)?;
             let eye = OrbitEye::around(subject(surface.mesh(), None));
             let (maps, environment, lobe) = (result.maps, result.environment, result.lobe);
-            return Ok(Subject { name, surface, maps, environment, lobe, eye });
+            let cached = beside_a_fit(FitSettings { lobe, ..folder.read_settings::<RunSettings>()?.fit });
+            return Ok(Subject { name, surface, maps, environment, lobe, eye, cached });
         }
         let scene = crate::scene::read(path, &ReadSettings { hold_out_every: 0, ..ReadSettings::default() })?;
         let Some(truth) = scene.truth.clone() else {
@@ -109,7 +120,8 @@ impl Subject {
         let surface = Surface::new(scene.mesh.clone())?;
         let eye = OrbitEye::around(subject(surface.mesh(), Some(&scene)));
         let (maps, environment, lobe) = (truth.maps, truth.environment, LobeModel::BlinnPhong);
-        Ok(Subject { name, surface, maps, environment, lobe, eye })
+        let cached = beside_a_fit(FitSettings { lobe, ..FitSettings::default() });
+        Ok(Subject { name, surface, maps, environment, lobe, eye, cached })
     }
 }
 
@@ -123,9 +135,7 @@ pub fn measure(path: Option<&Path>, is_quick: bool, tell: &dyn Fn(&str)) -> Resu
     let stopped = || Error::new(ErrorKind::Stopped, "the bench was stopped");
     tell(&format!("caching light transport: {}", own.name));
     let began = Instant::now();
-    let transport =
-        relit::transport_of(&own.surface, relit::settings_of(BOUNCES, Some(own.lobe)), &Kept::nowhere(), &stop)
-            .ok_or_else(stopped)?;
+    let transport = relit::transport_of(&own.surface, own.cached, &Kept::nowhere(), &stop).ok_or_else(stopped)?;
     let cache_seconds = began.elapsed().as_secs_f64();
     let map_size = own.maps.diffuse.width();
     let texels = texels_from_maps(&own.maps);

@@ -73,7 +73,7 @@ impl BenchReport {
             let _ = writeln!(text, "| {} | {} | {} | {median} | {longest} |", row.scene, row.case, row.frames);
         }
         text.push_str(
-            "\nFrom the news that a frame takes in until its drawing is handed on: the wait for an adapter that is behind is in it, as where \
+            "\nFrom the news that a frame takes in until its drawing begins to be handed on: the wait for an adapter that is behind is in it, as where \
              the processors draw.\n\n",
         );
     }

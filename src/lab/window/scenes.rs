@@ -65,14 +65,16 @@ impl BenchScene {
     /// As of [`BenchScene::open`].
     pub fn open_as_it_is(&self, person: &Person) -> Result<()> {
         let scene = self.clone();
+        // Made here: the window's thread has no part in it.
+        let made = if let BenchScene::Sphere(case) = &scene { Some(scale::scene(*case)) } else { None };
         person.ask(move |studio, _| {
             // The layout of a first start, and nothing remembered of the measurement before.
             studio.layout = Layout::default();
             studio.model.edits = Default::default();
-            match scene {
-                BenchScene::Sphere(case) => studio.model.open_made(scale::scene(case), settings_of(case)),
-                BenchScene::Demo => studio.model.open_demo(),
-                BenchScene::Folder(path) => studio.model.open(path),
+            match (scene, made) {
+                (BenchScene::Sphere(case), Some(made)) => studio.model.open_made(made, settings_of(case)),
+                (BenchScene::Folder(path), _) => studio.model.open(path),
+                _ => studio.model.open_demo(),
             }
         })?;
         person.wait_until("a scene that is ready for a fit", LONG, |studio| {

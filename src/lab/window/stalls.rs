@@ -1,7 +1,7 @@
 //! For how long the window hears nobody: while a scene is opened, and from Start on.
 //!
 //! Its thread takes in news, lays out panels and hands the drawing on; while it does, it hears no key. What counts is the
-//! longest of these times over all frames, each from its news until its drawing is handed on, the wait for an adapter
+//! longest of these times over all frames, each from its news until its drawing begins to be handed on, the wait for an adapter
 //! that is behind included.
 
 use super::person::Person;

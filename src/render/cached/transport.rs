@@ -37,7 +37,7 @@ pub struct CachedTransport {
     pub bounces: Option<BounceMatrix>,
     /// What hides the light from each point; `None` for direct light only.
     pub surroundings: Option<Surroundings>,
-    /// Seconds that tracing what points see of other points took.
+    /// Seconds that tracing what points see of other points took; 0 where none was traced, or from disk.
     pub bounce_seconds: f64,
     /// Share of light that lobes send back on average, without and with Schlick's factor, over log width.
     albedo: Vec<[f32; 2]>,

@@ -63,6 +63,7 @@ impl Model {
     pub fn start_anew(&mut self) {
         let Some(project) = &self.project else { return };
         let (Some(scene), Some(surface)) = (project.scene.clone(), project.surface.clone()) else { return };
+        scene.spell_names(&mut self.edits.fit.exclude);
         let mut settings = project.settings.clone();
         settings.fit = self.edits.fit.clone();
         let path = new_run_folder(&self.runs_folder(), &project.title);
@@ -172,6 +173,9 @@ impl Model {
         let moving = context.input(|input| input.pointer.any_down()) || context.text_edit_focused();
         if moving || self.edits.fit.validate().is_err() {
             return;
+        }
+        if let Some(scene) = self.project.as_ref().and_then(|project| project.scene.as_ref()) {
+            scene.spell_names(&mut self.edits.fit.exclude);
         }
         let wanted = self.edits.fit.clone();
         // Taken as sent: if the worker refuses, what it said last comes back.

@@ -100,7 +100,8 @@ impl<'a> Check<'a> {
         let at_points = scene.point_light(&estimate.texels, &planes);
         let judgement = scene.judge(&self.surface, &self.views, light, (&planes, &at_points), stop)?;
         self.seconds.judging = began.elapsed().as_secs_f64();
-        self.seconds.bounces = scene.transport.bounces.is_some().then_some(scene.transport.bounce_seconds);
+        // Of a cache that was there nobody knows.
+        self.seconds.bounces = Some(scene.transport.bounce_seconds).filter(|&seconds| seconds > 0.0);
         let is_withheld = !self.withheld.is_empty();
         Some(Choices::of(&judgement, &self.surface, scene.settings.map_size, &self.seconds, is_withheld))
     }
