@@ -7,8 +7,8 @@
 use super::fitter::{Fitter, StepOutcome};
 use super::schedule::{Stage, StageKind};
 use super::settings::Method;
-use super::solver::descent::OnTheWay;
 use super::solver::refine::log_gains;
+use super::solver::way::OnTheWay;
 use super::solver::{
     Choices, Estimate, SolverScene, SolverSettings, SolverStep, StepReport, TexelVariance, TransportError,
 };

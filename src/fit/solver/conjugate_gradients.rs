@@ -4,10 +4,10 @@
 //! A list of all texels is longer than any cache, so that what an iteration costs is how often lists are gone over: once
 //! for what goes along the direction, once for the next one.
 
-use super::descent::Step;
 use super::neighbours::Parabola;
 use super::pixel_system::{CHUNK, Lanes, PixelSystem, Rows};
 use super::sight::Slopes;
+use super::way::Step;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 

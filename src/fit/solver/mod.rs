@@ -18,7 +18,7 @@
 //! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`) with the footprints of pixels, where the evidence,
 //!    as far as it is independent (`tile_independence`), decides which texels share a lobe ([`lobe_tree`],
 //!    [`lobe_evidence`], [`lobe_prior`], [`lobe_sums`], [`lobe_widths`], [`lobe_families`]).
-//!    Then `refine`: [`descent`] of the one [`objective`] over all texels (`conjugate_gradients`), by what whole [`pixels`] see
+//!    Then `refine`: [`descent`], step by step ([`way`]), of the one [`objective`] over all texels (`conjugate_gradients`), by what whole [`pixels`] see
 //!    (`sight`, `pixel_system`), with what `neighbours` have in common and the `texture_scale` that predicts photos that took
 //!    no part best; from the lobes that were found, or those of one dielectric where that explains pixels as well (`second_start`, `agreement`), under
 //!    the light that these maps say (`light_again`).
@@ -88,6 +88,7 @@ pub mod tile;
 mod tile_independence;
 mod tile_lobes;
 pub mod transport_check;
+pub mod way;
 
 #[cfg(test)]
 mod tests;

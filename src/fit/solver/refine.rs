@@ -3,11 +3,12 @@
 //! With a light and without one the same objective is made less from the same pixels with the same texels. So what the light
 //! bought can be read from the two.
 
-use super::descent::{Descended, Watch};
+use super::descent::Descended;
 use super::estimate::{Estimate, START_TEXEL, TexelVariance};
 use super::report::StepReport;
 use super::scene::SolverScene;
 use super::sight::Lit;
+use super::way::Watch;
 use crate::material::Material;
 use crate::math::statistics::median;
 use std::sync::atomic::AtomicBool;

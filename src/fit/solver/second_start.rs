@@ -8,11 +8,12 @@
 
 use super::agreement::SquareGains;
 use super::choice::clustered::ClusteredMean;
-use super::descent::{Descent, FIRST_STEPS, Place, Trace, difference};
+use super::descent::{Descent, FIRST_STEPS, Place, difference};
 use super::estimate::START_TEXEL;
 use super::light_scale::PLAIN_SPECULAR;
 use super::objective::Learned;
 use super::sight::{Sight, Slopes};
+use super::way::Trace;
 use crate::material::Material;
 use std::sync::Arc;
 

@@ -1,10 +1,10 @@
 //! The whole way in one call: for tests, measurements, and whoever needs neither checkpoint nor job.
 
-use super::descent::Watch;
 use super::estimate::Estimate;
 use super::report::StepReport;
 use super::scene::SolverScene;
 use super::settings::SolverSettings;
+use super::way::Watch;
 use crate::error::{Error, ErrorKind, Result};
 use crate::fit::targets::targets;
 use crate::image::Image;

@@ -7,13 +7,14 @@
 //! Stone 1974).
 
 use super::conjugate_gradients::conjugate_gradients;
-use super::descent::{Step, difference, stepped};
+use super::descent::{difference, stepped};
 use super::neighbours::Neighbours;
 use super::objective::Learned;
 use super::pixel_system::{PixelRow, PixelSystem, Rows};
 use super::pixels::Pixels;
 use super::scene::SolverScene;
 use super::sight::{Lit, Sight, Slopes};
+use super::way::Step;
 use crate::material::Material;
 use std::sync::atomic::AtomicBool;
 

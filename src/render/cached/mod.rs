@@ -14,7 +14,7 @@
 //! For fixed roughness the result is linear in the light; for fixed light and roughness it is linear in diffuse and
 //! specular reflectance. Nothing is random after the cache is traced, and nothing depends on the number of threads.
 //!
-//! What is approximate, and judged against the path tracer by the tests of this folder and by `examples/cached_error.rs`:
+//! What is approximate, and judged against the path tracer by the tests of this folder and by `patina-lab bench cache`:
 //! * visibility between points of the grid is interpolated for diffuse light and taken from the nearest for the lobe;
 //! * a surface that lights another does so as if its lobe were diffuse, with the right amount of energy;
 //! * the lobe sees other surface as coarsely as cells of the light ([`surroundings`]).
