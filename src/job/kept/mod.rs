@@ -1,8 +1,8 @@
 //! What opening a scene takes long to make, kept on disk, so that opening it again takes seconds.
 //!
 //! [`atlas`](self::atlas()) keeps charts, [`check`](self::check()) the verdict on a scene, [`photograph`] the pictures of the
-//! built-in scene, [`transport`](self::transport()) what relights a surface; each looks into a [`Kept`] folder first and makes what is not there. A result is found by its content:
-//! by the digest of all that it is made of and of the program that makes it ([`program`]). So no result is ever stale, two
+//! built-in scene, [`transport`](self::transport()) what relights a surface; each looks into a [`Kept`] folder first and
+//! makes what is not there. A result is found by its content: by the digest of all that it is made of and of the program that makes it ([`program`]). So no result is ever stale, two
 //! scenes with one mesh share their atlas, and a folder that was moved is known again.
 //!
 //! What comes back from disk is what would be made, bit for bit; what is damaged is made anew, without a word. The folder is

@@ -39,8 +39,10 @@ fn file_of(folder: &Path, kind: &str) -> PathBuf {
     files.find(|path| path.file_name().unwrap().to_string_lossy().starts_with(kind)).unwrap()
 }
 
-fn is_kept(entry: &std::fs::DirEntry) -> bool {
-    entry.path().extension().is_some_and(|ending| ending == "kept")
+/// How many results a folder holds.
+fn count_in(folder: &Path) -> usize {
+    let is_kept = |path: &Path| path.extension().is_some_and(|ending| ending == "kept");
+    std::fs::read_dir(folder).unwrap().filter(|entry| is_kept(&entry.as_ref().unwrap().path())).count()
 }
 
 /// Damages the file of an entry in many ways, one after another, and has the result computed each time.
@@ -173,7 +175,7 @@ fn transport_from_disk_is_the_one_that_is_traced() {
         assert!(first == expected && again == expected, "{settings:?}");
         assert!(seconds > 0.0 || settings.max_bounces == 1);
         assert_eq!(kept_seconds, 0.0, "the second time it is read");
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().flatten().filter(is_kept).count(), which + 1);
+        assert_eq!(count_in(folder.path()), which + 1);
     }
     std::fs::remove_dir_all(folder.path()).unwrap();
     let (expected, _) = traced(deep, &kept);
@@ -181,11 +183,7 @@ fn transport_from_disk_is_the_one_that_is_traced() {
         assert_eq!(traced(deep, &kept).0, expected, "{what}");
     });
     assert!(super::transport(&surface, kinds[2], (16, 8), &kept, &AtomicBool::new(true)).is_none());
-    assert_eq!(
-        std::fs::read_dir(folder.path()).unwrap().flatten().filter(is_kept).count(),
-        1,
-        "what was stopped is not kept"
-    );
+    assert_eq!(count_in(folder.path()), 1, "what was stopped is not kept");
 
     let made = CachedTransport::build(&surface, deep, (16, 8), &GO).unwrap();
     let CachedTransport { basis, grid, visibility, bounces, surroundings, .. } = &made;

@@ -26,10 +26,15 @@ pub struct BounceMatrix {
     share: f32,
 }
 
+/// Rays leave one a stratum, in a square of so many on a side for at least so many rays.
+pub(super) fn strata_along_a_side(rays: usize) -> usize {
+    (rays.max(1) as f32).sqrt().ceil() as usize
+}
+
 impl BounceMatrix {
     /// Traces `rays` rays from each point; the next square number is taken. Of no use when `stop` was raised.
     pub fn trace(surface: &Surface, grid: &VisibilityGrid, rays: usize, seed: u64, stop: &AtomicBool) -> Self {
-        let side = (rays.max(1) as f32).sqrt().ceil() as usize;
+        let side = strata_along_a_side(rays);
         let rows = parallel::map(grid.points.len(), |index| {
             if stop.load(Ordering::Relaxed) {
                 return Vec::new();

@@ -1,5 +1,6 @@
 //! How fine the cache is.
 
+use super::bounce::strata_along_a_side;
 use super::light_basis::LightBasis;
 use crate::material::LobeModel;
 
@@ -52,6 +53,6 @@ impl CachedSettings {
 
     /// Rays from each point to other surface: the next square number.
     pub fn rays_traced(&self) -> usize {
-        ((self.bounce_rays.max(1) as f32).sqrt().ceil() as usize).pow(2)
+        strata_along_a_side(self.bounce_rays).pow(2)
     }
 }
