@@ -6,6 +6,7 @@ use super::model::store::Store;
 use super::model::{FitStatus, Model, Workspace};
 use super::pace::Pace;
 use super::panel::{self, Memory};
+use super::repaint::Repaint;
 use super::stage::{Stage, StageStatus};
 use super::{perform, theme};
 use egui::{Context, ViewportCommand};
@@ -69,6 +70,7 @@ impl Studio {
             model.adapter = format!("{} ({})", info.name, info.backend);
             memory.stage.stage = Some(Stage::new(state));
             if model.software_adapter {
+                context.add_plugin(Repaint::new(state.target_format));
                 model.log.note(format!(
                     "No graphics card: {} renders the viewport on the CPU. Everything works; orbiting is slower",
                     info.name
@@ -180,6 +182,16 @@ impl Studio {
         panel::welcome::drop_hint(ui.ctx());
     }
 
+    fn perform_acts(&mut self, context: &Context) {
+        for act in std::mem::take(&mut self.model.acts) {
+            let layout = match self.model.workspace {
+                Workspace::Scene => &mut self.layout,
+                Workspace::Object => &mut self.object_layout,
+            };
+            perform::perform(act, &mut self.model, layout, context);
+        }
+    }
+
     fn stage_status(&self) -> StageStatus {
         self.memory.stage.stage.as_ref().map(Stage::status).unwrap_or_default()
     }
@@ -270,16 +282,12 @@ impl eframe::App for Studio {
             self.touched = Instant::now();
         }
         self.model.nobody_waits = is_at_work(&self.model.fit.status) && self.touched.elapsed() > PERSON_WAITS;
+        // What a key asks for is seen in this frame, what is pressed in the next.
+        self.perform_acts(&context);
         self.draw(ui);
         focus_ring(&context);
         release_focus(&context);
-        for act in std::mem::take(&mut self.model.acts) {
-            let layout = match self.model.workspace {
-                Workspace::Scene => &mut self.layout,
-                Workspace::Object => &mut self.object_layout,
-            };
-            perform::perform(act, &mut self.model, layout, &context);
-        }
+        self.perform_acts(&context);
         if let Some(panel) = self.model.activate.take() {
             match panel.workspace(self.model.workspace) {
                 Workspace::Scene => self.layout.activate(panel),

@@ -6,7 +6,7 @@ use glam::{IVec3, Vec2, Vec3};
 use std::collections::HashMap;
 
 /// Cells along the longest side of the box.
-const CELLS: f32 = 160.0;
+const CELLS: f32 = 112.0;
 /// Cells along each side of the atlas: vertices on either side of a chart's border stay two.
 const ATLAS_CELLS: f32 = 16.0;
 

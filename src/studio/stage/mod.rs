@@ -12,12 +12,13 @@
 //! | `light` | a light blurred for quick shading, and what that leaves out |
 //! | `texels`, `mesh`, `slot` | uploads, on another thread where they are large |
 //! | `coarse` | fewer triangles while a large mesh is turned on a slow adapter |
-//! | `pipelines`, `uniforms`, `shader/` | the fixed part of the drawing, and what it is told |
+//! | `pipelines`, `variants`, `uniforms`, `shader/` | the fixed part of the drawing, what it is made for, and what it is told |
 //! | `overlay`, `renderer` | the part that changes, and when the scene is drawn anew |
 //!
 //! The scene is drawn into an own target of linear radiance in half precision; the display transform of
-//! [`crate::image::display`] is applied when that target is shown. So exposure and curve cost one triangle, and numbers
-//! beyond 65504, the largest of half precision, are cut there (a sun is still blurred by its full strength).
+//! [`crate::image::display`] makes a picture of that target, which is kept. So exposure and curve cost one triangle, a
+//! frame in which nothing changed a copy, and numbers beyond 65504, the largest of half precision, are cut (a sun is still
+//! blurred by its full strength).
 //!
 //! What it refuses to do: shadows and interreflection (the path tracer makes such a picture, see
 //! [`StageContent::traced`]), picking on the surface ([`crate::trace::Bvh`] does), reading the mouse for anything but
@@ -37,6 +38,7 @@ mod renderer;
 mod slot;
 mod texels;
 mod uniforms;
+mod variants;
 
 pub use content::{
     Backdrop, Layer, PhotoMode, StageCamera, StageContent, StageFrame, StageLight, StageLook, StageQuantity,
@@ -72,6 +74,7 @@ impl Stage {
         if ui.is_rect_visible(rect) && rect.is_positive() {
             let painting =
                 Painting { renderer: self.renderer.clone(), frame: frame.clone(), rect, context: ui.ctx().clone() };
+            crate::studio::repaint::tell_opaque(ui.ctx(), rect);
             ui.painter().add(egui_wgpu::Callback::new_paint_callback(rect, painting));
         }
         response

@@ -5,17 +5,22 @@
 use super::frustum::{Line, PictureCorner};
 use super::light::{FIRST_WIDTH, OUT_OF_FOCUS, WIDTHS};
 use super::uniforms::{ScreenUniform, ViewUniform};
+use super::variants::{BehindVariant, Constants, MeshVariant, ScreenVariant};
 use crate::image::display::{SCALE, STRIPE_PIXELS, TOO_BRIGHT, TOO_DARK};
 use eframe::wgpu;
 use glam::Vec3;
+use std::collections::HashMap;
 use std::fmt::Write;
 
 /// Format of the target of radiance.
 pub(super) const RADIANCE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
-/// Format of the target of frustums: sRGB as stored, times opacity.
-pub(super) const OVERLAY_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+/// Format of the finished picture, and of the target of frustums: sRGB as stored, there times opacity.
+pub(super) const PICTURE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 /// Format of the depth of both.
 pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// Depth is larger where it is nearer.
+const NEARER: wgpu::CompareFunction = wgpu::CompareFunction::GreaterEqual;
 
 /// A corner of the mesh, as the shader takes it.
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
@@ -33,11 +38,13 @@ pub(super) struct MeshCorner {
 
 /// Everything that is made once.
 pub(super) struct Pipelines {
-    pub behind: wgpu::RenderPipeline,
-    pub mesh: wgpu::RenderPipeline,
+    surface: wgpu::ShaderModule,
+    display: wgpu::ShaderModule,
+    meshes: HashMap<MeshVariant, wgpu::RenderPipeline>,
+    behinds: HashMap<BehindVariant, wgpu::RenderPipeline>,
+    screens: HashMap<ScreenVariant, wgpu::RenderPipeline>,
     pub lines: wgpu::RenderPipeline,
     pub pictures: wgpu::RenderPipeline,
-    pub screen: wgpu::RenderPipeline,
     pub view_layout: wgpu::BindGroupLayout,
     pub map_layout: wgpu::BindGroupLayout,
     pub light_layout: wgpu::BindGroupLayout,
@@ -137,6 +144,8 @@ struct Recipe<'a> {
     blend: Option<wgpu::BlendState>,
     /// Whether depth is written, and how it is compared; `None` without depth.
     depth: Option<(bool, wgpu::CompareFunction)>,
+    /// Of the colours.
+    constants: Constants,
 }
 
 fn pipeline(device: &wgpu::Device, recipe: Recipe<'_>) -> wgpu::RenderPipeline {
@@ -167,7 +176,10 @@ fn pipeline(device: &wgpu::Device, recipe: Recipe<'_>) -> wgpu::RenderPipeline {
         fragment: Some(wgpu::FragmentState {
             module: recipe.module,
             entry_point: Some(recipe.entries.1),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: &recipe.constants,
+                ..Default::default()
+            },
             targets: &[Some(wgpu::ColorTargetState {
                 format: recipe.format,
                 blend: recipe.blend,
@@ -180,8 +192,8 @@ fn pipeline(device: &wgpu::Device, recipe: Recipe<'_>) -> wgpu::RenderPipeline {
 }
 
 impl Pipelines {
-    /// `screen_format` is that of the window.
-    pub fn new(device: &wgpu::Device, screen_format: wgpu::TextureFormat) -> Self {
+    /// Those that every frame needs; the others are made when they are first drawn with.
+    pub fn new(device: &wgpu::Device) -> Self {
         use Binding::{Sampler, Texture, TextureLayers, Uniform};
         let constants = constants();
         let colour = include_str!("shader/colour.wgsl");
@@ -201,41 +213,6 @@ impl Pipelines {
             &[Uniform(size_of::<ScreenUniform>() as u64), Sampler, Texture, Texture, Texture, Texture],
         );
 
-        let surface_layouts = [Some(&view_layout), Some(&map_layout), Some(&light_layout)];
-        // Depth is larger where it is nearer.
-        let nearer = wgpu::CompareFunction::GreaterEqual;
-        let behind = pipeline(
-            device,
-            Recipe {
-                label: "stage behind",
-                module: &surface,
-                entries: ("corner_behind", "colour_behind"),
-                layouts: &surface_layouts,
-                buffer: None,
-                format: RADIANCE_FORMAT,
-                blend: None,
-                depth: Some((false, wgpu::CompareFunction::Always)),
-            },
-        );
-        let mesh = pipeline(
-            device,
-            Recipe {
-                label: "stage mesh",
-                module: &surface,
-                entries: ("corner_of_mesh", "colour_of_mesh"),
-                layouts: &surface_layouts,
-                buffer: Some(wgpu::VertexBufferLayout {
-                    array_stride: size_of::<MeshCorner>() as u64,
-                    step_mode: wgpu::VertexStepMode::Vertex,
-                    attributes: &wgpu::vertex_attr_array![
-                        0 => Float32x3, 1 => Float32x3, 2 => Float32x2, 3 => Float16x4
-                    ],
-                }),
-                format: RADIANCE_FORMAT,
-                blend: None,
-                depth: Some((true, nearer)),
-            },
-        );
         let lines = pipeline(
             device,
             Recipe {
@@ -248,9 +225,10 @@ impl Pipelines {
                     step_mode: wgpu::VertexStepMode::Instance,
                     attributes: &wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x4, 2 => Float32x4],
                 }),
-                format: OVERLAY_FORMAT,
+                format: PICTURE_FORMAT,
                 blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
-                depth: Some((false, nearer)),
+                depth: Some((false, NEARER)),
+                constants: Constants::new(),
             },
         );
         let pictures = pipeline(
@@ -265,22 +243,10 @@ impl Pipelines {
                     step_mode: wgpu::VertexStepMode::Vertex,
                     attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32, 2 => Float32x2],
                 }),
-                format: OVERLAY_FORMAT,
+                format: PICTURE_FORMAT,
                 blend: None,
-                depth: Some((true, nearer)),
-            },
-        );
-        let screen = pipeline(
-            device,
-            Recipe {
-                label: "stage screen",
-                module: &display,
-                entries: ("corner_of_screen", "colour_of_screen"),
-                layouts: &[Some(&screen_layout)],
-                buffer: None,
-                format: screen_format,
-                blend: None,
-                depth: None,
+                depth: Some((true, NEARER)),
+                constants: Constants::new(),
             },
         );
         let sampler = |address_mode_u, mipmap_filter| {
@@ -294,11 +260,13 @@ impl Pipelines {
             })
         };
         Pipelines {
-            behind,
-            mesh,
+            surface,
+            display,
+            meshes: HashMap::new(),
+            behinds: HashMap::new(),
+            screens: HashMap::new(),
             lines,
             pictures,
-            screen,
             view_layout,
             map_layout,
             light_layout,
@@ -307,5 +275,65 @@ impl Pipelines {
             map_sampler: sampler(wgpu::AddressMode::ClampToEdge, wgpu::MipmapFilterMode::Linear),
             light_sampler: sampler(wgpu::AddressMode::Repeat, wgpu::MipmapFilterMode::Nearest),
         }
+    }
+
+    /// What draws the mesh.
+    pub fn mesh(&mut self, device: &wgpu::Device, variant: MeshVariant) -> &wgpu::RenderPipeline {
+        self.meshes.entry(variant).or_insert_with(|| {
+            let recipe = Recipe {
+                label: "stage mesh",
+                module: &self.surface,
+                entries: ("corner_of_mesh", "colour_of_mesh"),
+                layouts: &[Some(&self.view_layout), Some(&self.map_layout), Some(&self.light_layout)],
+                buffer: Some(wgpu::VertexBufferLayout {
+                    array_stride: size_of::<MeshCorner>() as u64,
+                    step_mode: wgpu::VertexStepMode::Vertex,
+                    attributes: &wgpu::vertex_attr_array![
+                        0 => Float32x3, 1 => Float32x3, 2 => Float32x2, 3 => Float16x4
+                    ],
+                }),
+                format: RADIANCE_FORMAT,
+                blend: None,
+                depth: Some((true, NEARER)),
+                constants: variant.constants(),
+            };
+            pipeline(device, recipe)
+        })
+    }
+
+    /// What draws the background.
+    pub fn behind(&mut self, device: &wgpu::Device, variant: BehindVariant) -> &wgpu::RenderPipeline {
+        self.behinds.entry(variant).or_insert_with(|| {
+            let recipe = Recipe {
+                label: "stage behind",
+                module: &self.surface,
+                entries: ("corner_behind", "colour_behind"),
+                layouts: &[Some(&self.view_layout), Some(&self.map_layout), Some(&self.light_layout)],
+                buffer: None,
+                format: RADIANCE_FORMAT,
+                blend: None,
+                depth: Some((false, wgpu::CompareFunction::Always)),
+                constants: variant.constants(),
+            };
+            pipeline(device, recipe)
+        })
+    }
+
+    /// What makes a picture of the drawn scene.
+    pub fn screen(&mut self, device: &wgpu::Device, variant: ScreenVariant) -> &wgpu::RenderPipeline {
+        self.screens.entry(variant).or_insert_with(|| {
+            let recipe = Recipe {
+                label: "stage screen",
+                module: &self.display,
+                entries: ("corner_of_screen", "colour_of_screen"),
+                layouts: &[Some(&self.screen_layout)],
+                buffer: None,
+                format: PICTURE_FORMAT,
+                blend: None,
+                depth: None,
+                constants: variant.constants(),
+            };
+            pipeline(device, recipe)
+        })
     }
 }

@@ -1,29 +1,36 @@
 //! The part that changes: what is uploaded, the targets, and when the scene is drawn anew.
 //!
-//! A frame that differs from the last only in exposure, curve, photo or wipe of the photo is not drawn again, only
-//! shown: that is one triangle over the rectangle.
+//! A frame that differs from the last only in exposure, curve, photo or wipe of the photo is not drawn again, only made a
+//! picture of anew; one that does not differ is the last picture, copied into the window.
 
 mod binding;
+mod drawing;
 
 use super::content::{StageFrame, StageLight};
 use super::light::{self, PreparedLight};
 use super::mesh::GpuMesh;
 use super::overlay::Overlay;
-use super::pipelines::{DEPTH_FORMAT, OVERLAY_FORMAT, Pipelines, RADIANCE_FORMAT, bind};
+use super::pipelines::Pipelines;
 use super::slot::{Slot, Speed};
 use super::texels::{CLAY, GpuTexture, MATT, Maker};
 use super::uniforms::{ScreenUniform, Sizes, ViewUniform};
+use super::variants::{BehindVariant, MeshVariant, ScreenVariant};
 use crate::error::Finding;
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::light::Environment;
 use crate::material::{LobeModel, MaterialMaps};
 use crate::scene::Mesh;
+use crate::studio::copy::Copy;
+use drawing::Targets;
 use eframe::{egui, wgpu};
 use glam::Vec3;
 use std::sync::Arc;
 
 /// Images of at most this many texels are uploaded within a frame, the rest on another thread.
 const TEXELS_AT_ONCE: usize = 256 * 256;
+
+/// Lights that were shown before and are shown again at once: who compares goes back and forth.
+const LIGHTS_KEPT: usize = 8;
 
 /// What the stage did, for the app to show and for tests.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -72,18 +79,11 @@ struct Missing {
     light: GpuLight,
 }
 
-/// The targets of a size.
-struct Targets {
-    size: [u32; 2],
-    radiance: wgpu::TextureView,
-    overlay: wgpu::TextureView,
-    depth: wgpu::TextureView,
-}
-
 /// Everything the stage keeps on the graphics adapter.
 pub(super) struct StageRenderer {
     maker: Maker,
     pipelines: Pipelines,
+    copy: Copy,
     view_buffer: wgpu::Buffer,
     screen_buffer: wgpu::Buffer,
     missing: Missing,
@@ -95,13 +95,15 @@ pub(super) struct StageRenderer {
     traced: Slot<Arc<RgbImage>, GpuTexture>,
     overlay: Overlay,
     targets: Option<Targets>,
-    drawn: Option<ViewUniform>,
-    screen_group: Option<wgpu::BindGroup>,
+    drawn: Option<(ViewUniform, MeshVariant, BehindVariant)>,
+    /// What the picture was made by, and of.
+    pictured: Option<(ScreenUniform, ScreenVariant)>,
+    is_shown: bool,
     status: StageStatus,
 }
 
 impl StageRenderer {
-    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, screen_format: wgpu::TextureFormat) -> Self {
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, window_format: wgpu::TextureFormat) -> Self {
         let maker = Maker { device: device.clone(), queue: queue.clone() };
         let uniform = |label, size: usize| {
             device.create_buffer(&wgpu::BufferDescriptor {
@@ -121,20 +123,22 @@ impl StageRenderer {
             light: GpuLight::new(&maker, &PreparedLight { mirror: dark, layers, reflectances }),
         };
         StageRenderer {
-            pipelines: Pipelines::new(device, screen_format),
+            pipelines: Pipelines::new(device),
+            copy: Copy::new(device, window_format),
             view_buffer: uniform("stage view", size_of::<ViewUniform>()),
             screen_buffer: uniform("stage screen", size_of::<ScreenUniform>()),
             missing,
             mesh: Slot::default(),
             maps: Slot::default(),
             quantity: Slot::default(),
-            lights: [Slot::default(), Slot::default()],
+            lights: [Slot::keeping(LIGHTS_KEPT), Slot::keeping(LIGHTS_KEPT)],
             photo: Slot::default(),
             traced: Slot::default(),
             overlay: Overlay::default(),
             targets: None,
             drawn: None,
-            screen_group: None,
+            pictured: None,
+            is_shown: false,
             status: StageStatus::default(),
             maker,
         }
@@ -153,12 +157,12 @@ impl StageRenderer {
         context: &egui::Context,
         encoder: &mut wgpu::CommandEncoder,
     ) {
-        self.screen_group = None;
-        if screen.contains(&0) {
+        self.is_shown = !screen.contains(&0);
+        if !self.is_shown {
             return;
         }
         let sizes = self.sizes(screen, frame.look.resolution_scale, pixels_per_point);
-        let mut changed = self.follow_content(frame, context);
+        let (mut changed, pictures_changed) = self.follow_content(frame, context);
         let content = &frame.content;
         changed |= self.overlay.follow(
             &self.maker.device,
@@ -166,28 +170,32 @@ impl StageRenderer {
             &self.pipelines,
             (&content.cameras, content.frustum_depth, frame.eye.position_in_world(), frame.look.accent),
         );
-        changed |= self.follow_size(sizes.target);
+        changed |= self.follow_size(&sizes);
         let bounds = self.mesh.shown().and_then(|mesh| mesh.bounds);
         let view = ViewUniform::new(frame, &sizes, bounds);
-        if changed || self.drawn != Some(view) {
+        let (mesh, behind) = (MeshVariant::new(frame), BehindVariant::new(frame));
+        changed |= self.drawn != Some((view, mesh, behind));
+        if changed {
             self.maker.queue.write_buffer(&self.view_buffer, 0, bytemuck::bytes_of(&view));
-            self.draw_scene(encoder, frame.look.resolution_scale < 1.0);
-            self.drawn = Some(view);
+            self.draw_scene(encoder, mesh, behind, frame.look.resolution_scale < 1.0);
+            self.drawn = Some((view, mesh, behind));
             self.status.scenes_drawn += 1;
         }
         let size = |slot: &Slot<_, GpuTexture>| slot.shown().map(|texture| texture.size);
-        let uniform = ScreenUniform::new(frame, &sizes, size(&self.photo), size(&self.traced));
-        self.maker.queue.write_buffer(&self.screen_buffer, 0, bytemuck::bytes_of(&uniform));
-        self.screen_group = self.bind_screen();
+        let (uniform, [photo, traced]) = ScreenUniform::new(frame, &sizes, size(&self.photo), size(&self.traced));
+        let variant = ScreenVariant::new(frame, photo, traced);
+        if changed || pictures_changed || self.pictured != Some((uniform, variant)) {
+            self.maker.queue.write_buffer(&self.screen_buffer, 0, bytemuck::bytes_of(&uniform));
+            self.make_picture(encoder, variant);
+            self.pictured = Some((uniform, variant));
+        }
         self.status.frames_shown += 1;
     }
 
-    /// Shows the drawn scene in the pass of the window.
+    /// Shows the picture in the pass of the window.
     pub fn paint(&self, pass: &mut wgpu::RenderPass<'static>) {
-        if let Some(group) = &self.screen_group {
-            pass.set_pipeline(&self.pipelines.screen);
-            pass.set_bind_group(0, group, &[]);
-            pass.draw(0..3, 0..1);
+        if let Some(targets) = self.targets.as_ref().filter(|_| self.is_shown) {
+            self.copy.draw(pass, &targets.copied);
         }
     }
 
@@ -198,8 +206,8 @@ impl StageRenderer {
         Sizes { screen, target, pixels_per_point }
     }
 
-    /// Follows every handle of the content; whether the scene looks different.
-    fn follow_content(&mut self, frame: &StageFrame, context: &egui::Context) -> bool {
+    /// Follows every handle of the content; whether the scene looks different, and whether what is laid over it does.
+    fn follow_content(&mut self, frame: &StageFrame, context: &egui::Context) -> (bool, bool) {
         let content = &frame.content;
         let speed = |texels: usize| match (frame.wait_for_uploads || texels <= TEXELS_AT_ONCE, frame.quiet_uploads) {
             (true, _) => Speed::Now,
@@ -236,14 +244,14 @@ impl StageRenderer {
                 GpuLight::new(&maker, &light::prepare(environment, *lobe))
             });
         }
+        let mut pictures_changed = false;
         for (slot, picture, label) in [
             (&mut self.photo, &content.photo, "stage photo"),
             (&mut self.traced, &content.traced, "stage traced picture"),
         ] {
             let maker = self.maker.clone();
             let texels = picture.as_deref().map_or(0, pixels);
-            // A new photo or traced picture changes how the scene is shown, not the scene.
-            slot.follow(picture.clone(), speed(texels), move |image| maker.picture(label, image));
+            pictures_changed |= slot.follow(picture.clone(), speed(texels), move |image| maker.picture(label, image));
         }
         let light_seconds: f64 = self.lights.iter().map(Slot::seconds).sum();
         self.status.upload_seconds = self.maps.seconds() + light_seconds;
@@ -259,89 +267,6 @@ impl StageRenderer {
             let of_maps = self.maps.shown().map(|(_, _, findings)| findings);
             self.status.findings = of_mesh.into_iter().chain(of_maps).flatten().cloned().collect();
         }
-        changed
-    }
-
-    /// Makes the targets anew for another size; whether it did.
-    fn follow_size(&mut self, size: [u32; 2]) -> bool {
-        if self.targets.as_ref().is_some_and(|targets| targets.size == size) {
-            return false;
-        }
-        let target = |label, format| {
-            let texture = self.maker.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-                view_formats: &[],
-            });
-            texture.create_view(&wgpu::TextureViewDescriptor::default())
-        };
-        self.targets = Some(Targets {
-            size,
-            radiance: target("stage radiance", RADIANCE_FORMAT),
-            overlay: target("stage overlay", OVERLAY_FORMAT),
-            depth: target("stage depth", DEPTH_FORMAT),
-        });
-        true
-    }
-
-    /// Records the scene and then the frustums over it.
-    fn draw_scene(&self, encoder: &mut wgpu::CommandEncoder, coarsely: bool) {
-        let Some(targets) = &self.targets else { return };
-        let (device, pipelines) = (&self.maker.device, &self.pipelines);
-        let view = bind(device, &pipelines.view_layout, &[self.view_buffer.as_entire_binding()]);
-        let maps = self.bind_maps();
-        let lights = self.bind_lights();
-        let depth = |load| {
-            Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &targets.depth,
-                depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
-                stencil_ops: None,
-            })
-        };
-        let colour = |view| {
-            Some(wgpu::RenderPassColorAttachment {
-                view,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                    store: wgpu::StoreOp::Store,
-                },
-            })
-        };
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("stage scene"),
-            color_attachments: &[colour(&targets.radiance)],
-            depth_stencil_attachment: depth(wgpu::LoadOp::Clear(0.0)),
-            ..Default::default()
-        });
-        for (index, group) in [&view, &maps, &lights].into_iter().enumerate() {
-            pass.set_bind_group(index as u32, group, &[]);
-        }
-        pass.set_pipeline(&pipelines.behind);
-        pass.draw(0..3, 0..1);
-        if let Some(mesh) = self.mesh.shown()
-            && let Some((corners, all)) = &mesh.buffers
-        {
-            let (indices, count) = mesh.coarse.as_ref().filter(|_| coarsely).unwrap_or(all);
-            pass.set_pipeline(&pipelines.mesh);
-            pass.set_vertex_buffer(0, corners.slice(..));
-            pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
-            pass.draw_indexed(0..*count, 0, 0..1);
-        }
-        drop(pass);
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("stage frustums"),
-            color_attachments: &[colour(&targets.overlay)],
-            depth_stencil_attachment: depth(wgpu::LoadOp::Load),
-            ..Default::default()
-        });
-        pass.set_bind_group(0, &view, &[]);
-        self.overlay.draw(&mut pass, pipelines);
+        (changed, pictures_changed)
     }
 }

@@ -52,6 +52,10 @@ pub(super) enum Speed<'a> {
 /// What is shown of a handle `K`, and what is being made of a newer one.
 pub(super) struct Slot<K, G> {
     shown: Option<(K, G)>,
+    /// What was shown before, the newest last; it is shown again at once.
+    earlier: Vec<(K, G)>,
+    /// How many of these are kept.
+    kept: usize,
     pending: Option<(K, Receiver<(G, f64)>)>,
     /// A handle whose making broke: it is not tried again.
     broken: Option<K>,
@@ -61,11 +65,16 @@ pub(super) struct Slot<K, G> {
 
 impl<K, G> Default for Slot<K, G> {
     fn default() -> Self {
-        Slot { shown: None, pending: None, broken: None, seconds: 0.0 }
+        Slot { shown: None, earlier: Vec::new(), kept: 0, pending: None, broken: None, seconds: 0.0 }
     }
 }
 
 impl<K: Same + Clone + Send + 'static, G: Send + 'static> Slot<K, G> {
+    /// One that keeps so many of what it showed before.
+    pub fn keeping(kept: usize) -> Self {
+        Slot { kept, ..Slot::default() }
+    }
+
     /// What there is to draw with.
     pub fn shown(&self) -> Option<&G> {
         self.shown.as_ref().map(|(_, made)| made)
@@ -92,10 +101,15 @@ impl<K: Same + Clone + Send + 'static, G: Send + 'static> Slot<K, G> {
         if known(self.shown.as_ref().map(|(key, _)| key)) || self.pending.is_some() || known(self.broken.as_ref()) {
             return changed;
         }
+        if let Some(index) = self.earlier.iter().position(|(key, _)| key.same(&wanted)) {
+            let (key, made) = self.earlier.remove(index);
+            self.show(key, made);
+            return true;
+        }
         match speed {
             Speed::Now => {
                 let made = make(&wanted);
-                self.shown = Some((wanted, made));
+                self.show(wanted, made);
                 changed = true;
             }
             Speed::Later(_) | Speed::Quietly => {
@@ -120,6 +134,13 @@ impl<K: Same + Clone + Send + 'static, G: Send + 'static> Slot<K, G> {
         changed
     }
 
+    fn show(&mut self, key: K, made: G) {
+        self.earlier.extend(self.shown.replace((key, made)));
+        if self.earlier.len() > self.kept {
+            self.earlier.remove(0);
+        }
+    }
+
     /// Takes what has been made; whether there was something. Of several handles the newest is made once the last is done.
     fn collect(&mut self, wait: bool) -> bool {
         let Some((key, receiver)) = self.pending.take() else { return false };
@@ -127,7 +148,7 @@ impl<K: Same + Clone + Send + 'static, G: Send + 'static> Slot<K, G> {
         match result {
             Ok((made, seconds)) => {
                 self.seconds += seconds;
-                self.shown = Some((key, made));
+                self.show(key, made);
                 true
             }
             Err(TryRecvError::Empty) => {
@@ -155,6 +176,20 @@ mod tests {
         assert!(slot.follow(Some(other), Speed::Now, |key| **key + 2));
         assert_eq!(slot.shown(), Some(&5));
         assert!(slot.follow(None, Speed::Now, |key| **key) && slot.shown().is_none());
+    }
+
+    #[test]
+    fn what_was_shown_a_while_ago_is_shown_again_without_being_made_again() {
+        let mut slot = Slot::<Arc<u32>, u32>::keeping(2);
+        let handles: Vec<Arc<u32>> = (0..4).map(Arc::new).collect();
+        for handle in &handles {
+            slot.follow(Some(handle.clone()), Speed::Now, |key| **key);
+        }
+        assert!(slot.follow(Some(handles[1].clone()), Speed::Now, |_| panic!("it is still there")));
+        assert!(slot.follow(Some(handles[3].clone()), Speed::Now, |_| panic!("it is still there")));
+        assert_eq!(slot.shown(), Some(&3));
+        slot.follow(Some(handles[0].clone()), Speed::Now, |_| 10);
+        assert_eq!(slot.shown(), Some(&10), "only two are kept");
     }
 
     #[test]

@@ -1,11 +1,10 @@
 //! What the shaders are told: of the scene ([`ViewUniform`], whose change means drawing it anew) and of the screen
-//! ([`ScreenUniform`], which only changes how the drawn scene is shown).
+//! ([`ScreenUniform`], which only changes how the drawn scene is shown). What no number says is in `variants`.
 
 use super::content::{Backdrop, PhotoMode, StageFrame, StageLight};
 use super::eye::Eye;
 use super::frustum::vec3_of;
-use crate::image::display::ToneCurve;
-use glam::{Mat4, UVec4, Vec2, Vec3, Vec4};
+use glam::{Mat4, Vec2, Vec3, Vec4};
 
 /// `View` of `view.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -19,19 +18,16 @@ pub(super) struct ViewUniform {
     other_light: Vec4,
     shading: Vec4,
     backdrop: Vec4,
-    choice: UVec4,
 }
 
 /// `Screen` of `display.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(super) struct ScreenUniform {
-    size: Vec4,
     photo_rect: Vec4,
     numbers: Vec4,
     marks: Vec4,
-    choice: UVec4,
-    pictures: UVec4,
+    size: Vec4,
 }
 
 /// The sizes of a frame.
@@ -43,6 +39,12 @@ pub(super) struct Sizes {
     pub target: [u32; 2],
     /// Pixels of the screen a point.
     pub pixels_per_point: f32,
+}
+
+impl Sizes {
+    fn target_pixels_per_point(&self) -> f32 {
+        self.pixels_per_point * self.target[1] as f32 / self.screen[1].max(1) as f32
+    }
 }
 
 fn vec2_of(size: [u32; 2]) -> Vec2 {
@@ -88,7 +90,7 @@ impl ViewUniform {
                 frame.eye.position_in_world().extend(1.0),
             ),
             focal_centre: Vec4::new(focal.x, focal.y, centre.x, centre.y),
-            size: target.extend(sizes.pixels_per_point * target.y / sizes.screen[1].max(1) as f32).extend(near),
+            size: target.extend(sizes.target_pixels_per_point()).extend(near),
             light: of_light(content.light.as_ref()),
             other_light: of_light(content.other_light.as_ref()),
             shading: Vec4::new(
@@ -98,74 +100,58 @@ impl ViewUniform {
                 if per_unit.is_finite() { per_unit } else { 0.0 },
             ),
             backdrop: match look.backdrop {
-                Backdrop::Light | Backdrop::BlurredLight if content.light.is_none() => Vec4::ZERO,
-                Backdrop::Light => Vec4::W,
-                Backdrop::BlurredLight => Vec4::W * 2.0,
                 Backdrop::Colour(colour) => vec3_of(colour).extend(0.0),
+                Backdrop::Light | Backdrop::BlurredLight => Vec4::ZERO,
             },
-            choice: UVec4::new(look.layer as u32, u32::from(content.vertex_colours.is_some()), 0, 0),
         }
     }
 }
 
 /// Place of the wipe between the lights in [0, 1], where there are two.
-fn light_wipe(frame: &StageFrame) -> Option<f32> {
+pub(super) fn light_wipe(frame: &StageFrame) -> Option<f32> {
     let place = frame.look.light_wipe.filter(|place| place.is_finite())?;
     (frame.content.light.is_some() && frame.content.other_light.is_some()).then_some(place.clamp(0.0, 1.0))
 }
 
 impl ScreenUniform {
-    /// `photo` and `traced` are the sizes of what is uploaded.
-    pub fn new(frame: &StageFrame, sizes: &Sizes, photo: Option<[u32; 2]>, traced: Option<[u32; 2]>) -> Self {
+    /// `photo` and `traced` are the sizes of what is uploaded. Also whether their pixels are those of the target.
+    pub fn new(
+        frame: &StageFrame,
+        sizes: &Sizes,
+        photo: Option<[u32; 2]>,
+        traced: Option<[u32; 2]>,
+    ) -> (Self, [Option<bool>; 2]) {
         let look = &frame.look;
-        let screen = vec2_of(sizes.screen);
-        let (corner, picture) = frame.eye.picture_rect(screen);
-        let through_photo = matches!(frame.eye, Eye::Photo(_));
-        let (mode, amount) = match look.photo_mode {
-            _ if photo.is_none() || !through_photo => (0, 0.0),
-            PhotoMode::Off => (0, 0.0),
-            PhotoMode::Under => (1, 0.0),
-            PhotoMode::Over(opacity) => (2, opacity),
-            PhotoMode::Wipe(place) => (3, place.clamp(0.0, 1.0)),
+        let target = vec2_of(sizes.target);
+        let (corner, picture) = frame.eye.picture_rect(target);
+        let (opacity, wipe) = match look.photo_mode {
+            PhotoMode::Over(opacity) => (opacity, 0.0),
+            PhotoMode::Wipe(place) => (0.0, place.clamp(0.0, 1.0)),
+            PhotoMode::Off | PhotoMode::Under => (0.0, 0.0),
         };
-        // Level of detail: how many pixels of a picture fall on one of the screen.
+        // Level of detail: how many pixels of a picture fall on one of the target.
         let level = |size: Option<[u32; 2]>, shown: Vec2| {
             size.map_or(0.0, |size| (vec2_of(size) / shown.max(Vec2::ONE)).max_element().max(1.0).log2())
         };
-        let exactly = |size: Option<[u32; 2]>, shown: Vec2, corner: Vec2| {
-            u32::from(size.is_some_and(|size| vec2_of(size) == shown) && corner == corner.floor())
-        };
-        ScreenUniform {
-            size: screen.extend(sizes.target[0] as f32).extend(sizes.target[1] as f32),
+        let is_exact = |size: [u32; 2], shown: Vec2, corner: Vec2| vec2_of(size) == shown && corner == corner.floor();
+        let uniform = ScreenUniform {
             photo_rect: Vec4::new(corner.x, corner.y, picture.x, picture.y),
             numbers: Vec4::new(
                 look.display.exposure_stops.exp2(),
-                amount,
+                opacity,
                 level(photo, picture),
-                level(traced, screen),
+                level(traced, target),
             ),
             marks: Vec4::new(
-                light_wipe(frame).map_or(-1.0, |place| place * screen.x),
-                if mode == 3 { amount * screen.x } else { -1.0 },
-                sizes.pixels_per_point.max(0.1),
-                f32::from(u8::from(through_photo)),
+                light_wipe(frame).map_or(0.0, |place| place * target.x),
+                wipe * target.x,
+                sizes.target_pixels_per_point().max(0.1),
+                0.0,
             ),
-            choice: UVec4::new(
-                match look.display.curve {
-                    ToneCurve::Srgb => 0,
-                    ToneCurve::Filmic => 1,
-                    ToneCurve::Linear => 2,
-                },
-                u32::from(look.display.false_colour),
-                u32::from(look.display.stripes),
-                mode,
-            ),
-            pictures: UVec4::new(
-                u32::from(traced.is_some()),
-                exactly(photo, picture, corner),
-                exactly(traced, screen, Vec2::ZERO),
-                0,
-            ),
-        }
+            size: target.extend(0.0).extend(0.0),
+        };
+        let exact =
+            [photo.map(|size| is_exact(size, picture, corner)), traced.map(|size| is_exact(size, target, Vec2::ZERO))];
+        (uniform, exact)
     }
 }

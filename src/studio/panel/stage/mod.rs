@@ -1,25 +1,24 @@
 //! The stage panel: what is drawn from the model, and what the mouse does to it.
 
+mod decorate;
 mod frame;
 mod gauges;
 mod relit;
 mod traced;
 
 use crate::error::Finding;
-use crate::image::value_scale::{Palette, ValueScale, three_digits};
 use crate::insight::cursor::place_in_view;
 use crate::studio::act::Act;
 use crate::studio::layout::Panel;
 use crate::studio::model::edits::PhotoLook;
 use crate::studio::model::laid::CachedOf;
-use crate::studio::model::log::{Message, capitalised};
-use crate::studio::model::tasks::TaskKind;
-use crate::studio::model::{Cursor, FitStatus, Model};
-use crate::studio::picture::scale_bar::scale_bar;
+use crate::studio::model::lights::LightName;
+use crate::studio::model::log::Message;
+use crate::studio::model::{Cursor, Model};
 use crate::studio::stage::eye::Eye;
-use crate::studio::stage::{self, Layer, Stage, StageFrame};
-use crate::studio::theme;
-use egui::{Align2, Color32, CursorIcon, FontId, Pos2, Rect, Response, Stroke, StrokeKind, Ui, pos2, vec2};
+use crate::studio::stage::{self, Backdrop, Layer, Stage, StageFrame};
+use decorate::{colour_bar, decorate};
+use egui::{CursorIcon, Pos2, Rect, Response, Ui};
 use frame::FrameCache;
 use gauges::Gauges;
 use glam::Vec2;
@@ -41,8 +40,37 @@ pub struct StageMemory {
     dragging: Option<Dragging>,
     last_moved: Option<Instant>,
     last_eye: Option<Eye>,
+    last_changed: Option<Instant>,
+    last_look: Option<Look>,
     /// What the stage could not show as it is, as last told.
     told: Vec<Finding>,
+}
+
+/// What a person may change, beside the eye, for which the scene is drawn anew. News of a fit are no part of it.
+#[derive(PartialEq)]
+struct Look {
+    layer: Layer,
+    backdrop: Backdrop,
+    wipe: Option<f32>,
+    lights: (LightName, Option<LightName>),
+    turn_degrees: f32,
+    strength_stops: f32,
+    chosen_view: Option<usize>,
+}
+
+impl Look {
+    fn of(model: &Model, frame: &StageFrame) -> Self {
+        let relight = &model.edits.relight;
+        Look {
+            layer: frame.look.layer,
+            backdrop: frame.look.backdrop,
+            wipe: frame.look.light_wipe,
+            lights: (relight.first.clone(), relight.second.clone()),
+            turn_degrees: relight.turn_degrees,
+            strength_stops: relight.strength_stops,
+            chosen_view: model.project.as_ref().map(|project| project.chosen_view),
+        }
+    }
 }
 
 /// What a drag moves.
@@ -74,18 +102,24 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut StageMemory) {
         return super::empty(ui, "No project open", "Open a scene or the built-in demo");
     }
     let eye = model.eye_in_force();
-    let moved = memory.last_eye.as_ref() != Some(&eye);
-    if moved {
-        memory.last_moved = Some(Instant::now());
-        memory.last_eye = Some(eye);
-    }
-    let settled = memory.last_moved.is_none_or(|then| then.elapsed().as_secs_f32() > SETTLED_SECONDS);
-    if !settled {
-        ui.ctx().request_repaint_after(std::time::Duration::from_secs_f32(SETTLED_SECONDS));
+    let now = Instant::now();
+    if memory.last_eye.replace(eye) != Some(eye) {
+        memory.last_moved = Some(now);
     }
     let mut frame = memory.cache.frame(model, eye, ui.visuals());
-    if model.software_adapter && !settled {
-        // While something moves, a quarter of the pixels is soon enough on a processor.
+    let look = Look::of(model, &frame);
+    if memory.last_look.as_ref() != Some(&look) {
+        memory.last_changed = Some(now);
+        memory.last_look = Some(look);
+    }
+    let rests = |since: Option<Instant>| since.is_none_or(|then| then.elapsed().as_secs_f32() > SETTLED_SECONDS);
+    let settled = rests(memory.last_moved);
+    let is_sharp = !model.software_adapter || (settled && rests(memory.last_changed));
+    if !(settled && is_sharp) {
+        ui.ctx().request_repaint_after(std::time::Duration::from_secs_f32(SETTLED_SECONDS));
+    }
+    if !is_sharp {
+        // While something changes, a quarter of the pixels is soon enough on a processor.
         frame.look.resolution_scale = 0.5;
     }
     let size = ui.available_size();
@@ -238,137 +272,6 @@ fn pin(model: &mut Model, cursor: Option<Cursor>) {
     if model.cursor.is_some() {
         model.act(Act::PanelRecord);
     }
-}
-
-/// Lines, captions and the linked cursor over the stage.
-fn decorate(ui: &mut Ui, model: &Model, frame: &StageFrame, rect: Rect, traced: &str) {
-    let colours = theme::palette(ui.visuals());
-    let painter = ui.painter_at(rect);
-    let size = Vec2::new(rect.width(), rect.height());
-    let caption = |anchor: Align2, text: &str| {
-        if text.is_empty() {
-            return;
-        }
-        let at = anchor.pos_in_rect(&rect.shrink(10.0));
-        let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(13.0), Color32::WHITE);
-        let text_rect = anchor.anchor_size(at, galley.size());
-        painter.rect_filled(text_rect.expand(4.0), 4.0, Color32::from_black_alpha(140));
-        painter.galley(text_rect.min, galley, Color32::WHITE);
-    };
-    let shown = model.shown_layer();
-    let name = Layer::NAMED.iter().find(|(layer, _)| *layer == shown).map_or("", |(_, name)| name);
-    let lit = shown == Layer::Lit;
-    let relight = &model.edits.relight;
-    let told = frame::told_by(shown);
-    caption(
-        Align2::LEFT_TOP,
-        &match told.and_then(|what| model.project.as_ref()?.known.layer(what)) {
-            _ if lit => relight.first.label(),
-            Some(layer) => format!("{name}: {} to {}", three_digits(layer.range[0]), three_digits(layer.range[1])),
-            None => name.to_owned(),
-        },
-    );
-    if let (Some(second), Some(share), true) = (&relight.second, frame.look.light_wipe, lit) {
-        caption(Align2::RIGHT_TOP, &second.label());
-        handle(&painter, rect, share, colours.accent);
-    }
-    if let (PhotoLook::Wipe(share), Eye::Photo(_)) = (model.edits.photo, &frame.eye) {
-        handle(&painter, rect, share, colours.accent);
-    }
-    let mut left = match model.project.as_ref().and_then(|project| project.chosen_name()) {
-        Some(name) if model.switches.looking_through => format!("Camera view: {name}"),
-        _ => String::new(),
-    };
-    if lit && relight.turn_degrees != 0.0 {
-        let turned = format!("environment rotated by {:.0}°", relight.turn_degrees);
-        left = if left.is_empty() { capitalised(&turned) } else { format!("{left}, {turned}") };
-    }
-    caption(Align2::LEFT_BOTTOM, &left);
-    let quick = lit && frame.content.traced.is_none();
-    let clay = model.project.as_ref().is_some_and(|project| project.maps.is_none());
-    let is_untold = told.is_some_and(|what| !model.project.as_ref().is_some_and(|own| own.known.has(what)));
-    let is_measured = shown.is_quantity() && told.is_none();
-    let right = match (quick, clay) {
-        _ if is_untold => model.why_untold(),
-        _ if is_measured && frame.content.quantity.is_none() => match model.tasks.is_running(&TaskKind::Residuals) {
-            true => "Computing residuals…",
-            false => "Not computed: View › Compute residuals",
-        },
-        _ if shown == Layer::Photos && model.project.as_ref().is_some_and(|own| own.laid.is_none()) => {
-            "Projecting photos…"
-        }
-        (_, true) if shown == Layer::Photos && model.fit.status.is_live() => {
-            "The mean of the photos · materials are on their way"
-        }
-        (_, true) if lit && model.fit.status.is_live() => "Materials are on their way",
-        (_, true) if lit || shown == Layer::Photos => match model.can_resume() {
-            true => "No materials yet. Press Resume.",
-            false => "No materials yet. Press Start.",
-        },
-        // Also while a fit runs.
-        _ if lit && !traced.is_empty() => traced,
-        (true, _) if matches!(model.fit.status, FitStatus::Running | FitStatus::Pausing) => {
-            "Raster preview (no shadows) · pause for path tracing"
-        }
-        (true, _) if !model.switches.traced => "Raster preview (no shadows)",
-        _ => traced,
-    };
-    caption(Align2::RIGHT_BOTTOM, right);
-    if let Some(cursor) = &model.cursor
-        && let Some((place, _)) = frame.eye.project(cursor.position, size)
-    {
-        let at = rect.min + vec2(place.x, place.y);
-        let stroke = Stroke::new(1.5, colours.accent);
-        painter.circle_stroke(at, if cursor.pinned { 7.0 } else { 4.0 }, stroke);
-        painter.circle_stroke(at, if cursor.pinned { 8.5 } else { 5.5 }, Stroke::new(1.0, Color32::BLACK));
-    }
-    let border = ui.visuals().widgets.noninteractive.bg_stroke;
-    painter.rect_stroke(rect, 0.0, border, StrokeKind::Inside);
-}
-
-/// The colours of the quantity that is shown, with their values and unit, at the lower left of the stage.
-fn colour_bar(ui: &mut Ui, frame: &StageFrame, rect: Rect) {
-    let layer = frame.look.layer;
-    let (Some(quantity), true) = (&frame.content.quantity, layer.is_quantity()) else { return };
-    let Some((name, unit)) = unit_of(layer) else { return };
-    let logarithmic = layer == Layer::LobeSharing;
-    let [low, high] = if logarithmic { quantity.range.map(f32::exp2) } else { quantity.range };
-    let width = (0.45 * rect.width()).clamp(120.0, 360.0);
-    let place = Rect::from_min_size(pos2(rect.min.x + 10.0, rect.max.y - 62.0), vec2(width, 32.0));
-    if !rect.contains_rect(place) {
-        return;
-    }
-    ui.painter().rect_filled(place.expand(6.0), 4.0, ui.visuals().panel_fill.gamma_multiply(0.85));
-    ui.scope_builder(egui::UiBuilder::new().max_rect(place), |ui| {
-        let scale = ValueScale { low, high, logarithmic };
-        scale_bar(ui, &format!("{name}, colour scale"), &scale, Palette::Scale, unit);
-    });
-}
-
-/// Name of a quantity, and its unit; `None` for layers of colours.
-fn unit_of(layer: Layer) -> Option<(&'static str, &'static str)> {
-    let name = Layer::NAMED.iter().find(|(own, _)| *own == layer)?.1;
-    let unit = match layer {
-        Layer::PhotoError => "linear radiance",
-        Layer::Coverage => "share of the photos",
-        Layer::TimesSeen => "photos",
-        Layer::Disagreement => "0 to 1",
-        Layer::DiffuseDeviation | Layer::SpecularDeviation => "reflectance",
-        Layer::RoughnessDeviation => "r = a²",
-        Layer::LobeSharing => "texels",
-        Layer::Choice => "1 none, 2 shared, 3 own",
-        _ => return None,
-    };
-    Some((name, unit))
-}
-
-/// The grip of a line that can be dragged.
-fn handle(painter: &egui::Painter, rect: Rect, share: f32, colour: Color32) {
-    let x = rect.min.x + share * rect.width();
-    painter.line_segment([pos2(x, rect.min.y), pos2(x, rect.max.y)], Stroke::new(1.5, colour));
-    let grip = Rect::from_center_size(pos2(x, rect.center().y), vec2(10.0, 34.0));
-    painter.rect_filled(grip, 4.0, colour);
-    painter.rect_stroke(grip, 4.0, Stroke::new(1.0, Color32::BLACK), StrokeKind::Outside);
 }
 
 /// Where the linked cursor falls in a view, in pixels of its photo.

@@ -9,6 +9,10 @@ use eframe::wgpu;
 use std::sync::Arc;
 
 impl StageRenderer {
+    pub(super) fn bind_view(&self) -> wgpu::BindGroup {
+        bind(&self.maker.device, &self.pipelines.view_layout, &[self.view_buffer.as_entire_binding()])
+    }
+
     pub(super) fn bind_maps(&self) -> wgpu::BindGroup {
         use wgpu::BindingResource::{Sampler, TextureView};
         let (diffuse, specular) =

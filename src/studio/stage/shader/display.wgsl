@@ -1,19 +1,28 @@
-// The finished picture: radiance through exposure and curve, the photo and the path-traced picture over it, then the
-// frustums and the lines of the wipes. Mirrors `ScreenUniform` in `uniforms.rs`.
+// The finished picture, in the pixels of the targets: radiance through exposure and curve, the photo and the path-traced
+// picture over it, then the frustums and the lines of the wipes. Mirrors `ScreenUniform` in `uniforms.rs`.
+
+// What a pipeline is made for; see `variants.rs`.
+override CURVE: u32 = 0u;
+override FALSE_COLOUR: bool = false;
+override STRIPES: bool = false;
+// 0 off, 1 under, 2 over, 3 wipe.
+override PHOTO_MODE: u32 = 0u;
+override PHOTO_IS_EXACT: bool = false;
+override HAS_TRACED: bool = false;
+override TRACED_IS_EXACT: bool = false;
+override HAS_LIGHT_WIPE: bool = false;
+// The border of the photo is drawn.
+override THROUGH_PHOTO: bool = false;
 
 struct Screen {
-    // Width and height of the rectangle in pixels, width and height of the target of radiance.
-    size: vec4<f32>,
-    // Upper left corner and size of the photo in pixels of the rectangle.
+    // Upper left corner and size of the photo in pixels.
     photo_rect: vec4<f32>,
     // Two to the power of the exposure, opacity or place of the photo, levels of detail of photo and traced picture.
     numbers: vec4<f32>,
-    // Columns of the wipes of light and photo, or below 0; pixels a point; 1 where the photo's border is drawn.
+    // Columns of the wipes of light and photo; pixels a point; padding.
     marks: vec4<f32>,
-    // Curve, 1 for false colour, 1 for stripes, mode of the photo: 0 off, 1 under, 2 over, 3 wipe.
-    choice: vec4<u32>,
-    // 1 for a traced picture, 1 where photo, traced picture are shown pixel by pixel, padding.
-    pictures: vec4<u32>,
+    // Width and height in pixels, padding.
+    size: vec4<f32>,
 }
 
 @group(0) @binding(0) var<uniform> screen: Screen;
@@ -44,7 +53,7 @@ fn shown(pixel: vec4<f32>, place: vec2<f32>) -> vec3<f32> {
         return pixel.rgb;
     }
     let exposed = pixel.rgb * select(1.0, screen.numbers.x, kind < 1.5);
-    if screen.choice.z != 0u && (u32(place.y) + u32(place.x)) / STRIPE_PIXELS % 2u == 0u {
+    if STRIPES && (u32(place.y) + u32(place.x)) / STRIPE_PIXELS % 2u == 0u {
         let largest = max(exposed.r, max(exposed.g, exposed.b));
         if largest > 1.0 {
             return TOO_BRIGHT;
@@ -53,29 +62,10 @@ fn shown(pixel: vec4<f32>, place: vec2<f32>) -> vec3<f32> {
             return TOO_DARK;
         }
     }
-    if screen.choice.y != 0u {
+    if FALSE_COLOUR {
         return scale_colour(dot(exposed, vec3(0.2126, 0.7152, 0.0722)));
     }
-    let curve = screen.choice.x;
-    return vec3(encode(exposed.r, curve), encode(exposed.g, curve), encode(exposed.b, curve));
-}
-
-fn target_at(place: vec2<i32>) -> vec4<f32> {
-    return textureLoad(radiance_target, clamp(place, vec2(0), vec2<i32>(screen.size.zw) - 1), 0);
-}
-
-// Kinds must not be mixed, and bright pixels would swallow dark ones: colours are mixed, as they are shown.
-fn scene(place: vec2<f32>) -> vec3<f32> {
-    let scaled = place * screen.size.zw / screen.size.xy;
-    if all(screen.size.xy == screen.size.zw) {
-        return shown(target_at(vec2<i32>(scaled)), place);
-    }
-    let corner = floor(scaled - 0.5);
-    let share = scaled - 0.5 - corner;
-    let first = vec2<i32>(corner);
-    let upper = mix(shown(target_at(first), place), shown(target_at(first + vec2(1, 0)), place), share.x);
-    let lower = mix(shown(target_at(first + vec2(0, 1)), place), shown(target_at(first + vec2(1, 1)), place), share.x);
-    return mix(upper, lower, share.y);
+    return vec3(encode(exposed.r, CURVE), encode(exposed.g, CURVE), encode(exposed.b, CURVE));
 }
 
 // A pixel of a picture marks what is not finite by alpha 0; a filter may have mixed it with others.
@@ -88,9 +78,6 @@ fn over(below: vec3<f32>, above: vec3<f32>, opacity: f32) -> vec3<f32> {
 }
 
 fn mark(colour: vec3<f32>, place: f32, line: f32) -> vec3<f32> {
-    if line < 0.0 {
-        return colour;
-    }
     // A light line in a dark one, seen on any picture.
     let away = abs(place - line) / screen.marks.z;
     let dark = mix(vec3(0.0), colour, clamp(away - 0.4, 0.55, 1.0));
@@ -101,39 +88,46 @@ fn mark(colour: vec3<f32>, place: f32, line: f32) -> vec3<f32> {
 fn colour_of_screen(corner: ScreenCorner) -> @location(0) vec4<f32> {
     let place = corner.place;
     let of_size = place / screen.size.xy;
-    var colour = scene(place);
-    if screen.pictures.x != 0u {
-        var pixel = textureSampleLevel(traced, smooth_sampler, of_size, screen.numbers.w);
-        if screen.pictures.z != 0u {
+    let drawn = textureLoad(radiance_target, vec2<i32>(place), 0);
+    var colour: vec3<f32>;
+    if HAS_TRACED {
+        var pixel: vec4<f32>;
+        if TRACED_IS_EXACT {
             pixel = textureLoad(traced, vec2<i32>(place), 0);
+        } else {
+            pixel = textureSampleLevel(traced, smooth_sampler, of_size, screen.numbers.w);
         }
         colour = shown(of_picture(pixel), place);
+    } else {
+        colour = shown(drawn, place);
     }
     let in_photo = place - screen.photo_rect.xy;
     let is_in_photo = all(in_photo >= vec2(0.0)) && all(in_photo < screen.photo_rect.zw);
-    let mode = screen.choice.w;
-    if mode != 0u && is_in_photo {
-        var pixel = textureSampleLevel(photo, smooth_sampler, in_photo / screen.photo_rect.zw, screen.numbers.z);
-        if screen.pictures.y != 0u {
+    if PHOTO_MODE != 0u && is_in_photo {
+        var pixel: vec4<f32>;
+        if PHOTO_IS_EXACT {
             pixel = textureLoad(photo, vec2<i32>(in_photo), 0);
+        } else {
+            pixel = textureSampleLevel(photo, smooth_sampler, in_photo / screen.photo_rect.zw, screen.numbers.z);
         }
         let photo_colour = shown(of_picture(pixel), place);
-        if mode == 1u {
-            let scaled = vec2<i32>(place * screen.size.zw / screen.size.xy);
-            colour = select(colour, photo_colour, target_at(scaled).a >= BEHIND - 0.5);
-        } else if mode == 2u {
+        if PHOTO_MODE == 1u {
+            colour = select(colour, photo_colour, drawn.a >= BEHIND - 0.5);
+        } else if PHOTO_MODE == 2u {
             colour = over(colour, photo_colour, screen.numbers.y);
         } else {
             colour = select(colour, photo_colour, place.x < screen.marks.y);
         }
     }
-    let overlay = textureSampleLevel(overlay_target, smooth_sampler, of_size, 0.0);
+    let overlay = textureLoad(overlay_target, vec2<i32>(place), 0);
     colour = colour * (1.0 - overlay.a) + overlay.rgb;
-    colour = mark(colour, place.x, screen.marks.x);
-    if is_in_photo {
+    if HAS_LIGHT_WIPE {
+        colour = mark(colour, place.x, screen.marks.x);
+    }
+    if PHOTO_MODE == 3u && is_in_photo {
         colour = mark(colour, place.x, screen.marks.y);
     }
-    if screen.marks.w > 0.5 {
+    if THROUGH_PHOTO {
         let outside = max(screen.photo_rect.xy - place, place - screen.photo_rect.xy - screen.photo_rect.zw);
         let away = max(outside.x, outside.y) / screen.marks.z;
         // Around the photo, not on it: none of its pixels is hidden.

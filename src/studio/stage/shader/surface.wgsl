@@ -12,6 +12,15 @@
 @group(2) @binding(4) var other_light_layers: texture_2d_array<f32>;
 @group(2) @binding(5) var reflectance_table: texture_2d<f32>;
 
+// What of all this a pipeline is made for: what is not chosen costs nothing, on a processor too, which computes both sides
+// of a branch. See `variants.rs`.
+override LAYER: u32 = 0u;
+override HAS_LOBE: bool = false;
+override HAS_OTHER_LIGHT: bool = false;
+override HAS_COLOURS: bool = false;
+// 0 one colour, 1 the light, 2 the light out of focus.
+override BACKDROP: u32 = 0u;
+
 const PI = 3.14159265358979;
 
 struct Corner {
@@ -52,7 +61,7 @@ fn place_on_map(direction: vec3<f32>) -> vec2<f32> {
 }
 
 fn is_other_light(column: f32) -> bool {
-    return column >= view.shading.x;
+    return HAS_OTHER_LIGHT && column >= view.shading.x;
 }
 
 fn light_towards(direction: vec3<f32>, column: f32) -> vec3<f32> {
@@ -92,7 +101,7 @@ fn lit(place: vec3<f32>, normal: vec3<f32>, uv: vec2<f32>, column: f32) -> vec3<
     let cosine = clamp(dot(normal, towards_eye), 0.0, 1.0);
     let width = sqrt(clamp(specular.a, 0.0, 1.0));
     var radiance = clamp(diffuse, vec3(0.0), vec3(1.0)) * blurred_light(normal, 0, column);
-    if view.shading.y > 0.0 {
+    if HAS_LOBE {
         let table = textureSampleLevel(reflectance_table, map_sampler, vec2(cosine, width), 0.0).xy;
         let reflected = clamp(specular.rgb, vec3(0.0), vec3(1.0)) * table.x + table.y;
         let about = reflect(-towards_eye, normal);
@@ -117,7 +126,7 @@ fn colour_of_mesh(corner: Corner, @builtin(front_facing) is_front: bool) -> @loc
     let uv = vec2(corner.uv.x, 1.0 - corner.uv.y);
     // Rows of the target do not matter here, and columns are the same on every adapter.
     let column = corner.clip.x;
-    switch view.choice.x {
+    switch LAYER {
         case 0u: {
             return vec4(min(lit(corner.place, normal, uv, column), vec3(LARGEST)), RADIANCE);
         }
@@ -140,7 +149,7 @@ fn colour_of_mesh(corner: Corner, @builtin(front_facing) is_front: bool) -> @loc
         }
         case 15u: {
             let on_map = textureSample(diffuse_map, map_sampler, uv).rgb;
-            if view.choice.y == 0u {
+            if !HAS_COLOURS {
                 return vec4(min(on_map, vec3(LARGEST)), RADIANCE);
             }
             if corner.colour.a < 0.01 {
@@ -174,7 +183,7 @@ fn corner_behind(@builtin(vertex_index) index: u32) -> Behind {
 
 @fragment
 fn colour_behind(behind: Behind) -> @location(0) vec4<f32> {
-    if view.backdrop.w < 0.5 {
+    if BACKDROP == 0u {
         return vec4(view.backdrop.rgb, READY + BEHIND);
     }
     let on_plane = (behind.place - view.focal_centre.zw) / view.focal_centre.xy;
@@ -182,7 +191,7 @@ fn colour_behind(behind: Behind) -> @location(0) vec4<f32> {
     let direction = axes[0].xyz * on_plane.x + axes[1].xyz * on_plane.y + axes[2].xyz;
     let towards = normalize(direction);
     var radiance: vec3<f32>;
-    if view.backdrop.w > 1.5 {
+    if BACKDROP == 2u {
         radiance = blurred_light(towards, OUT_OF_FOCUS, behind.place.x);
     } else {
         radiance = light_towards(towards, behind.place.x);

@@ -13,10 +13,8 @@ struct View {
     other_light: vec4<f32>,
     // Column of the target where the first light ends, strength of the specular lobe, lower end of the scale, 1 over its length.
     shading: vec4<f32>,
-    // sRGB of the background; 1 where the light is shown instead.
+    // sRGB of the background, padding.
     backdrop: vec4<f32>,
-    // Layer; 1 where photos are shown as colours of vertices; padding.
-    choice: vec4<u32>,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
