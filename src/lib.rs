@@ -130,7 +130,7 @@ pub use atlas::{Atlas, AtlasSettings, KeepUv, build as build_atlas};
 pub use cli::run as run_command_line;
 pub use error::{Error, ErrorKind, Finding, Place, Result, Severity};
 pub use export::RunFolder;
-pub use fit::{FitSettings, Fitter, LossRow, Method, Preset, StepOutcome, ViewUse};
+pub use fit::{FitSettings, Fitter, LossRow, Method, Preset, ViewUse};
 pub use image::file::keep_decoders_quiet;
 pub use image::{GreyImage, Image, RgbImage};
 pub use job::demo::write_folder as write_demo_folder;
@@ -141,11 +141,17 @@ pub use job::{Command, Event, JobHandle, JobOptions, Progress, RunSettings, Snap
 pub use lab::cli::run as run_lab;
 pub use light::Environment;
 pub use material::{LobeModel, MaterialMaps};
-pub use measured::{HalfDifference, MeasuredBrdf, ReflectanceModel};
-pub use object::{Estimate, Known, ObjectGeometry, ObjectPhoto, ObjectSettings, ObjectView, StartedModel, estimate};
 pub use render::Surface;
 pub use scene::demo::DemoSettings;
 pub use scene::doctor::{Report as CheckReport, check};
 pub use scene::settings::{BackgroundChoice, ColourEncoding, MaskUse, PixelCentre, Up};
 pub use scene::{Background, Camera, Mesh, Photo, PixelState, ReadSettings, Scene, Truth, View, WorldFromSource};
 pub use scene::{read, read_mesh};
+
+/// Object mode: light and measured reflectance from one photo of a single object, as `patina object` finds them.
+pub mod object_mode {
+    pub use crate::measured::{HalfDifference, MeasuredBrdf, ReflectanceModel};
+    pub use crate::object::{
+        Estimate, Known, ObjectGeometry, ObjectPhoto, ObjectSettings, ObjectView, StartedModel, estimate,
+    };
+}
