@@ -4,14 +4,13 @@
 use super::tasks::TaskKind;
 use super::{Done, Model};
 use crate::error::{Error, ErrorKind};
-use crate::image::Image;
 use crate::insight::projected_photos::{ProjectedPhotos, WeightedColour};
 use crate::job::relit;
 use crate::material::MaterialMaps;
 use crate::render::Surface;
 use crate::render::cached::CachedTransport;
 use crate::scene::Mesh;
-use crate::studio::stage::Layer;
+use crate::studio::stage::{CoveredTexels, Layer};
 use std::sync::Arc;
 
 /// The photos on the surface.
@@ -23,7 +22,7 @@ pub struct LaidPhotos {
     /// Colours of its vertices; until there are those of texels.
     pub vertices: Option<Arc<Vec<WeightedColour>>>,
     /// Colours of the texels of its atlas as a diffuse map, and which of them some photo sees.
-    pub texels: Option<(Arc<MaterialMaps>, Arc<Image<bool>>)>,
+    pub texels: Option<(Arc<MaterialMaps>, Arc<CoveredTexels>)>,
 }
 
 /// A cache, and the surface it is of.
@@ -60,7 +59,7 @@ impl Model {
             match surface {
                 Some(surface) => {
                     let (maps, seen) = laid.projected.of_texels(&surface, map_size);
-                    laid.texels = Some((Arc::new(maps), Arc::new(seen)));
+                    laid.texels = Some((Arc::new(maps), Arc::new(CoveredTexels::new(Box::new(move || seen)))));
                 }
                 None => laid.vertices = Some(Arc::new(laid.projected.of_vertices(&laid.mesh))),
             }

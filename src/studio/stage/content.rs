@@ -10,7 +10,7 @@ use crate::light::Environment;
 use crate::material::{LobeModel, MaterialMaps};
 use crate::scene::{Camera, Mesh};
 use eframe::egui::Color32;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 /// What is drawn on the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -145,6 +145,9 @@ impl StageCamera {
     }
 }
 
+/// Texels inside a chart, found where they are first asked for: on the thread that uploads the maps.
+pub type CoveredTexels = LazyLock<Image<bool>, Box<dyn FnOnce() -> Image<bool> + Send>>;
+
 /// What the stage shows.
 #[derive(Clone, Debug)]
 pub struct StageContent {
@@ -153,7 +156,7 @@ pub struct StageContent {
     /// Its maps; grey clay without.
     pub maps: Option<Arc<MaterialMaps>>,
     /// Texels of the maps inside a chart. Where known, the filters of the textures do not mix in what is outside.
-    pub covered: Option<Arc<Image<bool>>>,
+    pub covered: Option<Arc<CoveredTexels>>,
     /// Linear colours of the mesh's vertices times their weights, and the weights in [0, 1]; for [`Layer::Photos`].
     pub vertex_colours: Option<Arc<Vec<[f32; 4]>>>,
     /// Strength of the specular lobe in [0, 1]; 0 for maps without one.

@@ -41,7 +41,8 @@ mod uniforms;
 mod variants;
 
 pub use content::{
-    Backdrop, Layer, PhotoMode, StageCamera, StageContent, StageFrame, StageLight, StageLook, StageQuantity,
+    Backdrop, CoveredTexels, Layer, PhotoMode, StageCamera, StageContent, StageFrame, StageLight, StageLook,
+    StageQuantity,
 };
 pub use frustum::{frustum_depth, pick_camera};
 pub use navigate::{Navigation, navigate};

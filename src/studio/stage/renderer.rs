@@ -6,7 +6,7 @@
 mod binding;
 mod drawing;
 
-use super::content::{StageFrame, StageLight};
+use super::content::{CoveredTexels, StageFrame, StageLight};
 use super::light::{self, PreparedLight};
 use super::mesh::GpuMesh;
 use super::overlay::Overlay;
@@ -50,7 +50,7 @@ pub struct StageStatus {
 }
 
 type MeshKey = (Arc<Mesh>, Option<Arc<Vec<[f32; 4]>>>);
-type MapsKey = (Arc<MaterialMaps>, Option<Arc<Image<bool>>>);
+type MapsKey = (Arc<MaterialMaps>, Option<Arc<CoveredTexels>>);
 /// A light, and the microfacets that it is blurred by.
 type LightKey = (Arc<Environment>, LobeModel);
 
@@ -226,8 +226,9 @@ impl StageRenderer {
         let maker = self.maker.clone();
         let texels = content.maps.as_ref().map_or(0, |maps| pixels(&maps.diffuse));
         let key = content.maps.clone().map(|maps| (maps, content.covered.clone()));
-        changed |=
-            self.maps.follow(key, speed(texels), move |(maps, covered)| maker.materials(maps, covered.as_deref()));
+        changed |= self.maps.follow(key, speed(texels), move |(maps, covered)| {
+            maker.materials(maps, covered.as_deref().map(|covered| &**covered))
+        });
 
         let maker = self.maker.clone();
         // Uploaded only while it is looked at: nobody needs the four quantities of a fit at once.

@@ -13,7 +13,8 @@ use patina::scene::demo::{DemoSettings, build};
 use patina::studio::stage::eye::Eye;
 use patina::studio::stage::eye::OrbitEye;
 use patina::studio::stage::{
-    Backdrop, Layer, PhotoMode, StageCamera, StageContent, StageFrame, StageLight, StageQuantity, frustum_depth,
+    Backdrop, CoveredTexels, Layer, PhotoMode, StageCamera, StageContent, StageFrame, StageLight, StageQuantity,
+    frustum_depth,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -108,7 +109,10 @@ fn pictures_of_the_demo_scene() {
     let content = StageContent {
         mesh: Some(Arc::new(demo.scene.mesh.clone())),
         maps: Some(Arc::new(truth.maps.clone())),
-        covered: Some(Arc::new(demo.covered.clone())),
+        covered: Some({
+            let covered = demo.covered.clone();
+            Arc::new(CoveredTexels::new(Box::new(move || covered)))
+        }),
         light: Some(StageLight::new(Arc::new(truth.environment.clone()))),
         quantity: Some(StageQuantity { texels: Arc::new(noise), range: [-2.0, 2.0] }),
         ..StageContent::default()

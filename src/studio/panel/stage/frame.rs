@@ -1,6 +1,6 @@
 //! From the model to a frame of the stage. What is costly to make is made once and kept.
 
-use crate::image::{GreyImage, Image, RgbImage};
+use crate::image::{GreyImage, RgbImage};
 use crate::job::prepare::covered;
 use crate::render::Surface;
 use crate::scene::Scene;
@@ -10,8 +10,8 @@ use crate::studio::model::lights::LightName;
 use crate::studio::model::{Model, Project};
 use crate::studio::stage::eye::Eye;
 use crate::studio::stage::{
-    Backdrop, Layer, PhotoMode, StageCamera, StageContent, StageFrame, StageLight, StageLook, StageQuantity,
-    frustum_depth,
+    Backdrop, CoveredTexels, Layer, PhotoMode, StageCamera, StageContent, StageFrame, StageLight, StageLook,
+    StageQuantity, frustum_depth,
 };
 use crate::studio::theme;
 use egui::Visuals;
@@ -21,7 +21,7 @@ use std::sync::Arc;
 #[derive(Default)]
 pub struct FrameCache {
     photo: Option<(Arc<Scene>, usize, Arc<RgbImage>)>,
-    covered: Option<(Arc<Surface>, usize, Arc<Image<bool>>)>,
+    covered: Option<(Arc<Surface>, usize, Arc<CoveredTexels>)>,
     lights: Vec<(LightName, bool, Arc<crate::light::Environment>, Arc<crate::light::Environment>)>,
     cameras: Option<(CameraKey, Arc<Vec<StageCamera>>)>,
 }
@@ -120,14 +120,15 @@ impl FrameCache {
     }
 
     /// Texels of a chart at the size of the maps.
-    fn covered(&mut self, project: &Project) -> Option<Arc<Image<bool>>> {
+    fn covered(&mut self, project: &Project) -> Option<Arc<CoveredTexels>> {
         let (surface, maps) = (project.surface.as_ref()?, project.maps.as_ref()?);
         let size = maps.diffuse.width();
         let known = self.covered.as_ref().filter(|(own, width, _)| Arc::ptr_eq(own, surface) && *width == size);
         if let Some((.., texels)) = known {
             return Some(Arc::clone(texels));
         }
-        let texels = Arc::new(covered(surface, size));
+        let own = Arc::clone(surface);
+        let texels: Arc<CoveredTexels> = Arc::new(CoveredTexels::new(Box::new(move || covered(&own, size))));
         self.covered = Some((Arc::clone(surface), size, Arc::clone(&texels)));
         Some(texels)
     }
