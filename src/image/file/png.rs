@@ -15,14 +15,32 @@ pub fn declared(bytes: &[u8]) -> Declared {
     }
 }
 
+/// The chunk that a PNG ends with.
+pub const END: &[u8; 12] = b"\0\0\0\0IEND\xae\x42\x60\x82";
+
+/// Whether the file declares code points: they say what the colours are, whatever its profile says.
+pub fn has_code_points(bytes: &[u8]) -> bool {
+    chunks(bytes).any(|(name, body)| name == b"cICP" && body.len() == 4)
+}
+
+/// The chunks before the pixels: name and content.
+fn chunks(bytes: &[u8]) -> impl Iterator<Item = (&[u8], &[u8])> {
+    let mut position = 8;
+    std::iter::from_fn(move || {
+        let head = bytes.get(position..position + 8)?;
+        let length = u32::from_be_bytes([head[0], head[1], head[2], head[3]]) as usize;
+        let body = bytes.get(position + 8..(position + 8).saturating_add(length))?;
+        position = (position + 12).saturating_add(length);
+        (!matches!(&head[4..8], b"IDAT" | b"IEND")).then_some((&head[4..8], body))
+    })
+}
+
 /// The colour space; `None` for sRGB, the name of what is not read as an error.
 fn space_of(bytes: &[u8]) -> Result<Option<ColourSpace>, String> {
-    let mut position = 8;
     let (mut gamma, mut primaries, mut code_points, mut is_srgb) = (None, None, None, false);
-    while let Some(head) = bytes.get(position..position + 8) {
-        let length = u32::from_be_bytes([head[0], head[1], head[2], head[3]]) as usize;
-        let Some(body) = bytes.get(position + 8..(position + 8).saturating_add(length)) else { break };
-        match &head[4..8] {
+    for (name, body) in chunks(bytes) {
+        let length = body.len();
+        match name {
             b"gAMA" if length == 4 => gamma = numbers::<1>(body).map(|[gamma]| gamma),
             b"cHRM" if length == 32 => {
                 let xy = DVec2::new;
@@ -35,10 +53,8 @@ fn space_of(bytes: &[u8]) -> Result<Option<ColourSpace>, String> {
             }
             b"cICP" if length == 4 => code_points = Some([body[0], body[1], body[2], body[3]]),
             b"sRGB" => is_srgb = true,
-            b"IDAT" | b"IEND" => break,
             _ => {}
         }
-        position = (position + 12).saturating_add(length);
     }
     if let Some(points) = code_points {
         return space_of_code_points(points).map(|space| (!space.is_srgb()).then_some(space));
@@ -61,12 +77,16 @@ fn space_of(bytes: &[u8]) -> Result<Option<ColourSpace>, String> {
     Ok((!space.is_srgb()).then_some(space))
 }
 
+/// The inverse of the curve of ITU-R BT.709 (item 1.2), which BT.601 and BT.2020 share: what a camera of video undoes.
+const INVERSE_BT709: [f64; 7] = [1.0 / 0.45, 1.0 / 1.099, 0.099 / 1.099, 1.0 / 4.5, 0.081, 0.0, 0.0];
+
 /// The colour space of coding-independent code points (ITU-T H.273): primaries, transfer, matrix, range. The name of what is
 /// not read as an error.
 fn space_of_code_points([primaries, transfer, matrix, range]: [u8; 4]) -> Result<ColourSpace, String> {
     let curve = match transfer {
-        // Those of video are near enough to their own inverse only; sRGB is what still images carry.
-        1 | 2 | 6 | 13 | 14 | 15 => Curve::Srgb,
+        // What is not specified is sRGB, as still images are.
+        2 | 13 => Curve::Srgb,
+        1 | 6 | 14 | 15 => Curve::Parametric(INVERSE_BT709),
         4 => Curve::Gamma(2.2),
         5 => Curve::Gamma(2.8),
         8 => Curve::Linear,
@@ -134,6 +154,10 @@ mod tests {
         assert_eq!(linear, ColourSpace::of_curve(Curve::Linear));
         let p3 = space(b"cICP", &[12, 13, 0, 1]);
         assert!(p3.curves[0] == Curve::Srgb && (p3.rec709_from_rgb.unwrap() * Vec3::X).x > 1.2);
+        let video = space(b"cICP", &[1, 1, 0, 1]);
+        for (linear, stored) in [(0.01f32, 0.045), (0.18, 1.099 * 0.18f32.powf(0.45) - 0.099)] {
+            assert!((video.curves[0].linear(stored) - linear).abs() < 1e-5);
+        }
         let wide = [31_270u32, 32_900, 70_800, 29_200, 17_000, 79_700, 13_100, 4_600];
         let wide: Vec<u8> = wide.into_iter().flat_map(u32::to_be_bytes).collect();
         let wide = space(b"cHRM", &wide);
@@ -148,12 +172,56 @@ mod tests {
         })
     }
 
+    /// A chunk with its length and its sum.
+    fn chunk(name: &[u8], body: &[u8]) -> Vec<u8> {
+        let whole = [name, body].concat();
+        [&(body.len() as u32).to_be_bytes(), &whole[..], &check_sum(&whole).to_be_bytes()].concat()
+    }
+
+    #[test]
+    fn code_points_go_before_a_profile() {
+        let encoded = {
+            use ::image::ImageEncoder;
+            let mut bytes = Vec::new();
+            let mut encoder = ::image::codecs::png::PngEncoder::new(&mut bytes);
+            encoder.set_icc_profile(moxcms::ColorProfile::new_display_p3().encode().unwrap()).unwrap();
+            encoder.write_image(&[200, 20, 20], 1, 1, ::image::ExtendedColorType::Rgb8).unwrap();
+            bytes
+        };
+        let red = |bytes: &[u8]| {
+            let photo = file::read_photo_from(Path::new("a.png"), bytes.to_vec(), &PhotoOptions::default()).unwrap();
+            match photo.pixels {
+                file::PhotoPixels::Srgb8(bytes) => f32::from(bytes.pixels()[0][0]),
+                file::PhotoPixels::Linear(image) => image.pixels()[0].x,
+            }
+        };
+        let linear = [&encoded[..33], &chunk(b"cICP", &[1, 8, 0, 1]), &encoded[33..]].concat();
+        assert!(red(&encoded) > 0.6, "of Display P3, redder than Rec. 709");
+        assert!((red(&linear) - 200.0 / 255.0).abs() < 1e-5);
+        let srgb = [&encoded[..33], &chunk(b"cICP", &[1, 13, 0, 1]), &encoded[33..]].concat();
+        assert_eq!(red(&srgb), 200.0);
+    }
+
+    #[test]
+    fn a_file_without_its_end_is_read_where_all_pixels_are_there() {
+        let whole = file::encode_png_srgb8(&Image::from_fn(9, 7, |row, column| [row as u8, column as u8, 90])).unwrap();
+        let read = |bytes: &[u8]| file::read_photo_from(Path::new("a.png"), bytes.to_vec(), &PhotoOptions::default());
+        assert!(whole.ends_with(END) && read(&whole).unwrap().findings.is_empty());
+        let pixels = &whole[..whole.len() - END.len()];
+        let photo = read(pixels).unwrap();
+        assert_eq!(photo.findings[0].code, "png-no-end");
+        assert_eq!(read(&pixels[..pixels.len() - 8]).unwrap_err().kind(), ErrorKind::Malformed);
+        // A part of the pixels in a chunk that is whole by itself.
+        let place = whole.windows(4).position(|name| name == b"IDAT").unwrap();
+        let part = [&whole[..place - 4], &chunk(b"IDAT", &whole[place + 4..place + 20])].concat();
+        assert_eq!(read(&part).unwrap_err().kind(), ErrorKind::Malformed);
+    }
+
     #[test]
     fn a_photo_of_pq_is_refused_with_a_way_out_unless_its_curve_is_given() {
         let plain = file::encode_png_srgb8(&Image::filled(4, 3, [90, 100, 110])).unwrap();
-        let body = [&b"cICP"[..], &[9, 16, 0, 1]].concat();
         // Behind the header, which is the first chunk.
-        let bytes = [&plain[..33], &4u32.to_be_bytes(), &body, &check_sum(&body).to_be_bytes(), &plain[33..]].concat();
+        let bytes = [&plain[..33], &chunk(b"cICP", &[9, 16, 0, 1]), &plain[33..]].concat();
         let read = |encoding| {
             let options = PhotoOptions { encoding, ..Default::default() };
             file::read_photo_from(Path::new("a.png"), bytes.clone(), &options)

@@ -29,9 +29,23 @@ pub fn read(source: &Source) -> Result<(Stored, exif::Exif)> {
     if is_jpeg {
         findings = check_jpeg(source)?;
     }
-    let decoded = decode(source, &source.bytes)?;
+    let decoded = match decode(source, &source.bytes) {
+        Err(error) if !is_jpeg => {
+            // A decoder of PNG misses what is missing: with an end behind them, the pixels are all there or none are taken.
+            let has_end = source.bytes.windows(png::END.len()).any(|bytes| bytes == png::END);
+            let ended = || decode(source, &[&source.bytes[..], png::END].concat()).ok();
+            let Some(decoded) = (!has_end).then(ended).flatten() else { return Err(error) };
+            findings.push(
+                Finding::new(Severity::Note, "png-no-end", "the PNG has no end marker, but all pixels are there")
+                    .remedy("copy the photo again if it may have been cut short"),
+            );
+            decoded
+        }
+        decoded => decoded?,
+    };
     let declared = if is_jpeg { Declared::Nothing } else { png::declared(&source.bytes) };
     let Decoded { image, icc, exif } = decoded;
+    let icc = icc.filter(|_| is_jpeg || !png::has_code_points(&source.bytes));
     let (width, height) = (image.width() as usize, image.height() as usize);
     let channels = usize::from(image.color().channel_count());
     let has_alpha = image.color().has_alpha();

@@ -9,8 +9,9 @@ use super::{exif, format};
 use crate::error::{Error, ErrorKind, Place, Result};
 use std::io::{BufRead, Cursor, Read, Seek};
 use std::path::Path;
+use tiff::TiffUnsupportedError::{InterpretationWithBits, UnknownCompressionMethod, UnsupportedCompressionMethod};
 use tiff::decoder::{Decoder, DecodingResult, Limits};
-use tiff::tags::Tag;
+use tiff::tags::{CompressionMethod, PhotometricInterpretation, Tag};
 use tiff::{ColorType, TiffError};
 
 /// Most bytes that one byte of a strip can stand for: deflate at its best (1032), with room for tags.
@@ -68,6 +69,12 @@ fn header_of(cursor: &mut Cursor<&[u8]>) -> std::result::Result<(TiffHeader, Col
     let format = decoder.find_tag_unsigned_vec::<u16>(Tag::SampleFormat)?.unwrap_or_default();
     let header = TiffHeader { width: width as usize, height: height as usize, is_float: format.first() == Some(&3) };
     Ok((header, colour))
+}
+
+fn refused_compression(path: &Path, method: &str) -> Error {
+    Error::new(ErrorKind::Unsupported, format!("a TIFF compressed by {method} is not read"))
+        .at(Place::File(path.into()))
+        .remedy("save it without compression, or with LZW or deflate (ZIP)")
 }
 
 fn refused_kind(path: &Path, kind: &str) -> Error {
@@ -158,6 +165,16 @@ fn interleaved(samples: DecodingResult, channels: usize, pixels: usize) -> Decod
 
 fn explain(error: TiffError, path: &Path) -> Error {
     match error {
+        TiffError::UnsupportedError(UnsupportedCompressionMethod(method)) => match method {
+            CompressionMethod::JPEG | CompressionMethod::ModernJPEG => refused_compression(path, "JPEG"),
+            method => refused_compression(path, &format!("{method:?}")),
+        },
+        TiffError::UnsupportedError(UnknownCompressionMethod) => {
+            refused_compression(path, "a method that is not known")
+        }
+        TiffError::UnsupportedError(InterpretationWithBits(PhotometricInterpretation::RGBPalette, _)) => {
+            refused_kind(path, "indexed colours, whose pixels are numbers of a palette,")
+        }
         TiffError::UnsupportedError(what) => refused_kind(path, &what.to_string()),
         TiffError::LimitsExceeded | TiffError::IntSizeError => {
             implausible(path, "the file claims more than it can hold".into())
@@ -165,5 +182,46 @@ fn explain(error: TiffError, path: &Path) -> Error {
         TiffError::IoError(error) if error.kind() != std::io::ErrorKind::UnexpectedEof => Error::reading(path, error),
         other => malformed(path, 0, format!("the file breaks its format: {other}"))
             .remedy("the file is cut short or damaged: copy it again"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The directory of a picture of one pixel with this compression and meaning of its numbers.
+    fn directory(compression: u16, interpretation: u16) -> Vec<u8> {
+        let channels = if interpretation == 2 { 3 } else { 1 };
+        let entries: [(u16, u16); 9] = [
+            (256, 1),
+            (257, 1),
+            (258, 8),
+            (259, compression),
+            (262, interpretation),
+            (273, 8),
+            (277, channels),
+            (278, 1),
+            (279, 3),
+        ];
+        let mut bytes = b"II*\0\x08\0\0\0".to_vec();
+        bytes.extend((entries.len() as u16).to_le_bytes());
+        for (tag, value) in entries {
+            bytes.extend([tag.to_le_bytes(), 3u16.to_le_bytes(), [1, 0], [0, 0], value.to_le_bytes(), [0, 0]].concat());
+        }
+        bytes.extend([0; 4]);
+        bytes
+    }
+
+    #[test]
+    fn what_is_not_read_is_named_with_the_way_out_that_helps() {
+        let error = |compression, interpretation| {
+            let bytes = directory(compression, interpretation);
+            Source::of_bytes(Path::new("a.tif"), bytes).and_then(|source| read(&source)).err().unwrap()
+        };
+        let jpeg = error(7, 1);
+        assert_eq!(jpeg.kind(), ErrorKind::Unsupported);
+        assert!(jpeg.message().contains("compressed by JPEG") && jpeg.remedy_text().contains("LZW"), "{jpeg}");
+        let palette = error(1, 3);
+        assert!(palette.message().contains("palette") && palette.remedy_text().contains("RGB"), "{palette}");
     }
 }
