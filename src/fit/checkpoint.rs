@@ -153,7 +153,7 @@ pub fn summary(path: &Path) -> Result<Summary> {
 /// `Missing`, `Unreadable` or `Malformed`, with the place.
 pub fn read(path: &Path) -> Result<FitState> {
     let bytes = std::fs::read(path).map_err(|source| {
-        Error::reading(path, source).remedy("a run writes it while it goes; start the run again with `patina fit`")
+        Error::reading(path, source).with_remedy("a run writes it while it goes; start the run again with `patina fit`")
     })?;
     let broken = |byte: usize, what: &str| {
         Error::new(ErrorKind::Malformed, format!("not a whole checkpoint: {what}"))

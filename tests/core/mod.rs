@@ -59,6 +59,7 @@ mod report;
 mod scene_bad_input;
 mod scene_doctor;
 mod scene_fixture;
+mod scene_gltf;
 mod scene_meshes;
 mod scene_read;
 mod scene_real;

@@ -202,6 +202,14 @@ fn what_is_missing_is_said_at_once() {
         std::fs::remove_dir_all(folder.join("cams")).unwrap();
     });
     assert_error(&bare, ErrorKind::Missing, "the cameras: cams/*_cam.txt; the mesh: textured_mesh/*.obj");
+    let without_mesh = |folder: &Path| std::fs::remove_dir_all(folder.join("textured_mesh")).unwrap();
+    let error = folder_error(without_mesh);
+    assert_error(&error, ErrorKind::Missing, "no mesh was found");
+    assert!(error.remedy_text().contains("separate download") && error.remedy_text().contains("--mesh"), "{error}");
+    let (_keep, elsewhere) = copy_of(&BLENDED_MVS);
+    let mesh = vec![elsewhere.join("cams/other.obj")];
+    std::fs::rename(elsewhere.join("textured_mesh/mesh.obj"), &mesh[0]).unwrap();
+    read(&elsewhere, &ReadSettings { mesh, ..Default::default() }).unwrap();
     let none = folder_error(|folder| {
         for name in ["00000000", "00000001"] {
             std::fs::remove_file(folder.join(format!("cams/{name}_cam.txt"))).unwrap();

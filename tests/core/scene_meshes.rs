@@ -29,7 +29,7 @@ const POINTS: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
 
 #[test]
 fn obj_of_any_program_is_the_same_triangle() {
-    let cases: [(&str, String, &str); 15] = [
+    let cases: [(&str, String, &str); 16] = [
         ("plain", format!("{POINTS}f 1 2 3\n"), ""),
         ("lines and points", format!("{POINTS}v 5 5 5\nf 1 2 3\nl 1 2 4 3\np 1 2 3 4\n"), "mesh-lines-dropped"),
         ("byte order mark", format!("\u{feff}v 9 9 9\n{POINTS}f 2 3 4\n"), ""),
@@ -38,6 +38,7 @@ fn obj_of_any_program_is_the_same_triangle() {
         ("comments", format!("{POINTS}f 1 2 3 # ground\n#f 1 2 1 \\\n"), ""),
         ("colours", "v 0 0 0 1 0 0 1\nv 1 0 0 1 0 0 1\nv 0 1 0 .5 0 0 1\nf 1 2 3".into(), ""),
         ("rgb", "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 .5 0 0\nf 1 2 3".into(), ""),
+        ("weights", "v 0 0 0 .5\nv .5 0 0 .5\nv 0 .5 0 .5\nf 1 2 3".into(), "mesh-vertices-weighted"),
         ("no material", format!("{POINTS}usemtl\nf 1 2 3\n"), ""),
         ("an unused vertex", format!("{POINTS}v -nan(ind) -nan(ind) 1.#QNAN\nf 1 2 3\n"), "mesh-vertices-dropped"),
         ("bad normals", format!("{POINTS}vn nan 0 0\nvn x\nf 1//1 2//1 3//2\n"), "mesh-normals-dropped"),
@@ -178,62 +179,6 @@ fn survey_coordinates_keep_their_shape_whatever_one_vertex_says() {
         assert!((area(&mesh) - 25e-6).abs() < 1e-9, "{}", area(&mesh));
         let (low, high) = mesh.bounds().unwrap();
         assert!((high - low).length() < 0.01);
-    }
-}
-
-/// A GLB file of one node: `json` with the length of the binary part in the place of `LENGTH`.
-fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
-    let mut json = json.replace("LENGTH", &binary.len().to_string()).into_bytes();
-    json.resize(json.len().next_multiple_of(4), b' ');
-    let mut binary = binary.to_vec();
-    binary.resize(binary.len().next_multiple_of(4), 0);
-    let mut file = b"glTF\x02\0\0\0".to_vec();
-    file.extend((12 + 8 + json.len() as u32 + 8 + binary.len() as u32).to_le_bytes());
-    for (kind, part) in [(b"JSON", &json), (b"BIN\0", &binary)] {
-        file.extend((part.len() as u32).to_le_bytes());
-        file.extend(kind);
-        file.extend(part);
-    }
-    file
-}
-
-const GLTF: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],
-    "nodes":[{"children":[1],"translation":[500000,0,4000000]},{"mesh":0,"scale":[-2,2,2]}],
-    "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1},{"attributes":{"POSITION":0},"mode":1}]}],
-    "buffers":[{"byteLength":LENGTH}],
-    "bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":12}],
-    "accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[0,0,0],"max":[1,1,1]},
-    {"bufferView":1,"componentType":5123,"count":6,"type":"SCALAR"}]}"#;
-
-fn gltf_data() -> Vec<u8> {
-    let points: [[f32; 3]; 4] = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]];
-    let mut data: Vec<u8> = points.iter().flatten().flat_map(|number| number.to_le_bytes()).collect();
-    data.extend([0u16, 1, 2, 0, 2, 3].iter().flat_map(|corner| corner.to_le_bytes()));
-    data
-}
-
-#[test]
-fn gltf_is_read_with_its_transforms_and_damaged_ones_are_refused() {
-    let (mesh, findings) = read("a.glb", glb(GLTF, &gltf_data()));
-    assert_eq!((mesh.triangles.len(), mesh.positions.len(), area(&mesh)), (2, 4, 4.0));
-    assert!(has(&findings, "mesh-lines-dropped"), "{findings:?}");
-    // The mirror of the scale is undone: the square still faces +z.
-    assert!(mesh.area_vector(0).z > 0.0);
-
-    let whole = glb(GLTF, &gltf_data());
-    let short = glb(GLTF, &gltf_data()[..40]);
-    let beyond = {
-        let mut data = gltf_data();
-        data[48] = 9;
-        glb(GLTF, &data)
-    };
-    for damaged in [&whole[..whole.len() - 20], &whole[..30], &short, &beyond] {
-        let (_keep, folder) = folder();
-        let path = folder.join("a.glb");
-        std::fs::write(&path, damaged).unwrap();
-        let error = read_mesh(&path).unwrap_err();
-        assert_eq!(error.kind(), patina::ErrorKind::Malformed, "{error}");
-        assert!(!error.remedy_text().is_empty());
     }
 }
 

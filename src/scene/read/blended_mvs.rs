@@ -24,12 +24,18 @@ pub fn is_folder_of_this_kind(folder: &Path) -> bool {
     folder.join("cams").is_dir() || folder.join("blended_images").is_dir()
 }
 
-/// Lists a BlendedMVS folder and reads its cameras.
+/// Whether a folder of this kind has the file of a camera.
+pub fn holds_cameras(folder: &Path) -> bool {
+    let files = files_of(&folder.join("cams"), &["txt"]).unwrap_or_default();
+    files.iter().any(|path| stem_of(path).ends_with("_cam"))
+}
+
+/// Lists a BlendedMVS folder and reads its cameras. Without a mesh there is none in it: another may be named.
 pub fn read(folder: &Path) -> Result<SourceScene> {
     let images = ["blended_images", "images"].map(|name| folder.join(name)).into_iter().find(|path| path.is_dir());
     let cams = Some(folder.join("cams")).filter(|path| path.is_dir());
     let (mesh, mut findings) = find_mesh(folder)?;
-    let (Some(images), Some(cams), false) = (&images, &cams, mesh.is_empty()) else {
+    let (Some(images), Some(cams)) = (&images, &cams) else {
         let mut missing = Vec::new();
         if images.is_none() {
             missing.push("the photos: blended_images/*.jpg");
@@ -38,7 +44,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
             missing.push("the cameras: cams/*_cam.txt");
         }
         if mesh.is_empty() {
-            missing.push("the mesh: textured_mesh/*.obj or *.ply (BlendedMVS offers it as a separate download)");
+            missing.push("the mesh: textured_mesh/*.obj or *.ply");
         }
         return Err(Error::new(ErrorKind::Missing, format!("the folder lacks {}", missing.join("; ")))
             .at(Place::File(folder.into()))

@@ -2,10 +2,11 @@
 //!
 //! All triangles of the default scene become one mesh in the scene's world, the transforms of its nodes applied in `f64`.
 //! Every range of bytes is checked against its buffer before it is read. Compressed geometry (Draco, meshopt), sparse
-//! accessors and skins are refused or ignored by name.
+//! accessors and skins are refused or ignored by name; extensions of materials, textures and lights change no geometry.
 
-use super::source_mesh::{SourceMesh, is_a_place, vertex_index};
+use super::source_mesh::{SourceMesh, is_a_place, uvs_dropped, vertex_index};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::files::as_stored;
 use crate::image::file::guarded;
 use base64::Engine;
 use glam::{DMat4, DVec3, Vec2, Vec3};
@@ -25,12 +26,9 @@ const DEEPEST: usize = 256;
 pub fn read(path: &Path) -> Result<SourceMesh> {
     let bytes = std::fs::read(path).map_err(|source| Error::reading(path, source))?;
     // The crate panics where a mesh names an accessor that is not there.
-    let decoded = guarded(path, || Ok(Gltf::from_slice(&bytes)))
+    let decoded = guarded(path, || Ok(geometry_of(&bytes, path)))
         .map_err(|_| malformed(path, "the glTF file is damaged in a way its decoder did not expect".into()))?;
-    let Gltf { document, mut blob } = decoded.map_err(|error| {
-        malformed(path, format!("the glTF file cannot be read: {error}"))
-            .remedy("the file is damaged, or packed by Draco or meshopt: export it again, without compression")
-    })?;
+    let Gltf { document, mut blob } = decoded?;
     let mut buffers = Vec::new();
     for buffer in document.buffers() {
         let data = match buffer.source() {
@@ -44,6 +42,42 @@ pub fn read(path: &Path) -> Result<SourceMesh> {
     let mut reader = Reader { path, buffers, mesh: SourceMesh::default(), materials: BTreeSet::new(), left_out: 0 };
     reader.add_scene(&document)?;
     reader.finish()
+}
+
+/// The document without its materials, textures and animations: what they need does not matter to the geometry.
+fn geometry_of(bytes: &[u8], path: &Path) -> Result<Gltf> {
+    let cannot = |error: gltf::Error| malformed(path, format!("the glTF file cannot be read: {error}"));
+    let Gltf { document, blob } = Gltf::from_slice_without_validation(bytes).map_err(cannot)?;
+    let mut root = document.into_json();
+    root.extensions_required.retain(|name| !is_beside_geometry(name));
+    if let Some(name) = root.extensions_required.first() {
+        let (message, remedy) = if name.contains("draco") || name.contains("meshopt") {
+            (format!("the geometry is compressed ({name}), which is not read"), "export it again, without compression")
+        } else {
+            (format!("the file requires the extension {name}, which is not read"), "export it again without it")
+        };
+        return Err(Error::new(ErrorKind::Unsupported, message).at(Place::File(path.into())).remedy(remedy));
+    }
+    root.materials.iter_mut().for_each(|material| *material = Default::default());
+    root.textures.clear();
+    root.images.clear();
+    root.samplers.clear();
+    root.animations.clear();
+    let document = Document::from_json(root).map_err(cannot)?;
+    Ok(Gltf { document, blob })
+}
+
+/// Whether an extension leaves the geometry as it is, or is read here: numbers of few bits are.
+fn is_beside_geometry(name: &str) -> bool {
+    const BEGINNINGS: [&str; 4] = ["KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_"];
+    const NAMES: [&str; 5] = [
+        "KHR_mesh_quantization",
+        "KHR_lights_punctual",
+        "EXT_lights_image_based",
+        "KHR_animation_pointer",
+        "KHR_xmp_json_ld",
+    ];
+    BEGINNINGS.iter().any(|start| name.starts_with(start)) || NAMES.contains(&name)
 }
 
 fn malformed(path: &Path, message: String) -> Error {
@@ -61,7 +95,8 @@ fn of_uri(uri: &str, path: &Path) -> Result<Vec<u8>> {
             .decode(encoded)
             .map_err(|error| malformed(path, format!("a buffer in the text is not base64: {error}")));
     }
-    let relative = Path::new(uri);
+    let decoded = unescaped(uri);
+    let relative = Path::new(&decoded);
     let stays = relative
         .components()
         .all(|part| matches!(part, std::path::Component::Normal(_) | std::path::Component::CurDir));
@@ -70,8 +105,24 @@ fn of_uri(uri: &str, path: &Path) -> Result<Vec<u8>> {
             .at(Place::File(path.into()))
             .remedy("save the mesh as .glb, which holds everything"));
     }
-    let file = path.with_file_name("").join(uri.replace("%20", " "));
-    std::fs::read(&file).map_err(|source| Error::reading(&file, source).remedy("copy the buffer beside the .gltf file"))
+    // Some programs write names as they are, be there a percent sign in them or not.
+    let plain = path.with_file_name("").join(uri);
+    let file = if plain.is_file() { plain } else { as_stored(path.with_file_name("").join(&decoded)) };
+    std::fs::read(&file)
+        .map_err(|source| Error::reading(&file, source).with_remedy("copy the buffer beside the .gltf file"))
+}
+
+/// A reference with its percent escapes undone (RFC 3986, 2.1), which stand for bytes of UTF-8.
+fn unescaped(uri: &str) -> String {
+    let mut rest = uri.as_bytes();
+    let mut bytes = Vec::with_capacity(rest.len());
+    while let Some((&first, behind)) = rest.split_first() {
+        let digit = |place: usize| char::from(*behind.get(place)?).to_digit(16);
+        let escaped = if first == b'%' { digit(0).zip(digit(1)) } else { None };
+        bytes.push(escaped.map_or(first, |(high, low)| (16 * high + low) as u8));
+        rest = if escaped.is_some() { &behind[2..] } else { behind };
+    }
+    String::from_utf8(bytes).unwrap_or_else(|_| uri.to_owned())
 }
 
 struct Reader<'a> {
@@ -195,7 +246,13 @@ impl Reader<'_> {
         if mesh.normals.len() != mesh.positions.len() {
             mesh.normals.clear();
         }
-        if mesh.uvs.len() != mesh.positions.len() || materials.len() > 1 {
+        let are_complete = mesh.uvs.len() == mesh.positions.len();
+        if !mesh.uvs.is_empty() && (!are_complete || materials.len() > 1) {
+            let message = match are_complete {
+                true => format!("the texture coordinates refer to {} materials and are not kept", materials.len()),
+                false => "parts of the mesh have no texture coordinates: none are kept".into(),
+            };
+            mesh.findings.push(uvs_dropped(path, message));
             mesh.uvs.clear();
         }
         if left_out > 0 {

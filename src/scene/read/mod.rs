@@ -44,6 +44,7 @@ mod photo_index;
 mod photo_size;
 pub mod photos;
 mod ply;
+mod ply_faces;
 mod ply_header;
 pub mod polygon;
 mod realitycapture;
@@ -106,9 +107,7 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
     photo_size::fit_to_photos(&mut views, &sizes, &mut findings)?;
     let mesh = if settings.mesh.is_empty() { mesh } else { settings.mesh.iter().cloned().map(as_stored).collect() };
     if mesh.is_empty() {
-        return Err(Error::new(ErrorKind::Missing, "no mesh was found with the photos and cameras")
-            .at(Place::File(folder))
-            .remedy("put one into the folder, in the coordinate system of the cameras, or name it with --mesh FILE"));
+        return Err(mesh_choice::none_found(&folder));
     }
 
     // The mesh.

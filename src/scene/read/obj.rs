@@ -6,7 +6,7 @@
 //! given plain triangles near the origin, whose corners it joins. Their number is compared with that of the file.
 
 use super::obj_elements::{Elements, NONE};
-use super::source_mesh::SourceMesh;
+use super::source_mesh::{SourceMesh, uvs_dropped};
 use super::{text, udim};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use glam::{DVec3, Vec2, Vec3};
@@ -33,12 +33,7 @@ pub fn read(path: &Path) -> Result<SourceMesh> {
     if !has_one_texture && !elements.uvs.is_empty() {
         let message =
             format!("the texture coordinates refer to {} textures and are not kept", elements.materials.len());
-        findings.push(
-            Finding::new(Severity::Note, "mesh-uvs-dropped", message)
-                .at(Place::File(path.into()))
-                .remedy("nothing is lost: the fit makes its own atlas")
-                .extent(elements.materials.len() as f64),
-        );
+        findings.push(uvs_dropped(path, message).extent(elements.materials.len() as f64));
     }
     let origin = elements.origin(&triangles);
     let plain = plain_text(&elements, &triangles, origin, with_uvs, with_normals);
@@ -68,13 +63,13 @@ fn keep<T>(
     let all = 3 * triangles.len();
     if named > 0 && good < all {
         let message = format!("{} of {all} corners have no {what} that can be used: none are kept", all - good);
-        let code = if kind == 1 { "mesh-uvs-dropped" } else { "mesh-normals-dropped" };
-        let remedy = if kind == 1 {
-            "nothing is lost: the fit makes its own atlas"
+        findings.push(if kind == 1 {
+            uvs_dropped(path, message)
         } else {
-            "normals are computed from the triangles; export the mesh again for its own"
-        };
-        findings.push(Finding::new(Severity::Note, code, message).at(Place::File(path.into())).remedy(remedy));
+            Finding::new(Severity::Note, "mesh-normals-dropped", message)
+                .at(Place::File(path.into()))
+                .remedy("normals are computed from the triangles; export the mesh again for its own")
+        });
     }
     good == all
 }

@@ -32,6 +32,8 @@ pub(super) struct Elements {
     small_faces: (usize, usize),
     /// Number of lines and points, and the line of the first.
     lines_and_points: (usize, usize),
+    /// Number of vertices that are divided by their fourth number, and the line of the first.
+    weighted: (usize, usize),
     /// The first line with decimal commas.
     decimal_commas: Option<usize>,
 }
@@ -78,6 +80,7 @@ impl Elements {
                     && *weight != 1.0
                 {
                     point /= *weight;
+                    count(&mut self.weighted, line);
                 }
                 if !is_a_place(point) {
                     self.bad_vertices.push((self.positions.len(), line));
@@ -197,6 +200,10 @@ impl Elements {
         let (count, line) = self.lines_and_points;
         let message = "lines and points are not surfaces; this is the first: they are ignored";
         tell(Severity::Note, "mesh-lines-dropped", count, line, message, "");
+        let (count, line) = self.weighted;
+        let message = "vertices have a fourth number, this is the first: they are divided by it, as by a weight";
+        let remedy = "if it is a shade of grey, export the mesh without colours, or with three numbers for each";
+        tell(Severity::Warning, "mesh-vertices-weighted", count, line, message, remedy);
         if let Some(line) = self.decimal_commas {
             let message = "numbers have decimal commas: they are read as points";
             let finding = Finding::new(Severity::Note, "decimal-commas", message);

@@ -3,13 +3,14 @@
 //! A header may claim any number of elements. The claim is checked against the size of the file before anything is
 //! read, so that a lying file of one kilobyte costs one kilobyte.
 
+use super::ply_faces::{Face, split_at_seams};
 use super::source_mesh::{SourceMesh, is_a_place, vertex_index};
 use super::{ply_header, polygon};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use glam::{DVec3, Vec2, Vec3};
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{
-    BeginList, ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
+    ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
 };
 use std::io::Cursor;
 use std::path::Path;
@@ -23,7 +24,7 @@ pub fn read(path: &Path) -> Result<SourceMesh> {
         .read_header(&mut source.reader)
         .map_err(|error| malformed(path, 0, format!("the PLY header cannot be read: {}", first_line(&error))))?;
     let mut mesh = SourceMesh::default();
-    let mut faces: Vec<Vec<u32>> = Vec::new();
+    let mut faces: Vec<Face> = Vec::new();
     let mut face_lines: &[u32] = &[];
     let mut vertex_lines: &[u32] = &[];
     for (index, element) in header.elements.values().enumerate() {
@@ -57,6 +58,7 @@ pub fn read(path: &Path) -> Result<SourceMesh> {
         Some(&line) => Place::Line(path.into(), line as usize),
         None => Place::File(path.into()),
     };
+    split_at_seams(&mut mesh, &mut faces, path)?;
     cut(&mut mesh, &faces, &|index| place(face_lines, index), &|index| place(vertex_lines, index))?;
     Ok(mesh)
 }
@@ -65,12 +67,12 @@ pub fn read(path: &Path) -> Result<SourceMesh> {
 /// left out, and told.
 fn cut(
     mesh: &mut SourceMesh,
-    faces: &[Vec<u32>],
+    faces: &[Face],
     place_of_face: &dyn Fn(usize) -> Place,
     place_of_vertex: &dyn Fn(usize) -> Place,
 ) -> Result<()> {
     let (mut small, mut first_small) = (0usize, 0);
-    for (index, corners) in faces.iter().enumerate() {
+    for (index, Face { corners, .. }) in faces.iter().enumerate() {
         let mut points = Vec::with_capacity(corners.len());
         for &corner in corners {
             let Some(position) = mesh.positions.get(corner as usize) else {
@@ -223,13 +225,13 @@ fn read_vertices(source: &mut Source, header: &Header, element: &ElementDef, mes
     Ok(())
 }
 
-fn read_faces(source: &mut Source, header: &Header, element: &ElementDef) -> Result<Vec<Vec<u32>>> {
+fn read_faces(source: &mut Source, header: &Header, element: &ElementDef) -> Result<Vec<Face>> {
     if !["vertex_indices", "vertex_index"].iter().any(|name| element.properties.contains_key(*name)) {
         return Err(Error::new(ErrorKind::Malformed, "the faces have no list vertex_indices")
             .at(Place::File(source.path.into()))
             .remedy("export the mesh again"));
     }
-    Ok(payload::<Face>(source, header, element)?.into_iter().map(|Face(corners)| corners).collect())
+    payload::<Face>(source, header, element)
 }
 
 /// Position, normal and texture coordinate.
@@ -274,38 +276,6 @@ impl PropertyAccess for Vertex {
             _ => return PropertyAccessResult::Ignored,
         };
         self.set(name, value)
-    }
-}
-
-/// Corners of a polygon. Negative or overlong indices become `u32::MAX`, which no mesh has.
-struct Face(Vec<u32>);
-
-fn is_corner_list(name: &str) -> bool {
-    name == "vertex_indices" || name == "vertex_index"
-}
-
-impl PropertyAccess for Face {
-    fn new() -> Self {
-        Face(Vec::new())
-    }
-    fn begin_list_uint(&mut self, name: &str, _length: usize) -> BeginList<'_, u32> {
-        if is_corner_list(name) { BeginList::Fill(&mut self.0) } else { BeginList::UseSetter }
-    }
-    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        if !is_corner_list(name) {
-            return PropertyAccessResult::Ignored;
-        }
-        let index = |value: i64| u32::try_from(value).unwrap_or(u32::MAX);
-        self.0 = match property {
-            Property::ListChar(list) => list.into_iter().map(|value| index(value.into())).collect(),
-            Property::ListUChar(list) => list.into_iter().map(u32::from).collect(),
-            Property::ListShort(list) => list.into_iter().map(|value| index(value.into())).collect(),
-            Property::ListUShort(list) => list.into_iter().map(u32::from).collect(),
-            Property::ListInt(list) => list.into_iter().map(|value| index(value.into())).collect(),
-            Property::ListUInt(list) => list,
-            _ => return PropertyAccessResult::UnsupportedType,
-        };
-        PropertyAccessResult::Set
     }
 }
 

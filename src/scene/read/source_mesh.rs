@@ -37,6 +37,13 @@ pub fn vertex_index(count: usize, path: &Path) -> Result<u32> {
     })
 }
 
+/// That the texture coordinates of a file are not kept, and why.
+pub(super) fn uvs_dropped(path: &Path, message: impl Into<String>) -> Finding {
+    Finding::new(Severity::Note, "mesh-uvs-dropped", message)
+        .at(Place::File(path.into()))
+        .remedy("nothing is lost: the fit makes its own atlas")
+}
+
 impl SourceMesh {
     /// Lower and upper corner of the referenced vertices; `None` without triangles.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
