@@ -8,7 +8,8 @@
 use super::blended_mvs::files_of;
 use super::camera_file::read_text;
 use super::colmap_lens::matrix;
-use super::photo_index::{PhotoIndex, Posed, some_of};
+use super::photo_index::{PhotoIndex, some_of};
+use super::posed::Posed;
 use super::source::{SourceCamera, SourceScene};
 use super::tool_folder::scene_of;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
@@ -98,7 +99,17 @@ fn intrinsics_of(entry: &Value, place: &Place) -> Result<((usize, usize), DMat3,
             .at(place.clone())
             .remedy("align with a pinhole camera, its distortion may be fisheye4, or export undistorted photos (PrepareDenseScene)"));
     }
+    // What undoes a lens instead of describing it, as studios calibrate them.
+    let undistortion = entry.get("undistortionType").and_then(Value::as_str).unwrap_or("none");
+    let undone_by = entry.get("undistortionParams").map(numbers).unwrap_or_default();
+    if undistortion != "none" && undone_by.iter().any(|value| *value != 0.0) {
+        return Err(Error::new(ErrorKind::Unsupported, format!("the undistortion {undistortion} is not supported"))
+            .at(place.clone())
+            .remedy("export undistorted photos (PrepareDenseScene) and their cameras"));
+    }
     let kind = distortion.unwrap_or(camera);
+    // Without coefficients these are no pinholes yet: their radius goes by the angle.
+    let is_by_angle = kind.contains("fisheye") || kind.starts_with("equi");
     let k = entry.get("distortionParams").map(numbers).unwrap_or_default();
     let radial = |values: &[f64]| {
         let mut numerator = [0.0; 6];
@@ -107,7 +118,7 @@ fn intrinsics_of(entry: &Value, place: &Place) -> Result<((usize, usize), DMat3,
         numerator
     };
     let polynomial = match (kind, k.as_slice()) {
-        (_, values) if values.iter().all(|value| *value == 0.0) && !kind.contains("fisheye") => Polynomial::default(),
+        (_, values) if values.iter().all(|value| *value == 0.0) && !is_by_angle => Polynomial::default(),
         ("pinhole" | "none", _) => Polynomial::default(),
         ("radial1" | "radialk1" | "radial3" | "radialk3", values) => {
             Polynomial { numerator: radial(values), ..Default::default() }
@@ -298,6 +309,20 @@ mod tests {
         std::fs::write(&path, RIG.replace("\"pinhole\"", "\"equidistant\"")).unwrap();
         let error = read(&path).unwrap_err();
         assert!(error.kind() == ErrorKind::Unsupported && error.to_string().contains("equidistant"), "{error}");
+        let by_type = RIG.replace("\"pinhole\"", "\"equidistant\"").replace(",\"distortionType\":\"radialk3\"", "");
+        std::fs::write(&path, by_type.replace("\"distortionParams\":[\"0.1\",\"0\",\"0\"]", "\"distortionParams\":[]"))
+            .unwrap();
+        let error = read(&path).unwrap_err();
+        assert!(error.kind() == ErrorKind::Unsupported && error.to_string().contains("equidistant"), "{error}");
+        for (value, is_read) in [("0.1", false), ("0", true)] {
+            let undone = format!(
+                "\"undistortionType\":\"3declassicld\",\"undistortionParams\":[\"{value}\"],\"distortionParams\""
+            );
+            std::fs::write(&path, RIG.replace("\"distortionParams\"", &undone)).unwrap();
+            let outcome = read(&path);
+            assert_eq!(outcome.is_ok(), is_read);
+            assert!(outcome.err().is_none_or(|error| error.to_string().contains("3declassicld")));
+        }
         std::fs::write(&path, RIG.replace("[\"0.1\"", "[\"nan\"")).unwrap();
         assert_eq!(read(&path).unwrap_err().kind(), ErrorKind::NonFinite);
     }

@@ -6,7 +6,8 @@
 use super::blended_mvs::files_of;
 use super::camera_file::read_text;
 use super::colmap_lens::matrix;
-use super::photo_index::{PhotoIndex, Posed};
+use super::photo_index::PhotoIndex;
+use super::posed::Posed;
 use super::source::{SourceCamera, SourceScene};
 use super::tool_folder::scene_of;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};

@@ -13,7 +13,8 @@ use super::bytes::Bytes;
 use super::camera_file::read_text;
 use super::colmap_lens::{lens_of, model_of_id, model_of_name};
 use super::mesh_choice;
-use super::photo_index::{PhotoIndex, Posed, views_of};
+use super::photo_index::PhotoIndex;
+use super::posed::{Posed, views_of};
 use super::source::{SourceCamera, SourceScene};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use glam::{DMat3, DQuat, DVec3};
@@ -162,7 +163,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
     roots.retain(|root| root.is_dir());
     roots.push(folder.into());
     roots.dedup();
-    let views = views_of(posed, &PhotoIndex::of_folders(&roots)?, &named(&["masks", "mask"]), &mut findings)?;
+    let views = views_of(posed, &PhotoIndex::of_folders(&roots)?, &bases, &mut findings)?;
     let mesh = mesh_choice::find(&[bases, vec![model.clone()]].concat(), &mut findings);
     Ok(SourceScene { findings, ..SourceScene::of_photographs(folder, mesh, views) })
 }

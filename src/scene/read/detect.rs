@@ -120,7 +120,10 @@ impl Format {
     fn is_whole(self, folder: &Path, evidence: &Path) -> bool {
         match self {
             Format::Exchange => exchange::holds_cameras(folder),
+            Format::BlendedMvs => blended_mvs::holds_cameras(folder),
             Format::MetashapeProject => metashape_project::has_archive(evidence),
+            Format::Transforms => transforms::holds_frames(evidence),
+            Format::MetashapeCameras => metashape::holds_poses(evidence),
             Format::AliceVision => alicevision::holds_poses(evidence),
             _ => true,
         }
@@ -203,7 +206,8 @@ impl Located {
             Format::Bundler => bundler::read(&self.evidence, &self.folder),
             Format::Neus => neural_scenes::read_neus(&self.evidence),
             Format::Llff => neural_scenes::read_llff(&self.evidence),
-        }?;
+        }
+        .map_err(|error| error.at(Place::File(self.evidence.clone())))?;
         let has_chunks = matches!(self.format, Format::MetashapeProject | Format::MetashapeCameras);
         if settings.chunk.is_some() && !has_chunks {
             let message = format!("a scene of {} has no chunks: --chunk has no effect", self.format);
@@ -255,7 +259,8 @@ pub fn locate(path: &Path) -> Result<Located> {
         let mut found: Vec<(Format, PathBuf)> = found.collect();
         if !found.is_empty() {
             // What is not whole is read where there is nothing else: its error says what it lacks.
-            let whole = found.iter().position(|(format, evidence)| format.is_whole(&folder, evidence));
+            let is_whole = |(format, evidence): &(Format, PathBuf)| format.is_whole(&folder, evidence);
+            let whole = if found.len() > 1 { found.iter().position(is_whole) } else { None };
             let (format, evidence) = found.remove(whole.unwrap_or(0));
             return Ok(Located { format, folder, evidence, others: found });
         }
@@ -280,58 +285,5 @@ fn only_subfolder(folder: &Path) -> Result<Option<PathBuf>> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn kinds_are_told_apart_and_what_is_passed_over_is_named() {
-        let folder = tempfile::tempdir().unwrap();
-        let root = folder.path();
-        assert_eq!(locate(root).unwrap_err().kind(), ErrorKind::Unsupported);
-        std::fs::create_dir_all(root.join("sparse/0")).unwrap();
-        for name in ["cameras.txt", "images.txt"] {
-            std::fs::write(root.join("sparse/0").join(name), b"").unwrap();
-        }
-        assert_eq!(locate(root).unwrap().format, Format::Colmap);
-        std::fs::write(root.join("other.xml"), b"<?xml version=\"1.0\"?><notes/>").unwrap();
-        assert_eq!(locate(root).unwrap().format, Format::Colmap, "XML of another kind is no scene");
-        std::fs::write(root.join("transforms.json"), b"{}").unwrap();
-        let located = locate(root).unwrap();
-        assert_eq!(located.format, Format::Transforms);
-        assert_eq!(located.why(), "it holds transforms.json; not read as COLMAP, though it holds sparse/0");
-        std::fs::write(root.join("p.psx"), b"<document/>").unwrap();
-        let located = locate(root).unwrap();
-        assert_eq!(located.format, Format::Transforms, "a project without its files");
-        assert!(located.why().contains("not read as Metashape project, though it holds p.psx"), "{}", located.why());
-        std::fs::create_dir(root.join("p.files")).unwrap();
-        std::fs::write(root.join("p.files/project.zip"), b"").unwrap();
-        assert_eq!(locate(root).unwrap().format, Format::MetashapeProject);
-        std::fs::write(root.join("scene.toml"), b"").unwrap();
-        assert_eq!(locate(root).unwrap().format, Format::Manifest);
-        assert_eq!(locate(&root.join("p.psx")).unwrap().format, Format::MetashapeProject);
-        std::fs::write(root.join("head.out"), b"").unwrap();
-        assert_eq!(locate(&root.join("head.out")).unwrap().format, Format::Bundler);
-    }
-
-    #[test]
-    fn files_of_other_programs_and_without_their_parts_stand_back() {
-        let folder = tempfile::tempdir().unwrap();
-        let root = folder.path();
-        std::fs::write(root.join("cameras.json"), br#"[{"id": 0, "img_name": "a", "fx": 1}]"#).unwrap();
-        assert_eq!(locate(root).unwrap().format, Format::Exchange, "there is nothing else");
-        for name in ["cameras.txt", "images.txt"] {
-            std::fs::write(root.join(name), b"").unwrap();
-        }
-        let located = locate(root).unwrap();
-        assert!(located.format == Format::Colmap && located.others[0].0 == Format::Exchange, "{located:?}");
-        std::fs::write(root.join("cameras.json"), br#"{"views": []}"#).unwrap();
-        assert_eq!(locate(root).unwrap().format, Format::Exchange);
-        std::fs::remove_file(root.join("cameras.json")).unwrap();
-        std::fs::remove_file(root.join("images.txt")).unwrap();
-        std::fs::write(root.join("cameraInit.sfm"), br#"{"views": []}"#).unwrap();
-        std::fs::write(root.join("poses_bounds.npy"), b"").unwrap();
-        assert_eq!(locate(root).unwrap().format, Format::Llff);
-        std::fs::write(root.join("sfm.sfm"), br#"{"poses": [{}]}"#).unwrap();
-        assert_eq!(locate(root).unwrap().evidence, root.join("sfm.sfm"));
-    }
-}
+#[path = "detect_tests.rs"]
+mod tests;

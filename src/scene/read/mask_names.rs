@@ -14,24 +14,49 @@ pub const PHOTO_EXTENSIONS: [&str; 8] = ["jpg", "jpeg", "png", "tif", "tiff", "e
 /// Extensions of raw files and of phones' photos, which are not read.
 pub const EXTENSIONS_NOT_READ: [&str; 14] =
     ["dng", "nef", "cr2", "cr3", "arw", "raf", "orf", "rw2", "pef", "srw", "heic", "heif", "avif", "webp"];
-/// Names of folders of masks, in any case.
-const FOLDER_NAMES: [&str; 2] = ["masks", "mask"];
+/// Names of folders of masks, in any case, the likelier first.
+const FOLDER_NAMES: [&str; 4] = ["masks", "mask", "silhouettes", "silhouette"];
+/// Names of folders of photos, in which masks may have a folder of theirs.
+pub const PHOTO_FOLDERS: [&str; 5] = ["images", "image", "photos", "rgb", "input"];
 /// What is added to a photo's name.
 const SUFFIXES: [&str; 8] = ["_mask", "-mask", ".mask", "_masks", "_seg", "_segmentation", "_silhouette", "_matte"];
 const PREFIXES: [&str; 5] = ["mask_", "mask-", "mask.", "masks_", "seg_"];
 /// Folders in folders that are looked into.
 const DEEPEST: usize = 6;
 
-/// The folder of masks in a scene's folder.
-pub fn folder_of_masks(scene: &Path) -> Option<PathBuf> {
+/// The folders in a folder, in the order of their names.
+fn folders_in(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten();
     let mut folders: Vec<PathBuf> =
-        std::fs::read_dir(scene).ok()?.filter_map(|entry| Some(entry.ok()?.path())).collect();
+        entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.is_dir()).collect();
     folders.sort();
-    let named = |wanted: &str| {
-        let has_name = |path: &&PathBuf| path.file_name().is_some_and(|name| name.eq_ignore_ascii_case(wanted));
-        folders.iter().find(|path| has_name(path) && path.is_dir()).cloned()
-    };
-    FOLDER_NAMES.iter().find_map(|name| named(name))
+    folders
+}
+
+/// The first folder of those with one of these names, in any case.
+fn named<'a>(folders: &'a [PathBuf], names: &[&str]) -> Option<&'a PathBuf> {
+    let has_name =
+        |path: &PathBuf, wanted: &str| path.file_name().is_some_and(|name| name.eq_ignore_ascii_case(wanted));
+    names.iter().find_map(|wanted| folders.iter().find(|path| has_name(path, wanted)))
+}
+
+/// The folder of masks in a scene's folder, or in its folder of photos.
+pub fn folder_of_masks(scene: &Path) -> Option<PathBuf> {
+    let folders = folders_in(scene);
+    named(&folders, &FOLDER_NAMES).cloned().or_else(|| {
+        let among_photos = folders_in(named(&folders, &PHOTO_FOLDERS)?);
+        named(&among_photos, &FOLDER_NAMES).cloned()
+    })
+}
+
+/// Whether a folder by its name, in lower case, may hold masks and no photos.
+pub fn may_hold_masks(folder: &str) -> bool {
+    ["mask", "silhouette", "matte"].iter().any(|word| folder.contains(word))
+}
+
+/// A folder in a scene's folder that by its name may hold masks, but is none of those that are read.
+pub fn unread_folder_of_masks(scene: &Path) -> Option<PathBuf> {
+    folders_in(scene).into_iter().find(|folder| may_hold_masks(&name_of(folder).to_lowercase()))
 }
 
 /// A mask and the names it may go by.
@@ -88,6 +113,11 @@ impl Masks {
             }
         }
         None
+    }
+
+    /// Marks a mask that its photo names itself.
+    pub fn mark_used(&mut self, path: &Path) {
+        self.entries.iter_mut().filter(|mask| mask.path == path).for_each(|mask| mask.used = true);
     }
 
     /// Tells of masks that belong to no photo. Those that a manifest names are an error.

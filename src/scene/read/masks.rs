@@ -31,6 +31,11 @@ fn is_twin(path: &Path) -> bool {
 /// A mask from a file or from an archive.
 pub fn read_mask(path: &Path, packed: &BTreeMap<PathBuf, Archive>) -> Result<MaskFile> {
     let file = match path.parent().and_then(|parent| packed.get(parent)) {
+        None if !path.exists() => {
+            return Err(Error::new(ErrorKind::Missing, "the mask that the scene names is not there")
+                .at(Place::File(path.into()))
+                .remedy("copy it, take it out of the file that names it, or ignore all masks with --masks ignore"));
+        }
         None => MaskFile::open(path)?,
         Some(archive) => {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -40,21 +45,28 @@ pub fn read_mask(path: &Path, packed: &BTreeMap<PathBuf, Archive>) -> Result<Mas
     Ok(if is_twin(path) { file.of_picture() } else { file })
 }
 
-/// A mask from an archive was made on the photo that the project knows: it is brought to the size of the photo that is here,
-/// where that has the same shape.
-pub fn resized(mask: GreyImage, path: &Path, photo: &Photo, packed: &BTreeMap<PathBuf, Archive>) -> GreyImage {
+/// A mask of the photo in another size, brought to the size of the photo that is here where that has the same shape: one from
+/// an archive was made on the photo that the project knows, a larger one on a photo that was made smaller since, which is
+/// told. A smaller one has not the photo's detail: it is refused later on.
+pub fn resized(
+    mask: GreyImage,
+    path: &Path,
+    photo: &Photo,
+    packed: &BTreeMap<PathBuf, Archive>,
+) -> (GreyImage, Option<Finding>) {
     /// What rounding of the sides may make of a shape.
     const SAME_SHAPE: f64 = 0.01;
-    if !path.parent().is_some_and(|parent| packed.contains_key(parent)) {
-        return mask;
-    }
+    let is_packed = path.parent().is_some_and(|parent| packed.contains_key(parent));
     let (width, height) = (photo.width(), photo.height());
     let across = mask.width() as f64 / width as f64;
     let down = mask.height() as f64 / height as f64;
-    if (mask.width(), mask.height()) == (width, height) || (across / down - 1.0).abs() > SAME_SHAPE {
-        return mask;
+    let is_of_size = (mask.width(), mask.height()) == (width, height);
+    if is_of_size || (across / down - 1.0).abs() > SAME_SHAPE || !(is_packed || across.min(down) > 1.0) {
+        return (mask, None);
     }
-    resize::enlarge(&resize::shrink(&mask, across as usize), width, height)
+    let message = format!("masks are {across:.3} times the size of their photos: they are made smaller");
+    let told = (!is_packed).then(|| Finding::new(Severity::Note, "masks-scaled", message));
+    (resize::enlarge(&resize::shrink(&mask, across as usize), width, height), told)
 }
 
 /// Turns the states of pixels with less than half of their opacity to background.
@@ -193,6 +205,29 @@ mod tests {
         let black = twin.map(|&[r, g, b, _]| [r, g, b]);
         file::write_png_srgb8(&root.join("b_masked.png"), &black).unwrap();
         assert_eq!(objects_of(&[view(root, "a", "b_masked.png")]), [4 + 4 + 2], "what is as dark in the photo stays");
+    }
+
+    #[test]
+    fn masks_of_photos_that_were_made_smaller_are_made_smaller_too() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        file::write_png_srgb8(&root.join("a.png"), &Image::filled(4, 3, [90; 3])).unwrap();
+        let halves = |width, height| {
+            Image::from_fn(width, height, |_, column| if 2 * column < width { [255u8; 3] } else { [0; 3] })
+        };
+        for (width, height) in [(8, 6), (12, 9), (6, 5)] {
+            file::write_png_srgb8(&root.join("large.png"), &halves(width, height)).unwrap();
+            let views = [view(root, "a", "large.png")];
+            if width == 6 {
+                let loaded = load_all(&views, &[(4, 3)], Default::default(), None, &ReadSettings::default());
+                assert!(loaded.err().unwrap().message().contains("6 x 5"), "another shape");
+            } else {
+                assert_eq!(objects_of(&views), [6]);
+            }
+        }
+        file::write_png_srgb8(&root.join("small.png"), &halves(2, 2)).unwrap();
+        let views = [view(root, "a", "small.png")];
+        assert!(load_all(&views, &[(4, 3)], Default::default(), None, &ReadSettings::default()).is_err());
     }
 
     #[test]

@@ -11,7 +11,8 @@
 use super::mesh_choice;
 use super::metashape_cameras::{self, Cameras};
 use super::metashape_project::{self, Chunk, parse};
-use super::photo_index::{PhotoIndex, views_of};
+use super::photo_index::PhotoIndex;
+use super::posed::views_of;
 use super::source::{MeshFrame, SourceScene};
 use super::{blended_mvs::files_of, camera_file::read_text};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
@@ -24,13 +25,25 @@ pub fn project_of(folder: &Path) -> Option<PathBuf> {
     files_of(folder, &["psx"]).ok()?.into_iter().next()
 }
 
-/// The exported cameras of a folder, if it holds any: an XML file whose root is a document with cameras.
+/// The exported cameras of a folder, if it holds any: the first XML file with poses whose root is a document, or else the
+/// first such document, which may be one of markers.
 pub fn export_of(folder: &Path) -> Option<PathBuf> {
-    files_of(folder, &["xml"]).ok()?.into_iter().find(|path| {
+    let mut files = files_of(folder, &["xml"]).ok()?;
+    files.retain(|path| {
         let Ok(text) = read_text(path) else { return false };
         let start: String = text.chars().take(2000).collect();
         start.contains("<document") && start.contains("<chunk")
-    })
+    });
+    let with_poses = if files.len() > 1 { files.iter().find(|path| holds_poses(path)) } else { None };
+    with_poses.or(files.first()).cloned()
+}
+
+/// Whether exported cameras have poses.
+pub fn holds_poses(path: &Path) -> bool {
+    let Ok(text) = read_text(path) else { return false };
+    let Ok(document) = parse(&text, path) else { return false };
+    let mut chunks = document.descendants().filter(|node| node.has_tag_name("chunk"));
+    chunks.any(|chunk| !metashape_cameras::aligned_labels(chunk).is_empty())
 }
 
 fn photos_of(folder: &Path) -> Result<PhotoIndex> {
@@ -38,7 +51,7 @@ fn photos_of(folder: &Path) -> Result<PhotoIndex> {
 }
 
 fn finish(folder: &Path, cameras: Cameras, photos: &PhotoIndex, mut findings: Vec<Finding>) -> Result<SourceScene> {
-    let views = views_of(cameras.posed, photos, &[folder.join("masks"), folder.join("mask")], &mut findings)?;
+    let views = views_of(cameras.posed, photos, &[folder.into()], &mut findings)?;
     let mesh = mesh_choice::find(&[folder.into()], &mut findings);
     let mut scene = SourceScene::of_photographs(folder, mesh, views);
     if let Some(world_from_chunk) = cameras.transform {

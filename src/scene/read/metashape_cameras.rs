@@ -9,7 +9,8 @@
 //! slave's centre in the master's frame (PhotogrammetryCommunity, Metashape expert manual, "The slave-sensor transform").
 
 use super::colmap_lens::matrix;
-use super::photo_index::{Posed, some_of};
+use super::photo_index::some_of;
+use super::posed::Posed;
 use super::source::SourceCamera;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::scene::lens::{Base, Lens, Model, Polynomial};

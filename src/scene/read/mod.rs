@@ -47,6 +47,7 @@ mod ply;
 mod ply_faces;
 mod ply_header;
 pub mod polygon;
+mod posed;
 mod realitycapture;
 mod realitycapture_csv;
 pub(crate) mod repeated;

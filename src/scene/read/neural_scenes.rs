@@ -10,7 +10,8 @@ use super::blended_mvs::files_of;
 use super::colmap_lens::matrix;
 use super::mesh_choice;
 use super::numpy;
-use super::photo_index::{PhotoIndex, Posed, reduction_of, views_of};
+use super::photo_index::{PhotoIndex, reduction_of};
+use super::posed::{Posed, views_of};
 use super::source::{MeshFrame, SourceCamera, SourceScene};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::files::folder_of;
@@ -64,7 +65,7 @@ fn wrong(file: &Path, what: &str) -> Error {
 fn finish(folder: &Path, posed: Vec<Posed>, frames: Vec<MeshFrame>) -> Result<SourceScene> {
     let mut findings = Vec::new();
     let photos = PhotoIndex::of_folders(&[folder.into()])?;
-    let views = views_of(posed, &photos, &[folder.join("mask"), folder.join("masks")], &mut findings)?;
+    let views = views_of(posed, &photos, &[folder.into()], &mut findings)?;
     let mesh = mesh_choice::find(&[folder.into()], &mut findings);
     Ok(SourceScene { findings, mesh_frames: frames, ..SourceScene::of_photographs(folder, mesh, views) })
 }

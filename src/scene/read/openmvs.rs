@@ -1,18 +1,21 @@
 //! OpenMVS: the interface file, which begins with `MVSI` (`libs/MVS/Interface.h`). Project files of OpenMVS itself are others.
 //!
 //! A pose holds R from world to platform and its centre; a camera stands in its platform the same way. Intrinsics are in units of
-//! the longer side unless the camera says its size. Pixel centres are at whole numbers: half a pixel is added here.
+//! the longer side unless the camera says its size. Pixel centres are at whole numbers: half a pixel is added here. Newer
+//! versions scale the principal point about the picture's corner and no longer about the first pixel's centre (`ScaleK`):
+//! where it lies tells which, and pixels where a size is lacking.
 
 use super::blended_mvs::files_of;
 use super::bytes::Bytes;
-use super::photo_index::{PhotoIndex, Posed};
+use super::photo_index::PhotoIndex;
+use super::posed::Posed;
 use super::source::{SourceCamera, SourceScene};
 use super::tool_folder::scene_of;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::files::folder_of;
 use crate::image::file;
 use crate::scene::lens::Lens;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -84,6 +87,33 @@ fn platform(bytes: &mut Bytes, version: u32) -> Result<Platform> {
     Ok(Platform { cameras, poses })
 }
 
+/// Intrinsics whose pixel centres are at whole numbers, with centres at (0.5, 0.5).
+fn half_added(mut intrinsics: DMat3) -> DMat3 {
+    intrinsics.z_axis += DVec3::new(0.5, 0.5, 0.0);
+    intrinsics
+}
+
+/// Intrinsics in pixels, centres at (0.5, 0.5), of a camera that does not say its size: in units of the longer side by
+/// either rule, or in pixels all the same.
+fn of_units(intrinsics: DMat3, (width, height): (usize, usize)) -> DMat3 {
+    /// Further out than this, in longer sides, no principal point lies.
+    const FURTHEST: f64 = 4.0;
+    let unit = width.max(height) as f64;
+    let centre = intrinsics.z_axis.truncate();
+    if centre.abs().max_element() > FURTHEST {
+        return half_added(intrinsics);
+    }
+    let middle = DVec2::new(width as f64, height as f64) * 0.5 / unit;
+    let about_corner = centre + DVec2::splat(0.5);
+    let mut scaled = DMat3::from_diagonal(DVec3::new(unit, unit, 1.0)) * intrinsics;
+    if (about_corner - middle).length() < (centre - middle).length() {
+        // (c + 0.5) / unit - 0.5 was written, where c + 0.5 is what is meant here.
+        scaled.z_axis = (about_corner * unit).extend(1.0);
+        return scaled;
+    }
+    half_added(scaled)
+}
+
 /// Lists an OpenMVS scene and reads its cameras.
 pub fn read(path: &Path) -> Result<SourceScene> {
     let folder = folder_of(path);
@@ -135,12 +165,10 @@ pub fn read(path: &Path) -> Result<SourceScene> {
             (0, _) | (_, 0) => photos.find(&listed).map(|path| file::read_size(&path)).transpose()?,
             (width, height) => Some((width as usize, height as usize)),
         };
-        let unit = match (camera.size, size) {
-            ((0, _) | (_, 0), Some((width, height))) => width.max(height) as f64,
-            _ => 1.0,
+        let intrinsics = match (camera.size, size) {
+            ((0, _) | (_, 0), Some(size)) => of_units(camera.intrinsics, size),
+            _ => half_added(camera.intrinsics),
         };
-        let mut intrinsics = DMat3::from_diagonal(DVec3::new(unit, unit, 1.0)) * camera.intrinsics;
-        intrinsics.z_axis += DVec3::new(0.5, 0.5, 0.0);
         let rotation = camera.in_platform.rotation * pose.rotation;
         let centre = pose.centre + pose.rotation.transpose() * camera.in_platform.centre;
         let (own, mut noticed) = SourceCamera::new(intrinsics, rotation, -(rotation * centre), &place)?;
@@ -190,6 +218,21 @@ mod tests {
             [0, 0, pose, 7].iter().for_each(|value| bytes.extend(value.to_le_bytes()));
         }
         bytes
+    }
+
+    #[test]
+    fn where_the_principal_point_lies_tells_how_intrinsics_are_written() {
+        let written = |focal: f64, x: f64, y: f64| {
+            DMat3::from_diagonal(DVec3::new(focal, focal, 1.0))
+                + DMat3::from_cols(DVec3::ZERO, DVec3::ZERO, DVec3::new(x, y, 0.0))
+        };
+        let of_first_pixel = written(1.25, 20.1 / 40.0, 14.3 / 40.0);
+        let of_corner = written(1.25, 20.6 / 40.0 - 0.5, 14.8 / 40.0 - 0.5);
+        let in_pixels = written(50.0, 20.1, 14.3);
+        for intrinsics in [of_first_pixel, of_corner, in_pixels] {
+            let read = of_units(intrinsics, (40, 30));
+            assert!((read - written(50.0, 20.6, 14.8)).to_cols_array().iter().all(|off| off.abs() < 1e-9), "{read}");
+        }
     }
 
     #[test]

@@ -4,45 +4,36 @@
 //! first the whole listed path, then as many folders as possible, then the name without its extension. Of folders with the
 //! same photos made smaller, `images_2` beside `images_4`, the one with the largest is meant.
 
-use super::mask_names::{EXTENSIONS_NOT_READ, Masks, PHOTO_EXTENSIONS, names_of_masks};
-use super::source::{SourceCamera, SourceView};
-use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use super::mask_names::{EXTENSIONS_NOT_READ, PHOTO_EXTENSIONS, PHOTO_FOLDERS, may_hold_masks, names_of_masks};
+use crate::error::{Error, Result};
 use crate::files::{composed, name_of, stem_of};
-use crate::image::file;
-use crate::scene::lens::Lens;
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{HashMap, HashSet};
 use std::path::{Component, Path, PathBuf};
 
 /// Folders that hold pictures of other kinds, by the beginnings of their names.
-const NOT_PHOTOS: [&str; 9] =
-    ["__macosx", "mask", "depth", "normal", "stereo", "texture", "thumb", "rendered_depth", "segmentation"];
+const NOT_PHOTOS: [&str; 10] = [
+    "__macosx",
+    "mask",
+    "depth",
+    "normal",
+    "stereo",
+    "texture",
+    "thumb",
+    "rendered_depth",
+    "segmentation",
+    "silhouette",
+];
 /// How deep folders are searched, and how many files are looked at.
-const DEEPEST: usize = 6;
+pub(super) const DEEPEST: usize = 6;
 const MOST_FILES: usize = 200_000;
 
 /// The photos under one or more folders.
 pub struct PhotoIndex {
-    roots: Vec<PathBuf>,
-    by_name: HashMap<String, Vec<PathBuf>>,
+    pub(super) roots: Vec<PathBuf>,
+    pub(super) by_name: HashMap<String, Vec<PathBuf>>,
     by_stem: HashMap<String, Vec<PathBuf>>,
     /// A file of each stem that is a photo of a kind that is not read.
     not_read: HashMap<String, PathBuf>,
-}
-
-/// A camera as a project lists it.
-pub struct Posed {
-    /// The photo's path or name as written.
-    pub listed: String,
-    /// Its camera.
-    pub camera: SourceCamera,
-    /// Its lens; the intrinsics of the camera put pixel centres at (0.5, 0.5).
-    pub lens: Lens,
-    /// Size the camera is calibrated for.
-    pub size: Option<(usize, usize)>,
-    /// The mask the project names.
-    pub mask: Option<PathBuf>,
-    /// Where it is written.
-    pub place: Place,
 }
 
 fn lower(path: &Path) -> String {
@@ -55,9 +46,8 @@ fn lower_stem(path: &Path) -> String {
 
 /// The number of a folder of photos: 2 of `images_2`.
 fn number_of(folder: &str) -> Option<usize> {
-    const NAMES: [&str; 5] = ["images", "image", "photos", "rgb", "input"];
     let (name, number) = folder.rsplit_once('_')?;
-    let is_of_photos = NAMES.iter().any(|own| own.eq_ignore_ascii_case(name));
+    let is_of_photos = PHOTO_FOLDERS.iter().any(|own| own.eq_ignore_ascii_case(name));
     number.parse().ok().filter(|_| is_of_photos)
 }
 
@@ -73,8 +63,15 @@ fn numbered(photo: &Path) -> Option<(&Path, usize)> {
 }
 
 /// The innermost folder of a photo that is named after how much its photos are made smaller, and that number.
-fn reduced(photo: &Path) -> Option<(&Path, usize)> {
+pub(super) fn reduced(photo: &Path) -> Option<(&Path, usize)> {
     numbered(photo).filter(|(_, factor)| *factor > 1)
+}
+
+/// How many folders of a photo's path agree with those of a listed one, from the end.
+pub(super) fn agreement(photo: &Path, listed: &Path) -> usize {
+    let part = |part: Component| composed(&part.as_os_str().to_string_lossy()).to_lowercase();
+    let (own, theirs) = (photo.components().rev().map(part), listed.components().rev().map(part));
+    own.zip(theirs).skip(1).take_while(|(a, b)| a == b).count()
 }
 
 impl PhotoIndex {
@@ -97,50 +94,79 @@ impl PhotoIndex {
 
     /// The photo of a listed path; `None` when none or several fit equally well.
     pub fn find(&self, listed: &str) -> Option<PathBuf> {
+        let mut fitting = self.fitting(listed);
+        if fitting.len() == 1 { fitting.pop() } else { None }
+    }
+
+    /// The photos that fit a listed path best: one, none, or several that nothing tells apart.
+    pub fn fitting(&self, listed: &str) -> Vec<PathBuf> {
         let listed = listed.replace('\\', "/");
         let relative = Path::new(listed.trim_start_matches("./"));
         if relative.is_relative() {
             let exact = self.roots.iter().map(|root| root.join(relative)).find(|path| path.is_file());
-            if exact.is_some() {
-                return exact;
+            if let Some(exact) = exact {
+                return vec![exact];
             }
         }
-        let best = |candidates: Option<&Vec<PathBuf>>| {
-            let agreement = |path: &Path| {
-                let part = |part: Component| composed(&part.as_os_str().to_string_lossy()).to_lowercase();
-                let (own, theirs) = (path.components().rev().map(part), relative.components().rev().map(part));
-                own.zip(theirs).skip(1).take_while(|(a, b)| a == b).count()
-            };
-            let candidates = candidates?;
-            let most = candidates.iter().map(|path| agreement(path)).max()?;
-            let fitting: Vec<&PathBuf> = candidates.iter().filter(|path| agreement(path) == most).collect();
-            // Of two that fit alike, the one under an earlier root is meant, then the larger: images, images_2, images_4.
-            // Folders that are numbered from nought or one are those of several cameras or times.
-            let is_of_several =
-                |path: &&PathBuf| numbered(self.below_root(path)).is_some_and(|(_, number)| number <= 1);
-            if fitting.len() > 1 && fitting.iter().any(is_of_several) {
-                return None;
+        // What stands behind a point is an extension only if it is one of photos: `IMG.1` is a whole name.
+        let extension = relative.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        let is_of_photos = [&PHOTO_EXTENSIONS[..], &EXTENSIONS_NOT_READ].concat().contains(&extension.as_str());
+        let (name, stem) = (lower(relative), lower_stem(relative));
+        let stems = if is_of_photos { [stem, name.clone()] } else { [name.clone(), stem] };
+        let lists = [self.by_name.get(&name)].into_iter().chain(stems.iter().map(|stem| self.by_stem.get(stem)));
+        let mut several = Vec::new();
+        for candidates in lists.flatten() {
+            let mut best = self.best_of(candidates, relative);
+            match best.len() {
+                1 => return best,
+                _ if several.is_empty() => several.append(&mut best),
+                _ => {}
             }
-            let root_of = |path: &Path| self.roots.iter().position(|root| path.starts_with(root));
-            let rank = |path: &Path| (root_of(path), reduced(self.below_root(path)).map_or(1, |(_, factor)| factor));
-            let best = fitting.iter().map(|path| rank(path)).min()?;
-            let mut first = fitting.into_iter().filter(|path| rank(path) == best);
-            first.next().filter(|_| first.next().is_none()).cloned()
-        };
-        best(self.by_name.get(&lower(relative)))
-            .or_else(|| best(self.by_stem.get(&lower_stem(relative))))
-            .or_else(|| best(self.by_stem.get(&lower(relative))))
+        }
+        // Where it was on the machine that the file was written on; this may be the one.
+        if relative.is_absolute() && is_of_photos && relative.is_file() {
+            return vec![relative.to_path_buf()];
+        }
+        several
+    }
+
+    /// Those of candidates whose path agrees best with a listed one.
+    fn best_of(&self, candidates: &[PathBuf], listed: &Path) -> Vec<PathBuf> {
+        // A mask has the name of its photo: it is one only where nothing else is.
+        let is_mask =
+            |path: &&PathBuf| self.below_root(path).ancestors().skip(1).any(|folder| may_hold_masks(&lower(folder)));
+        let (masks, photos): (Vec<&PathBuf>, Vec<&PathBuf>) = candidates.iter().partition(is_mask);
+        let candidates = if photos.is_empty() { masks } else { photos };
+        let most = candidates.iter().map(|path| agreement(path, listed)).max().unwrap_or_default();
+        let fitting: Vec<&PathBuf> = candidates.into_iter().filter(|path| agreement(path, listed) == most).collect();
+        // Of two that fit alike, the one under an earlier root is meant, then the larger: images, images_2, images_4.
+        // Folders that are numbered from nought or one are those of several cameras or times.
+        let is_of_several = |path: &&PathBuf| numbered(self.below_root(path)).is_some_and(|(_, number)| number <= 1);
+        if fitting.len() > 1 && fitting.iter().any(is_of_several) {
+            return fitting.into_iter().cloned().collect();
+        }
+        let root_of = |path: &Path| self.roots.iter().position(|root| path.starts_with(root));
+        let rank = |path: &Path| (root_of(path), reduced(self.below_root(path)).map_or(1, |(_, factor)| factor));
+        let best = fitting.iter().map(|path| rank(path)).min();
+        fitting.into_iter().filter(|path| Some(rank(path)) == best).cloned().collect()
+    }
+
+    /// The photo of a listed path that is here in a kind that is not read.
+    pub(super) fn not_read(&self, listed: &str) -> Option<&PathBuf> {
+        let listed = listed.replace('\\', "/");
+        let listed = Path::new(&listed);
+        self.not_read.get(&lower_stem(listed)).or_else(|| self.not_read.get(&lower(listed)))
     }
 
     /// A photo's path below the root it lies under.
-    fn below_root<'a>(&self, photo: &'a Path) -> &'a Path {
+    pub(super) fn below_root<'a>(&self, photo: &'a Path) -> &'a Path {
         self.roots.iter().find_map(|root| photo.strip_prefix(root).ok()).unwrap_or(photo)
     }
 
     /// A file beside a photo whose name says that it masks it, or one of its own name in a folder whose name says so:
-    /// `train_mask/0001.png` of `train/0001.exr`.
-    fn mask_beside(&self, photo: &Path) -> Option<PathBuf> {
-        let candidates = names_of_masks(&lower_stem(photo));
+    /// `train_mask/0001.png` of `train/0001.exr`. RealityScan puts `0001.jpg.mask.png` beside `0001.jpg`.
+    pub(super) fn mask_beside(&self, photo: &Path) -> Option<PathBuf> {
+        let candidates = [lower_stem(photo), lower(photo)].map(|name| names_of_masks(&name)).concat();
         let mut files = candidates.iter().filter_map(|name| self.by_stem.get(name)).flatten();
         let beside = files.find(|mask| mask.parent() == photo.parent()).cloned();
         beside.or_else(|| {
@@ -192,148 +218,11 @@ fn collect(folder: &Path, depth: usize, found: &mut Found) -> Result<()> {
     Ok(())
 }
 
-/// The views of listed cameras whose photos are here; the others are told in one finding.
-///
-/// # Errors
-/// `Missing` when no photo is here.
-pub fn views_of(
-    posed: Vec<Posed>,
-    photos: &PhotoIndex,
-    masks: &[PathBuf],
-    findings: &mut Vec<Finding>,
-) -> Result<Vec<SourceView>> {
-    let masks_folder = masks.iter().find(|folder| folder.is_dir());
-    let mut masks = masks_folder.map(|folder| Masks::of_folder(folder)).transpose()?.unwrap_or_default();
-    let listed = posed.len();
-    let (mut views, mut missing) = (Vec::new(), Vec::new());
-    for own in posed {
-        if !own.lens.is_finite() {
-            return Err(Error::new(ErrorKind::NonFinite, "a number of the lens is not finite")
-                .at(own.place)
-                .remedy("calibrate or export the camera again"));
-        }
-        let Some(photo) = photos.find(&own.listed) else {
-            missing.push(own.listed);
-            continue;
-        };
-        let mask =
-            own.mask.or_else(|| masks.of_photo(photos.below_root(&photo))).or_else(|| photos.mask_beside(&photo));
-        views.push(SourceView {
-            name: String::new(),
-            photo,
-            mask,
-            camera: own.camera,
-            lens: (!own.lens.is_pinhole()).then_some(own.lens),
-            size: own.size,
-            place: own.place,
-        });
-    }
-    let folder = photos.roots.first().cloned().unwrap_or_default();
-    if listed == 0 {
-        return Err(Error::new(ErrorKind::Missing, "no camera has a pose: no photo was aligned")
-            .at(Place::File(folder))
-            .remedy("align the photos in the program that made the cameras, and export them again"));
-    }
-    // A photo of a kind that is not read is here all the same: its error names the kind and the way out.
-    let not_read = |listed: &String| {
-        let listed = listed.replace('\\', "/");
-        let listed = Path::new(&listed);
-        photos.not_read.get(&lower_stem(listed)).or_else(|| photos.not_read.get(&lower(listed)))
-    };
-    if views.is_empty()
-        && let Some(photo) = missing.iter().find_map(not_read)
-    {
-        return Err(match file::read_header(photo) {
-            Err(error) if error.kind() == ErrorKind::Unsupported => error,
-            _ => Error::new(ErrorKind::Unsupported, "photos of this kind are not read")
-                .at(Place::File(photo.clone()))
-                .remedy(
-                    "develop raw files to linear 16-bit TIFF, convert others to TIFF, PNG or JPEG: all photos alike",
-                ),
-        });
-    }
-    if views.is_empty() {
-        let example = missing.first().map(|name| format!(", such as {name}")).unwrap_or_default();
-        return Err(Error::new(
-            ErrorKind::Missing,
-            format!("none of the {listed} photos the cameras name is here{example}"),
-        )
-        .at(Place::File(folder))
-        .remedy("copy the photos into a folder images/ of the scene"));
-    }
-    if !missing.is_empty() {
-        let remedy = if missing.iter().any(|listed| not_read(listed).is_some()) {
-            "raw files and HEIC are not read: convert them to TIFF, PNG or JPEG, all alike"
-        } else {
-            "copy their photos as well to use them"
-        };
-        findings.push(
-            Finding::new(
-                Severity::Warning,
-                "camera-without-photo",
-                format!(
-                    "{} of {listed} cameras have no photo here and are skipped: {}",
-                    missing.len(),
-                    some_of(&missing)
-                ),
-            )
-            .at(Place::File(folder))
-            .remedy(remedy),
-        );
-    }
-    findings.extend(told_of_smaller(&views, photos));
-    if let Some(folder) = masks_folder {
-        // Those of photos that take no part were meant for somebody too.
-        photos.by_name.values().flatten().for_each(|photo| drop(masks.of_photo(photos.below_root(photo))));
-        masks.tell_unused(folder, false, findings)?;
-    }
-    name_views(&mut views);
-    Ok(views)
-}
-
-/// That photos are taken from folders of smaller ones where those in full size are not there.
-fn told_of_smaller(views: &[SourceView], photos: &PhotoIndex) -> Option<Finding> {
-    let mut folders = BTreeSet::new();
-    for view in views {
-        let below = photos.below_root(&view.photo);
-        let Some((folder, _)) = reduced(below) else { continue };
-        let name = folder.to_string_lossy().into_owned();
-        let whole = name.rsplit_once('_').map_or("", |(whole, _)| whole);
-        if !photos.roots.iter().any(|root| root.join(whole).is_dir()) {
-            folders.insert(name);
-        }
-    }
-    let folders: Vec<String> = folders.into_iter().collect();
-    let message = format!("the photos in full size are not here: those of {} are read", some_of(&folders));
-    (!folders.is_empty()).then(|| {
-        Finding::new(Severity::Note, "photos-smaller", message)
-            .remedy("copy the folder of the photos in full size beside it for finer maps")
-    })
-}
-
 /// The first names of a list, and how many more there are.
 pub fn some_of(names: &[String]) -> String {
     const SHOWN: usize = 5;
     let shown = names.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join(", ");
     if names.len() > SHOWN { format!("{shown} and {} more", names.len() - SHOWN) } else { shown }
-}
-
-/// Names views by the stems of their photos; where two are alike, with the folders in front that tell them apart.
-fn name_views(views: &mut [SourceView]) {
-    for depth in 0..DEEPEST {
-        let name = |path: &Path| {
-            let mut parts: Vec<String> =
-                path.iter().rev().skip(1).take(depth).map(|part| composed(&part.to_string_lossy())).collect();
-            parts.reverse();
-            parts.push(stem_of(path));
-            parts.join("_")
-        };
-        views.iter_mut().for_each(|view| view.name = name(&view.photo));
-        let distinct: std::collections::HashSet<&str> = views.iter().map(|view| view.name.as_str()).collect();
-        if distinct.len() == views.len() {
-            return;
-        }
-    }
 }
 
 #[cfg(test)]

@@ -58,35 +58,30 @@ fn photos_are_found_by_the_end_of_their_path() {
     assert_eq!(index.mask_beside(&root.join("images/right/0001.JPG")), None);
 }
 
-fn posed(listed: &str) -> Posed {
-    let identity = glam::DMat3::IDENTITY;
-    let camera = SourceCamera { intrinsics: identity, rotation: identity, translation: glam::DVec3::ZERO };
-    let lens = Lens::default();
-    Posed { listed: listed.into(), camera, lens, size: None, mask: None, place: Place::Nowhere }
+#[test]
+fn names_with_points_are_whole_and_masks_bear_the_whole_name_of_their_photo() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    for file in ["IMG.png", "IMG.1.png", "IMG.png.mask.png", "b.png", "b.tif"] {
+        std::fs::write(root.join(file), b"").unwrap();
+    }
+    let index = PhotoIndex::of_folders(&[root.to_path_buf()]).unwrap();
+    assert_eq!(index.find("IMG.1"), Some(root.join("IMG.1.png")));
+    assert_eq!(index.find("IMG"), Some(root.join("IMG.png")));
+    assert_eq!(index.find("IMG.jpg"), Some(root.join("IMG.png")), "an extension of photos is one");
+    assert_eq!(index.mask_beside(&root.join("IMG.png")), Some(root.join("IMG.png.mask.png")));
+    assert_eq!(index.find("b.jpg"), None);
+    assert_eq!(index.fitting("b.jpg").len(), 2);
 }
 
 #[test]
-fn photos_of_kinds_that_are_not_read_are_named_with_the_way_out() {
-    let folder = tempfile::tempdir().unwrap();
-    // A TIFF with the tag of DNG's version.
-    let raw = b"II*\0\x08\0\0\0\x01\0\x12\xc6\x01\0\x04\0\0\0\x01\x04\0\0\0\0\0\0";
-    std::fs::write(folder.path().join("a.DNG"), raw).unwrap();
-    let index = PhotoIndex::of_folders(&[folder.path().into()]).unwrap();
-    for listed in ["a", "C:\\work\\a.jpg"] {
-        let error = views_of(vec![posed(listed)], &index, &[], &mut Vec::new()).unwrap_err();
-        assert!(error.kind() == ErrorKind::Unsupported && error.remedy_text().contains("develop"), "{error}");
-    }
-    std::fs::write(folder.path().join("c.nef"), b"II*\0").unwrap();
-    let index = PhotoIndex::of_folders(&[folder.path().into()]).unwrap();
-    let error = views_of(vec![posed("c")], &index, &[], &mut Vec::new()).unwrap_err();
-    assert!(error.kind() == ErrorKind::Unsupported && error.remedy_text().contains("develop"), "{error}");
-    let error = views_of(vec![posed("b")], &index, &[], &mut Vec::new()).unwrap_err();
-    assert_eq!(error.kind(), ErrorKind::Missing);
-    std::fs::create_dir(folder.path().join("images_2")).unwrap();
-    std::fs::write(folder.path().join("images_2/b.png"), b"").unwrap();
-    let index = PhotoIndex::of_folders(&[folder.path().into()]).unwrap();
-    let mut findings = Vec::new();
-    views_of(vec![posed("a"), posed("b")], &index, &[], &mut findings).unwrap();
-    assert!(findings[0].code == "camera-without-photo" && findings[0].message.contains("a"));
-    assert!(findings[1].code == "photos-smaller" && findings[1].message.contains("images_2"));
+fn a_photo_is_read_from_where_it_is_listed_unless_it_is_under_the_folder() {
+    let (folder, elsewhere) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let listed = elsewhere.path().join("a.png");
+    std::fs::write(&listed, b"").unwrap();
+    let listed_text = listed.to_string_lossy().into_owned();
+    let index = || PhotoIndex::of_folders(&[folder.path().to_path_buf()]).unwrap();
+    assert_eq!(index().find(&listed_text), Some(listed));
+    std::fs::write(folder.path().join("a.png"), b"").unwrap();
+    assert_eq!(index().find(&listed_text), Some(folder.path().join("a.png")));
 }

@@ -225,7 +225,9 @@ fn load(
                 let way = way.unwrap_or_else(|| MaskWay::of_set([read.facts()]));
                 let MaskValues { values, are_opacity, told } = read.into_values(way);
                 shared.extend(told);
-                let values = (masks::resized(values, mask, &photo, packed), are_opacity);
+                let (values, scaled) = masks::resized(values, mask, &photo, packed);
+                shared.extend(scaled);
+                let values = (values, are_opacity);
                 masks::apply_mask(mask, values, view, &photo, stored, &mut states, &mut findings)?;
             }
             (None, Some(alpha)) => masks::apply_alpha(alpha, is_float, &mut states, &mut shared),

@@ -10,10 +10,11 @@ use super::camera_file::read_text;
 use super::colmap_lens::matrix;
 use super::mesh_choice;
 use super::metashape_project::parse;
-use super::photo_index::{PhotoIndex, Posed, some_of, views_of};
+use super::photo_index::{PhotoIndex, some_of};
+use super::posed::{Posed, views_of};
 use super::source::{SourceCamera, SourceScene};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
-use crate::files::stem_of;
+use crate::files::name_of;
 use crate::image::file;
 use crate::scene::lens::{Lens, Model, Polynomial};
 use glam::{DMat3, DVec3};
@@ -25,12 +26,43 @@ const FILM_MILLIMETRES: f64 = 36.0;
 /// Pixels whose sides differ by less than this share are square: it moves the edge of a photo by less than a pixel.
 const SQUARE: f64 = 1e-4;
 
+/// Folders below that of the side files that are looked into, how deep and how many.
+const DEEPEST: usize = 3;
+const MOST_FOLDERS: usize = 1000;
+
 /// The folder of a scene that holds the side files: itself, or one of photos.
 pub fn folder_of(folder: &Path) -> Option<PathBuf> {
-    ["", "images", "photos", "image"].map(|inner| folder.join(inner)).into_iter().find(|inner| {
-        let first = files_of(inner, &["xmp"]).ok().and_then(|files| files.into_iter().next());
-        first.is_some_and(|path| read_text(&path).is_ok_and(|text| text.contains("xcr:")))
+    side_files(folder).map(|(inner, _)| inner)
+}
+
+/// The side files of a scene and the folder that they lie in or under: the scene's itself, one of photos, or any. Those that
+/// other programs wrote, such as Lightroom, are none.
+fn side_files(folder: &Path) -> Option<(PathBuf, Vec<PathBuf>)> {
+    let places = [("", 0), ("images", DEEPEST), ("photos", DEEPEST), ("image", DEEPEST), ("", DEEPEST)];
+    places.into_iter().map(|(inner, depth)| (folder.join(inner), depth)).find_map(|(inner, depth)| {
+        let (mut files, mut looked_into) = (Vec::new(), 0);
+        collect(&inner, depth, &mut looked_into, &mut files);
+        (!files.is_empty()).then_some((inner, files))
     })
+}
+
+fn collect(folder: &Path, depth: usize, looked_into: &mut usize, files: &mut Vec<PathBuf>) {
+    *looked_into += 1;
+    let own = files_of(folder, &["xmp"]).unwrap_or_default();
+    files.extend(own.into_iter().filter(|path| read_text(path).is_ok_and(|text| text.contains("xcr:"))));
+    if depth == 0 {
+        return;
+    }
+    let is_looked_into = |path: &PathBuf| path.is_dir() && !name_of(path).starts_with(['.', '_']);
+    let entries = std::fs::read_dir(folder).into_iter().flatten();
+    let mut folders: Vec<PathBuf> =
+        entries.filter_map(|entry| Some(entry.ok()?.path())).filter(is_looked_into).collect();
+    folders.sort();
+    for folder in folders {
+        if *looked_into < MOST_FOLDERS {
+            collect(&folder, depth - 1, looked_into, files);
+        }
+    }
 }
 
 /// What a side file says.
@@ -111,12 +143,13 @@ fn lens_of(side: &Side, place: &Place) -> Result<Lens> {
 
 /// Lists a scene of side files and reads its cameras.
 pub fn read(folder: &Path) -> Result<SourceScene> {
-    let inner = folder_of(folder).unwrap_or_else(|| folder.into());
+    let (inner, files) = side_files(folder).unwrap_or_else(|| (folder.into(), Vec::new()));
     let photos = PhotoIndex::of_folders(&[inner.clone(), folder.into()])?;
     let mut findings = Vec::new();
     let (mut posed, mut rejected, mut unaligned, mut tangential) = (Vec::new(), Vec::new(), Vec::new(), false);
-    for path in files_of(&inner, &["xmp"])? {
-        let stem = stem_of(&path);
+    for path in files {
+        // Photos of one name in several folders are told apart by these.
+        let stem = path.strip_prefix(&inner).unwrap_or(&path).with_extension("").to_string_lossy().into_owned();
         let Some(side) = side_of(&path)? else {
             unaligned.push(stem);
             continue;
@@ -157,7 +190,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
             ));
         }
     }
-    let views = views_of(posed, &photos, &[folder.join("masks"), folder.join("mask")], &mut findings)?;
+    let views = views_of(posed, &photos, &[folder.into()], &mut findings)?;
     let mesh = mesh_choice::find(&[folder.into(), inner], &mut findings);
     Ok(SourceScene { findings, ..SourceScene::of_photographs(folder, mesh, views) })
 }
@@ -175,6 +208,26 @@ mod tests {
             <xcr:Rotation>0 1 0 -1 0 0 0 0 1</xcr:Rotation><xcr:Position>1 2 3</xcr:Position>
             <xcr:DistortionCoeficients>0.1 0.02 0 0.001 0 0</xcr:DistortionCoeficients></rdf:Description></rdf:RDF></x:xmpmeta>"#
         )
+    }
+
+    #[test]
+    fn photos_in_several_folders_are_told_apart_and_files_of_lightroom_passed_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let images = folder.path().join("images");
+        for (name, position) in [("a", "1 2 3"), ("b", "4 5 6")] {
+            std::fs::create_dir_all(images.join(name)).unwrap();
+            file::write_png_srgb8(&images.join(name).join("0.png"), &Image::filled(40, 30, [9; 3])).unwrap();
+            std::fs::write(images.join(name).join("0.xmp"), side(1).replace("1 2 3", position)).unwrap();
+        }
+        std::fs::write(images.join("0.xmp"), "<x:xmpmeta xmlns:x=\"adobe:ns:meta/\"/>").unwrap();
+        assert_eq!(folder_of(folder.path()), Some(images.clone()));
+        let scene = read(folder.path()).unwrap();
+        let centres = scene.views.iter().map(|view| {
+            let centre = view.camera.rotation.transpose() * -view.camera.translation;
+            (view.photo.clone(), centre.x.round())
+        });
+        let expected = [(images.join("a/0.png"), 1.0), (images.join("b/0.png"), 4.0)];
+        assert_eq!(centres.collect::<Vec<_>>(), expected);
     }
 
     #[test]

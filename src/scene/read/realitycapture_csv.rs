@@ -13,7 +13,8 @@ use super::blended_mvs::files_of;
 use super::camera_file::read_text;
 use super::colmap_lens::matrix;
 use super::mesh_choice;
-use super::photo_index::{PhotoIndex, Posed, views_of};
+use super::photo_index::PhotoIndex;
+use super::posed::{Posed, views_of};
 use super::source::{SourceCamera, SourceScene};
 use super::text;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
@@ -176,7 +177,7 @@ pub fn read(path: &Path) -> Result<SourceScene> {
             .remedy("export XMP side files, which name the model, if it was the division model"),
         );
     }
-    let views = views_of(posed, &photos, &[folder.join("masks"), folder.join("mask")], &mut findings)?;
+    let views = views_of(posed, &photos, &[folder.into()], &mut findings)?;
     let mesh = mesh_choice::find(&[roots, vec![folder.into()]].concat(), &mut findings);
     Ok(SourceScene { findings, ..SourceScene::of_photographs(folder, mesh, views) })
 }

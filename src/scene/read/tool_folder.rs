@@ -1,7 +1,8 @@
 //! Folders in which tools leave photos, masks and a mesh beside their cameras.
 
 use super::mesh_choice;
-use super::photo_index::{PhotoIndex, Posed, views_of};
+use super::photo_index::PhotoIndex;
+use super::posed::{Posed, views_of};
 use super::source::SourceScene;
 use crate::error::{Finding, Result};
 use std::path::{Path, PathBuf};
@@ -18,7 +19,7 @@ pub fn scene_of(
     mesh_folders: &[PathBuf],
     mut findings: Vec<Finding>,
 ) -> Result<SourceScene> {
-    let views = views_of(posed, photos, &[folder.join("masks"), folder.join("mask")], &mut findings)?;
+    let views = views_of(posed, photos, &[folder.into()], &mut findings)?;
     let mesh = mesh_choice::find(mesh_folders, &mut findings);
     Ok(SourceScene { findings, ..SourceScene::of_photographs(folder, mesh, views) })
 }

@@ -7,7 +7,8 @@
 use super::camera_file::read_text;
 use super::colmap_lens::matrix;
 use super::mesh_choice;
-use super::photo_index::{PhotoIndex, Posed, some_of, views_of};
+use super::photo_index::{PhotoIndex, some_of};
+use super::posed::{Posed, views_of};
 use super::source::{MeshFrame, SourceCamera, SourceScene};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::files::{as_stored, folder_of};
@@ -27,6 +28,17 @@ const JUDGES: [&str; 2] = ["transforms_test.json", "transforms_val.json"];
 /// The file that makes a folder one of this kind.
 pub fn file_of(folder: &Path) -> Option<PathBuf> {
     [WHOLE, TRAIN].iter().map(|name| folder.join(name)).find(|path| path.is_file())
+}
+
+/// Whether a file holds frames.
+pub fn holds_frames(path: &Path) -> bool {
+    let json = read_text(path).ok().and_then(|text| serde_json::from_str::<Value>(&text).ok());
+    json.is_some_and(|json| json.get("frames").and_then(Value::as_array).is_some_and(|frames| !frames.is_empty()))
+}
+
+/// A number, be it written as one or, as some scripts do, as a string.
+fn number_of(value: &Value) -> Option<f64> {
+    value.as_f64().or_else(|| value.as_str()?.trim().parse().ok())
 }
 
 /// One file of frames.
@@ -62,7 +74,7 @@ impl Transforms {
     }
 
     fn number(&self, frame: &Value, key: &str) -> Option<f64> {
-        frame.get(key).or_else(|| self.json.get(key)).and_then(Value::as_f64)
+        frame.get(key).or_else(|| self.json.get(key)).and_then(number_of)
     }
 
     /// The rows of a matrix; those that are missing are those of the identity.
@@ -73,7 +85,7 @@ impl Transforms {
             return None;
         }
         for (index, row) in rows.iter().enumerate() {
-            let numbers: Vec<f64> = row.as_array()?.iter().map(Value::as_f64).collect::<Option<_>>()?;
+            let numbers: Vec<f64> = row.as_array()?.iter().map(number_of).collect::<Option<_>>()?;
             *matrix.col_mut(index) = DVec4::from_array(numbers.try_into().ok()?);
         }
         Some(matrix.transpose())
@@ -91,7 +103,7 @@ impl Transforms {
                 })?
             }
         };
-        let scale = self.json.get("applied_scale").and_then(Value::as_f64).filter(|scale| *scale > 0.0).unwrap_or(1.0);
+        let scale = self.json.get("applied_scale").and_then(number_of).filter(|scale| *scale > 0.0).unwrap_or(1.0);
         Ok(DMat4::from_scale(DVec3::splat(scale)) * transform)
     }
 
@@ -167,11 +179,6 @@ impl Transforms {
         findings.append(&mut noticed);
         let base = folder_of(&self.path);
         let mask = frame.get("mask_path").and_then(Value::as_str).map(|mask| as_stored(base.join(mask)));
-        if let Some(absent) = mask.as_ref().filter(|mask| !mask.is_file()) {
-            return Err(Error::new(ErrorKind::Missing, format!("the mask {} is not there", absent.display()))
-                .at(place)
-                .remedy("copy it, or remove mask_path from the file"));
-        }
         Ok(Posed { listed, camera, lens: self.lens(frame, index)?, size, mask, place })
     }
 }
@@ -231,7 +238,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
         }
         findings.extend(told_of_pinholes(file, &posed[first..]));
     }
-    let views = views_of(posed, &photos, &[folder.join("masks"), folder.join("mask")], &mut findings)?;
+    let views = views_of(posed, &photos, &[folder.into()], &mut findings)?;
     let held_out: Vec<String> =
         views.iter().filter(|view| held.contains(&view.photo)).map(|view| view.name.clone()).collect();
     if !held_out.is_empty() && held_out.len() < views.len() {

@@ -1,5 +1,6 @@
 use super::*;
 use crate::image::{Image, file};
+use crate::scene::settings::MaskUse;
 
 fn folder_with_photos(photos: &[&str]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -81,8 +82,20 @@ fn what_is_missing_is_named() {
     assert!(error_of(&frame(&format!(r#","transform_matrix":{POSE}"#))).message().contains("fl_x"));
     let panorama = format!(r#","fl_x":9,"camera_model":"EQUIRECTANGULAR","transform_matrix":{POSE}"#);
     assert_eq!(error_of(&frame(&panorama)).kind(), ErrorKind::Unsupported);
-    let masked = format!(r#","fl_x":9,"mask_path":"m.png","transform_matrix":{POSE}"#);
-    assert_eq!(error_of(&frame(&masked)).kind(), ErrorKind::Missing);
+}
+
+#[test]
+fn a_mask_that_is_named_and_missing_is_an_error_unless_masks_are_ignored() {
+    let folder = folder_with_photos(&["a.png"]);
+    let frame = format!(r#""file_path":"a.png","fl_x":"9.0","mask_path":"m.png","transform_matrix":{POSE}"#);
+    std::fs::write(folder.path().join("transforms.json"), format!(r#"{{"frames":[{{{frame}}}]}}"#)).unwrap();
+    std::fs::write(folder.path().join("mesh.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let settings = |masks| crate::scene::ReadSettings { masks, ..Default::default() };
+    let read = |masks| crate::scene::read::read(folder.path(), &settings(masks));
+    let error = read(MaskUse::Use).unwrap_err();
+    assert!(error.kind() == ErrorKind::Missing && error.remedy_text().contains("--masks ignore"), "{error}");
+    let scene = read(MaskUse::Ignore).unwrap();
+    assert_eq!(scene.views[0].camera.focal_pixels.x, 9.0, "numbers may stand in strings");
 }
 
 #[test]
