@@ -5,14 +5,16 @@ use crate::insight::report::data::ReportData;
 use crate::job::budget::ENDED_BY_BUDGET;
 
 /// Findings that are repeated when a fit has ended.
-const SPOILS_ALL: [&str; 9] = [
+const SPOILS_ALL: [&str; 11] = [
     ENDED_BY_BUDGET,
     "intrinsics-scaled",
     "light-in-groups",
     "light-turns-with-camera",
+    "photo-misplaced",
     "photo-turned",
     "photos-disagree",
     "photos-exchanged",
+    "photos-identical",
     "photos-not-explained",
     "photos-shifted",
 ];

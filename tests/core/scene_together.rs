@@ -25,7 +25,8 @@ fn finding<'a>(report: &'a Report, code: &str) -> &'a Finding {
     })
 }
 
-const ALL: [&str; 4] = ["photos-shifted", "photos-exchanged", "photo-turned", "photos-disagree"];
+const ALL: [&str; 6] =
+    ["photos-shifted", "photos-exchanged", "photos-identical", "photo-misplaced", "photo-turned", "photos-disagree"];
 
 #[test]
 fn photos_that_belong_agree() {
@@ -77,8 +78,46 @@ fn two_exchanged_photos_and_a_turned_one_are_named() {
     assert!(finding(&report, "photos-disagree").message.ends_with(": 00000006"), "{:#?}", report.findings);
 }
 
+#[test]
+fn a_copy_of_another_photo_is_told_by_its_content_and_by_where_it_fits() {
+    let mut copied = unmasked();
+    copied.views[3].photo = copied.views[4].photo.clone();
+    let report = check(&copied);
+    let told = finding(&report, "photos-identical");
+    assert_eq!(told.severity, Severity::Warning);
+    assert!(told.message.contains("00000003, 00000004; 00000004 fits"), "{told}");
+    assert!(report.views[3].is_misplaced && !report.views[4].is_misplaced);
+    // Another encoding of it is no copy, but fits where the other does.
+    change_photo(&mut copied.views[3], |radiance| radiance * 0.8);
+    let report = check(&copied);
+    let told = finding(&report, "photo-misplaced");
+    assert!(told.place.contains("00000003") && told.message.contains("camera of 00000004"), "{told}");
+    // A view given twice is counted twice, and no fault.
+    let mut twice = unmasked();
+    twice.views.push(twice.views[2].clone());
+    twice.views[8].name = "00000008".into();
+    assert_eq!(finding(&check(&twice), "photos-identical").severity, Severity::Note);
+}
+
+#[test]
+fn photos_that_are_all_mirrored_are_told_so() {
+    let mut mirrored = unmasked();
+    for view in &mut mirrored.views {
+        let Photo::Srgb8(bytes) = &view.photo else { unreachable!() };
+        view.photo = Photo::Srgb8(Image::from_fn(SIZE.0, SIZE.1, |row, column| bytes[(row, SIZE.0 - 1 - column)]));
+    }
+    let report = check(&mirrored);
+    let told = finding(&report, "photo-turned");
+    assert!(told.message.contains("all of them are mirrored left to right"), "{told}");
+}
+
 /// Photos whose surface is lit by one more light, from a direction of each view's own.
 fn relit(light_of_view: impl Fn(usize, &Scene) -> Vec3) -> Scene {
+    relit_beside(0.15, light_of_view)
+}
+
+/// The same beside so much light from all around.
+fn relit_beside(ambient: f32, light_of_view: impl Fn(usize, &Scene) -> Vec3) -> Scene {
     let mut scene = unmasked();
     let bvh = Bvh::build(&scene.mesh.positions, &scene.mesh.triangles).unwrap();
     for index in 0..scene.views.len() {
@@ -88,7 +127,7 @@ fn relit(light_of_view: impl Fn(usize, &Scene) -> Vec3) -> Scene {
             let hit = bvh.closest_hit(&view.camera.ray_through(Vec2::new(column as f32 + 0.5, row as f32 + 0.5)));
             let normal =
                 hit.map_or(Vec3::ZERO, |hit| scene.mesh.area_vector(hit.triangle as usize).normalize_or_zero());
-            view.photo.radiance(row, column) * (0.15 + normal.dot(light).max(0.0))
+            view.photo.radiance(row, column) * (ambient + normal.dot(light).max(0.0))
         });
         scene.views[index].photo = Photo::Srgb8(bytes_of(&linear));
     }

@@ -33,7 +33,7 @@ pub use format::Format;
 pub(crate) use guard::guarded;
 pub use guard::keep_decoders_quiet;
 pub use mask::{MaskFacts, MaskFile, MaskValues, MaskWay};
-pub use photo::{Encoding, PhotoFile, PhotoOptions, PhotoPixels, swaps_sides, turned};
+pub use photo::{Encoding, PhotoFile, PhotoOptions, PhotoPixels, place_in_stored, swaps_sides, turned};
 pub use source::read_header;
 
 use super::{GreyImage, Image, RgbImage, transfer};

@@ -111,13 +111,12 @@ pub fn swaps_sides(orientation: u8) -> bool {
     (5..=8).contains(&orientation)
 }
 
-/// The upright picture of a stored one, by its EXIF orientation (CIPA DC-008, 4.6.4): 1 is upright, 3 turned by 180
-/// degrees, 6 needs a quarter turn clockwise, 8 one counterclockwise, 2, 4, 5 and 7 are their mirrors. Other numbers are 1.
-pub fn turned<T: Copy>(image: Image<T>, orientation: u8) -> Image<T> {
-    let (width, height) = (image.width(), image.height());
-    let (last_row, last_column) = (height.wrapping_sub(1), width.wrapping_sub(1));
-    let size = if swaps_sides(orientation) { (height, width) } else { (width, height) };
-    let stored = |row: usize, column: usize| match orientation {
+/// Row and column in a stored picture of `size` (width and height) of a place in the upright one, by its EXIF orientation (CIPA
+/// DC-008, 4.6.4): 1 is upright, 3 turned by 180 degrees, 6 needs a quarter turn clockwise, 8 one counterclockwise, 2, 4, 5 and
+/// 7 are their mirrors. Other numbers are 1.
+pub fn place_in_stored(orientation: u8, size: (usize, usize), (row, column): (usize, usize)) -> (usize, usize) {
+    let (last_column, last_row) = (size.0.wrapping_sub(1), size.1.wrapping_sub(1));
+    match orientation {
         2 => (row, last_column - column),
         3 => (last_row - row, last_column - column),
         4 => (last_row - row, column),
@@ -126,11 +125,17 @@ pub fn turned<T: Copy>(image: Image<T>, orientation: u8) -> Image<T> {
         7 => (last_row - column, last_column - row),
         8 => (column, last_column - row),
         _ => (row, column),
-    };
+    }
+}
+
+/// The upright picture of a stored one, by its EXIF orientation.
+pub fn turned<T: Copy>(image: Image<T>, orientation: u8) -> Image<T> {
+    let stored = (image.width(), image.height());
+    let size = if swaps_sides(orientation) { (stored.1, stored.0) } else { stored };
     if !(2..=8).contains(&orientation) {
         return image;
     }
-    Image::from_fn(size.0, size.1, |row, column| image[stored(row, column)])
+    Image::from_fn(size.0, size.1, |row, column| image[place_in_stored(orientation, stored, (row, column))])
 }
 
 #[cfg(test)]

@@ -33,7 +33,9 @@ struct Pair {
 
 /// Measures the views' exposures against each other.
 pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Report) {
-    let pairs = neighbours::over_views(scene, |view| pairs_of(scene, bvh, probes, view));
+    let mut pairs = neighbours::over_views(scene, |view| pairs_of(scene, bvh, probes, view));
+    // A photo of something else is neither brighter nor darker.
+    pairs.retain(|pair| [pair.a, pair.b].into_iter().all(|view| !report.views[view].is_misplaced));
     let exposures = solve(scene.views.len(), &pairs);
     for (line, exposure) in report.views.iter_mut().zip(&exposures) {
         line.exposure_stops = exposure.map(|log| log / std::f64::consts::LN_2);

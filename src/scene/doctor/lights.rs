@@ -96,7 +96,8 @@ impl LightCheck {
 /// Measures the lights and says what they are.
 pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Report) {
     let step = scene.views.len().div_ceil(MOST_VIEWS).max(1);
-    let views: Vec<usize> = (0..scene.views.len()).step_by(step).filter(|&view| !probes[view].is_empty()).collect();
+    let is_usable = |view: &usize| !probes[*view].is_empty() && !report.views[*view].is_misplaced;
+    let views: Vec<usize> = (0..scene.views.len()).step_by(step).filter(is_usable).collect();
     if views.len() < 4 {
         return;
     }

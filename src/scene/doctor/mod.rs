@@ -12,7 +12,7 @@
 //! | [`silhouette`] | do masks and mesh agree |
 //! | [`pixel_centre`], [`edge_profile`] | where do pixel centres lie in the intrinsics, to a hundredth of a pixel |
 //! | [`pictures`] | encoding, clipping, darkness |
-//! | [`agreement`] | do photos belong to their cameras, by the photos alone |
+//! | [`agreement`], `outlying`, `copies`, `trial` | do photos belong to their cameras, by the photos alone |
 //! | [`lights`], `shading` | is the light one, does it turn with the camera, does it fall into groups |
 //! | [`exposure`] | do views agree on the radiance of what they share |
 //! | [`resolution`] | how much detail of the surface do the photos resolve |
@@ -24,6 +24,7 @@ pub mod agreement;
 pub mod cameras;
 pub mod closeness;
 pub mod contact_sheet;
+mod copies;
 pub mod detail;
 pub mod edge_profile;
 pub mod exposure;
@@ -32,6 +33,7 @@ pub mod geometry;
 pub mod lights;
 mod neighbours;
 pub mod normals;
+mod outlying;
 pub mod overlay;
 pub mod pictures;
 pub mod pixel_centre;
@@ -39,6 +41,7 @@ pub mod probe;
 pub mod resolution;
 mod shading;
 pub mod silhouette;
+mod trial;
 
 pub use contact_sheet::contact_sheet;
 pub use overlay::overlay;
@@ -114,6 +117,9 @@ pub struct ViewCheck {
     /// How the photo agrees with others where they show the same surface: the median correlation of the logarithms of
     /// radiance, in [-1, 1]; `None` when nothing is shared.
     pub agreement: Option<f64>,
+    /// Whether its photo was found not to belong to its camera as it is: what asks for light and exposure leaves it out.
+    #[serde(default)]
+    pub is_misplaced: bool,
     /// Brightness against the other views by the surface they share, in stops; `None` when nothing is shared.
     pub exposure_stops: Option<f64>,
 }
