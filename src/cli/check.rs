@@ -79,6 +79,10 @@ fn print_page(scene: &Scene, understood: &Understood, report: &Report, ask: &Ask
     if let Some(light) = &report.light {
         let share = 100.0 * light.of_each;
         match light.kind() {
+            LightKind::One if light.is_all_explained() => println!(
+                "light       one for all photos: their shading differs from it by {:.1} %",
+                100.0 * light.one_light_residual
+            ),
             LightKind::One => println!(
                 "light       one for all photos: another for each would explain {share:.0} % of what differs in shading"
             ),

@@ -156,6 +156,19 @@ fn a_light_that_turns_with_the_camera_and_two_lights_are_told() {
 }
 
 #[test]
+fn a_soft_light_that_turns_is_told_where_nothing_else_explains_the_photos() {
+    let from_left = |view: usize, scene: &Scene| {
+        scene.views[view].camera.rotation_camera_from_world.transpose() * Vec3::new(-0.8, -0.5, -0.3)
+    };
+    let report = check(&relit_beside(2.0, from_left));
+    let light = report.light.clone().unwrap();
+    assert!(light.one_light_residual < 0.15, "as little as gloss makes: {light:?}");
+    assert_eq!(light.kind(), LightKind::WithCamera, "{light:?}");
+    let report = check(&relit_beside(2.0, |_, _| Vec3::new(0.9, 0.4, 0.0)));
+    assert_eq!(report.light.as_ref().unwrap().kind(), LightKind::One, "{:?}", report.light);
+}
+
+#[test]
 fn photos_at_twice_the_calibrated_size_are_read_with_scaled_intrinsics() {
     let (_keep, folder) = folder();
     let written = scene(4);

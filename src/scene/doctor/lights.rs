@@ -38,6 +38,11 @@ const LEAST_SHARE: f64 = 0.25;
 const LEAST_PART: f64 = 0.55;
 /// Root mean square of what it takes away, in natural logarithms of radiance: gloss under one light comes to 0.1.
 const LEAST_SIZE: f64 = 0.15;
+/// An explanation that takes away this share leaves no room for gloss, which follows none of them so closely; where it leaves
+/// at most this part of what the next best leaves, it leads, and a smaller size is enough: a few percent of the radiance.
+const SURE_SHARE: f64 = 0.9;
+const SURE_PART: f64 = 0.5;
+const LEAST_SIZE_IF_SURE: f64 = 0.05;
 /// Share that a light turning with the camera must take away where it shines, and by how much more than one that stands
 /// still: of captures under one light the first comes to 0.5 at most, the second to 0.28 where there is little to explain.
 const LEAST_SHINE: f64 = 0.5;
@@ -77,19 +82,36 @@ pub enum LightKind {
 impl LightCheck {
     /// Which explanation is believed: the simplest that is as good as any.
     pub fn kind(&self) -> LightKind {
-        let is_large = |share: f64| self.one_light_residual * share.sqrt() > LEAST_SIZE;
+        let is_large = |share: f64| self.size_of(share) > LEAST_SIZE;
         let explained = |share: f64| share > LEAST_SHARE && share > LEAST_PART * self.of_each && is_large(share);
         let shines = self.shine_with_camera > LEAST_SHINE
             && self.shine_with_camera - self.shine_in_world > LEAST_LEAD
             && self.shine_with_camera > self.in_groups
             && is_large(self.shine_with_camera);
-        if shines || (explained(self.with_camera) && self.with_camera >= self.in_groups) {
+        let turning = self.with_camera.max(self.shine_with_camera);
+        let is_sure = |share: f64, other: f64| {
+            share > SURE_SHARE
+                && 1.0 - share < SURE_PART * (1.0 - other.max(self.shine_in_world))
+                && self.size_of(share) > LEAST_SIZE_IF_SURE
+        };
+        let turns = explained(self.with_camera) && self.with_camera >= self.in_groups;
+        if shines || turns || is_sure(turning, self.in_groups) {
             LightKind::WithCamera
-        } else if explained(self.in_groups) {
+        } else if explained(self.in_groups) || is_sure(self.in_groups, turning) {
             LightKind::InGroups
         } else {
             LightKind::One
         }
+    }
+
+    /// Root mean square of what an explanation takes away that takes this share, in natural logarithms of radiance.
+    fn size_of(&self, share: f64) -> f64 {
+        self.one_light_residual * share.sqrt()
+    }
+
+    /// Whether photos differ so little from what one light makes of them that nothing is there to be explained.
+    pub fn is_all_explained(&self) -> bool {
+        self.one_light_residual < LEAST_SIZE_IF_SURE
     }
 }
 
@@ -189,4 +211,35 @@ fn log_seen(scene: &Scene, bvh: &Bvh, view: usize, point: Vec3, normal: Vec3) ->
     }
     let value = luminance(photo.radiance(row, column));
     (value > DARK && !bvh.is_hidden_from(point, normal, camera.position_in_world())).then(|| f64::from(value.ln()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_explains_nearly_all_and_leads_needs_less_size() {
+        let of = |one_light_residual,
+                  [with_camera, shine_with_camera, shine_in_world, in_groups, of_each]: [f64; 5]| {
+            let second_group_begins = String::new();
+            LightCheck {
+                one_light_residual,
+                with_camera,
+                shine_with_camera,
+                shine_in_world,
+                in_groups,
+                of_each,
+                second_group_begins,
+            }
+            .kind()
+        };
+        // Two soft lights, and one that turns.
+        assert_eq!(of(0.11, [0.66, 0.72, 0.05, 0.94, 0.97]), LightKind::InGroups);
+        assert_eq!(of(0.14, [0.97, 0.99, 0.05, 0.62, 0.98]), LightKind::WithCamera);
+        // Gloss, few views of it, noise, and what two explanations explain alike.
+        assert_eq!(of(0.12, [0.06, 0.16, 0.67, 0.05, 0.7]), LightKind::One);
+        assert_eq!(of(0.09, [0.69, 0.73, 0.58, 0.46, 0.76]), LightKind::One);
+        assert_eq!(of(0.03, [0.1, 0.1, 0.0, 0.95, 0.97]), LightKind::One);
+        assert_eq!(of(0.1, [0.9, 0.92, 0.1, 0.93, 0.97]), LightKind::One);
+    }
 }
