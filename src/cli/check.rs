@@ -44,7 +44,7 @@ pub fn check(options: &CheckOptions, json: bool) -> Result<()> {
             serde_json::json!({"event": "check", "understood": understood, "findings": report.findings,
             "views": report.views, "texels_resolved": report.texels_resolved,
             "texels_resolved_sharpest": report.texels_resolved_sharpest, "surface": report.surface,
-            "agreement": report.agreement, "light": report.light, "ask": ask})
+            "agreement": report.agreement, "light": report.light, "pixel_centre": report.pixel_centre, "ask": ask})
         );
     } else {
         print_page(&scene, &understood, &report, &ask);
@@ -69,6 +69,9 @@ pub fn check(options: &CheckOptions, json: bool) -> Result<()> {
 fn print_page(scene: &Scene, understood: &Understood, report: &Report, ask: &Ask) {
     println!("{}", scene.name);
     println!("{understood}");
+    if let Some(measured) = &report.pixel_centre {
+        println!("centres     pixel centres are at {}; (0.5, 0.5) is right", measured.in_words());
+    }
     if let Some(texels) = report.texels_resolved {
         let texels = number::whole(texels as u64);
         println!("detail      the photos resolve {texels} texels of the surface: maps of {0} x {0}", ask.map_size);

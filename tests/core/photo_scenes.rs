@@ -140,3 +140,60 @@ fn exposures_by_exif_become_the_prior_of_the_gains() {
     assert!(plain.views.iter().all(|view| view.exposure_prior_stops.is_none()));
     assert!(plain.views[0].photo.radiance(0, 0).cmpgt(Vec3::ZERO).all());
 }
+
+/// An EXIF block with an orientation.
+fn exif_of_orientation(orientation: u8) -> Vec<u8> {
+    let mut tiff = b"II*\0\x08\0\0\0".to_vec();
+    tiff.extend([1, 0, 0x12, 0x01, 3, 0, 1, 0, 0, 0, orientation, 0, 0, 0, 0, 0, 0, 0]);
+    let length = (tiff.len() + 8) as u16;
+    [&[0xff, 0xe1], &length.to_be_bytes()[..], b"Exif\0\0", &tiff].concat()
+}
+
+#[test]
+fn orientations_that_keep_the_sides_are_tried_on_the_pixels() {
+    for (tag, turns) in [(3, true), (2, true), (4, true), (3, false)] {
+        let (_keep, path) = folder();
+        let whole = scene(8);
+        write_blended_mvs(&path, &whole, &FolderStyle::default());
+        for view in &whole.views {
+            let Photo::Srgb8(bytes) = &view.photo else { panic!("the fixture's photos have 8 bits") };
+            // Each of these is its own inverse.
+            let stored = if turns { file::turned(bytes.clone(), tag) } else { bytes.clone() };
+            let jpeg = file::encode_jpeg(&stored, 97).unwrap();
+            let photo = path.join(format!("blended_images/{}", view.name));
+            let with_exif = [&jpeg[..2], &exif_of_orientation(tag), &jpeg[2..]].concat();
+            std::fs::write(photo.with_extension("jpg"), with_exif).unwrap();
+            std::fs::remove_file(photo.with_extension("png")).unwrap();
+        }
+        let read = read(&path, &settings()).unwrap();
+        let (told, other) =
+            if turns { ("photo-turned", "photo-as-stored") } else { ("photo-as-stored", "photo-turned") };
+        let told = finding(&read, told).unwrap_or_else(|| panic!("{tag} {turns}: {:#?}", read.findings));
+        assert!(told.message.contains("photos agree by") && finding(&read, other).is_none(), "{told}");
+        let off = read.views.iter().zip(&whole.views).map(|(own, view)| {
+            let pixels = own.photo.to_linear().pixels().to_vec();
+            pixels.iter().zip(view.photo.to_linear().pixels()).map(|(a, b)| (*a - *b).length()).sum::<f32>()
+                / pixels.len() as f32
+        });
+        let worst = off.fold(0.0, f32::max);
+        assert!(worst < 0.02, "{tag} {turns}: off by {worst} in the mean");
+        // The masks lay as the cameras see them.
+        assert!(read.views.iter().zip(&whole.views).all(
+            |(own, view)| own.states.map(|state| state.is_surface()) == view.states.map(|state| state.is_surface())
+        ));
+    }
+    // Photos that show nothing tell nothing, and nothing is claimed.
+    let (_keep, path) = folder();
+    let whole = written(&path, |_, _| [90; 3]);
+    for view in &whole.views {
+        let Photo::Srgb8(bytes) = &view.photo else { panic!("the fixture's photos have 8 bits") };
+        let jpeg = file::encode_jpeg(bytes, 95).unwrap();
+        let photo = path.join(format!("blended_images/{}", view.name));
+        let with_exif = [&jpeg[..2], &exif_of_orientation(3), &jpeg[2..]].concat();
+        std::fs::write(photo.with_extension("jpg"), with_exif).unwrap();
+        std::fs::remove_file(photo.with_extension("png")).unwrap();
+    }
+    let read = read(&path, &settings()).unwrap();
+    let told = finding(&read, "photo-as-stored").unwrap();
+    assert!(told.message.contains("tells whether") && !told.remedy.is_empty(), "{told}");
+}

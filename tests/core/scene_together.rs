@@ -191,3 +191,25 @@ fn photos_at_twice_the_calibrated_size_are_read_with_scaled_intrinsics() {
     }
     assert!(check(&scene).views.iter().all(|view| view.mask_overlap.unwrap() > 0.95));
 }
+
+#[test]
+fn twice_the_calibrated_size_puts_a_wrong_convention_off_by_a_whole_pixel_which_is_mended() {
+    let (_keep, folder) = folder();
+    let written = scene(4);
+    // The source has its first pixel's centre at (0.5, 0.5), and readers of this kind of folder assume (0, 0).
+    write_blended_mvs(&folder, &written, &FolderStyle { centre_shift: 0.0, ..Default::default() });
+    for part in ["blended_images", "masks"] {
+        for entry in std::fs::read_dir(folder.join(part)).unwrap() {
+            let path = entry.unwrap().path();
+            let photo = file::read_srgb8(&path).unwrap();
+            let large = Image::from_fn(2 * SIZE.0, 2 * SIZE.1, |row, column| photo[(row / 2, column / 2)]);
+            file::write_png_srgb8(&path, &large).unwrap();
+        }
+    }
+    let scene = read(&folder, &ReadSettings::default()).unwrap();
+    assert!(scene.findings.iter().any(|finding| finding.code == "pixel-centre-measured"), "{:#?}", scene.findings);
+    for (read, written) in scene.views.iter().zip(&written.views) {
+        let off = read.camera.centre_pixels - 2.0 * written.camera.centre_pixels;
+        assert!(off.length() < 1e-2, "off by {off}: {:#?}", scene.findings);
+    }
+}

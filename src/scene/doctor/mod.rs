@@ -10,9 +10,10 @@
 //! | [`normals`] | do its normals belong to its triangles |
 //! | [`cameras`] | do the cameras look at the mesh, upright, not mirrored |
 //! | [`silhouette`] | do masks and mesh agree |
-//! | [`pixel_centre`], [`edge_profile`] | where do pixel centres lie in the intrinsics, to a hundredth of a pixel |
+//! | [`pixel_centre`], [`edge_profile`], `mask_edges` | where do pixel centres lie in the intrinsics, to a hundredth of a pixel |
 //! | [`pictures`] | encoding, clipping, darkness |
 //! | [`agreement`], `outlying`, `copies`, `trial` | do photos belong to their cameras, by the photos alone |
+//! | `ways` | do photos lie as stored, or as their EXIF orientation says |
 //! | [`lights`], `shading` | is the light one, does it turn with the camera, does it fall into groups |
 //! | [`exposure`] | do views agree on the radiance of what they share |
 //! | [`resolution`] | how much detail of the surface do the photos resolve |
@@ -31,6 +32,7 @@ pub mod exposure;
 pub mod facets;
 pub mod geometry;
 pub mod lights;
+mod mask_edges;
 mod neighbours;
 pub mod normals;
 mod outlying;
@@ -42,6 +44,7 @@ pub mod resolution;
 mod shading;
 pub mod silhouette;
 mod trial;
+pub(crate) mod ways;
 
 pub use contact_sheet::contact_sheet;
 pub use overlay::overlay;

@@ -8,28 +8,28 @@
 
 use super::Report;
 use super::edge_profile::Profiles;
-use super::probe::{centre_of, hit_at};
+use super::mask_edges::{self, MaskEdges};
+use super::probe::centre_of;
 use crate::error::{Finding, Severity};
-use crate::math::statistics::Moments;
+use crate::math::statistics::quantile;
 use crate::math::{evenly_spread, parallel};
 use crate::scene::settings::PixelCentre;
-use crate::scene::{PixelState, Scene, View};
+use crate::scene::{Scene, View};
 use crate::trace::Bvh;
-use glam::{DVec2, Vec2};
+use glam::DVec2;
 
 /// Views that are measured, spread over the scene.
 const MEASURED_VIEWS: usize = 10;
-/// Pixels beside the mask's edge that are measured in each view.
-const EDGE_PIXELS_PER_VIEW: usize = 600;
-/// Places tried along each axis: -0.25, 0, ... 1.25 within and around the pixel.
-const COARSE_COUNT: usize = 7;
-const COARSE_FIRST: f32 = -0.25;
-const COARSE_STEP: f32 = 0.25;
 /// A measurement further than this from a convention does not speak for it.
 const NEAR_PIXELS: f64 = 0.15;
 /// A measurement with a larger standard error says nothing: the other convention, half a pixel away, must be four
 /// errors off.
 const LARGEST_ERROR_PIXELS: f64 = 0.125;
+/// Where masks disagree with the mesh at one convention by so many times less than at the others, that decides. A mesh that is
+/// a little too fat or too thin disagrees at all of them.
+const MANY_TIMES: f64 = 3.0;
+/// Fewer edge pixels or crossings decide nothing.
+const FEWEST_EDGES: usize = 200;
 
 /// What a measurement is made from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -60,37 +60,69 @@ pub struct CentreMeasurement {
 }
 
 impl CentreMeasurement {
-    /// Whether the measurement is exact enough to choose by and lies at `place` on every measured axis.
-    fn clearly_at(&self, place: f64) -> bool {
-        let mut measured = self
-            .centre_pixels
-            .iter()
-            .zip(self.standard_error_pixels)
-            .filter_map(|(centre, error)| Some(((*centre)?, error)));
-        self.edge_count >= 200
-            && self.centre_pixels != [None, None]
-            && measured.all(|(centre, error)| error < LARGEST_ERROR_PIXELS && (centre - place).abs() < NEAR_PIXELS)
+    /// Which of these places the first pixel's centre clearly is at: the one that the measurement is near on every axis, where
+    /// that is exact enough, else the one where masks disagree with the mesh many times less.
+    fn clear_place(&self, places: &[f64]) -> Option<f64> {
+        if self.edge_count < FEWEST_EDGES || self.centre_pixels == [None, None] {
+            return None;
+        }
+        let axes = self.centre_pixels.iter().zip(self.standard_error_pixels);
+        let is_near = |place: f64| {
+            axes.clone()
+                .filter_map(|(centre, error)| Some(((*centre)?, error)))
+                .all(|(centre, error)| error < LARGEST_ERROR_PIXELS && (centre - place).abs() < NEAR_PIXELS)
+        };
+        places.iter().copied().find(|place| is_near(*place)).or_else(|| self.place_of_least_disagreement(places))
     }
 
-    /// The figures as text; `shift` is subtracted from the places, to speak of the source's own coordinates.
-    fn figures(&self, shift: f64) -> String {
+    fn place_of_least_disagreement(&self, places: &[f64]) -> Option<f64> {
+        let rate = |place: &f64| Some((self.disagreement_at(*place)?, *place));
+        let mut rated: Vec<(f64, f64)> = places.iter().map(rate).collect::<Option<_>>()?;
+        rated.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let [(least, place), (second, _), ..] = rated[..] else { return None };
+        (MANY_TIMES * least < second).then_some(place)
+    }
+
+    /// Share of edge pixels where mask and mesh disagree if the centre lies there; `None` where that was not tried.
+    fn disagreement_at(&self, place: f64) -> Option<f64> {
+        let index = (2.0 * place).round();
+        self.disagreement?.into_iter().enumerate().find(|(own, _)| *own as f64 == index).map(|(_, share)| share)
+    }
+
+    /// The figures as text, in the coordinates of the scene: (0.5, 0.5) is right.
+    pub fn in_words(&self) -> String {
+        self.figures(PixelCentre::Half, 1.0)
+    }
+
+    /// The figures as text, in the coordinates of `convention`, of a picture `scale` times smaller.
+    fn figures(&self, convention: PixelCentre, scale: f64) -> String {
         let what = match self.evidence {
             Evidence::Masks => "mask edge pixels",
             Evidence::PhotoEdges => "silhouette crossings",
         };
+        let own = place_of(convention);
         let along = |axis: usize| match self.centre_pixels[axis] {
-            Some(centre) => format!("{:.2} ± {:.2}", centre - shift, self.standard_error_pixels[axis]),
+            Some(centre) => {
+                format!("{:.2} ± {:.2}", own + (centre - RIGHT) / scale, self.standard_error_pixels[axis] / scale)
+            }
             None => "unknown".into(),
         };
         let mut text =
             format!("({}, {}) by {} {what} of {} views", along(0), along(1), self.edge_count, self.view_count);
-        if let Some(shares) = self.disagreement {
-            let at = |place: f64| 100.0 * shares[(2.0 * (place + shift)).round().clamp(0.0, 2.0) as usize];
-            text +=
-                &format!("; {:.1} % of them disagree with the mesh at (0, 0), {:.1} % at (0.5, 0.5)", at(0.0), at(0.5));
+        let at = |place: f64| Some(100.0 * self.disagreement_at(RIGHT + scale * (place - own))?);
+        if let (Some(corner), Some(middle)) = (at(0.0), at(0.5)) {
+            text += &format!("; {corner:.1} % of them disagree with the mesh at (0, 0), {middle:.1} % at (0.5, 0.5)");
         }
         text
     }
+}
+
+/// Where the first pixel's centre lies in a scene's cameras, when all is right.
+const RIGHT: f64 = 0.5;
+
+/// Where a convention puts the first pixel's centre.
+fn place_of(convention: PixelCentre) -> f64 {
+    RIGHT - convention.shift_pixels()
 }
 
 /// Measures the pixel centres of a scene; by masks where there are any, else by the photos' edges. `None` when too
@@ -105,13 +137,24 @@ fn spread<'a>(views: &[&'a View]) -> Vec<&'a View> {
     evenly_spread(views, MEASURED_VIEWS)
 }
 
-/// Mean and standard error over the views. A single view gets an error that decides nothing.
-fn summary(places: impl Iterator<Item = DVec2> + Clone) -> ([f64; 2], [f64; 2]) {
-    let [x, y]: [Moments; 2] = [places.clone().map(|place| place.x).collect(), places.map(|place| place.y).collect()];
-    let error = |moments: &Moments| {
-        if moments.count < 2 { f64::from(COARSE_STEP) } else { (moments.variance() / moments.count as f64).sqrt() }
+/// Median and its standard error over the views, by their median absolute deviation: what one view says is no more than a
+/// voice. A single view gets an error that decides nothing, and none is more exact than its steps.
+fn summary(places: &[DVec2]) -> ([f64; 2], [f64; 2]) {
+    /// Standard deviations of a normal distribution with a median absolute deviation of one, and of the median of many such
+    /// numbers in units of that of their mean.
+    const OF_MEDIAN: f64 = 1.4826 * 1.2533;
+    let step = f64::from(mask_edges::COARSE_STEP) / 4.0;
+    let along = |of: fn(&DVec2) -> f64| {
+        let along: Vec<f64> = places.iter().map(of).collect();
+        let middle = quantile(&along, 0.5);
+        let distances: Vec<f64> = along.iter().map(|place| (place - middle).abs()).collect();
+        let deviation = (OF_MEDIAN * quantile(&distances, 0.5)).max(step / 12f64.sqrt());
+        let error =
+            if along.len() < 2 { f64::from(mask_edges::COARSE_STEP) } else { deviation / (along.len() as f64).sqrt() };
+        (middle, error)
     };
-    ([x.mean, y.mean], [error(&x), error(&y)])
+    let [x, y] = [along(|place| place.x), along(|place| place.y)];
+    ([x.0, y.0], [x.1, y.1])
 }
 
 /// The measurement from masks alone.
@@ -122,7 +165,7 @@ pub fn measure_by_masks(views: &[&View], bvh: &Bvh) -> Option<CentreMeasurement>
     if edge_count < 50 {
         return None;
     }
-    let (centre, standard_error_pixels) = summary(of_views.iter().map(|edges| edges.centre));
+    let (centre, standard_error_pixels) = summary(&of_views.iter().map(|edges| edges.centre).collect::<Vec<_>>());
     let share = |index: usize| {
         of_views.iter().map(|edges| edges.disagreements[index]).sum::<usize>() as f64 / edge_count as f64
     };
@@ -134,85 +177,6 @@ pub fn measure_by_masks(views: &[&View], bvh: &Bvh) -> Option<CentreMeasurement>
         view_count: of_views.len(),
         disagreement: Some([share(0), share(1), share(2)]),
     })
-}
-
-/// What the mask's edge of one view says.
-struct MaskEdges {
-    count: usize,
-    centre: DVec2,
-    /// Disagreeing edge pixels with the centre at (0, 0), (0.5, 0.5) and (1, 1).
-    disagreements: [usize; 3],
-}
-
-impl MaskEdges {
-    fn measure(view: &View, bvh: &Bvh) -> Option<Self> {
-        let pixels = mask_edge_pixels(view);
-        if pixels.len() < 50 {
-            return None;
-        }
-        let step = pixels.len().div_ceil(EDGE_PIXELS_PER_VIEW);
-        let pixels: Vec<_> = pixels.into_iter().step_by(step).collect();
-        let disagreements_at = |place: Vec2| {
-            pixels
-                .iter()
-                .filter(|(row, column, object)| {
-                    let hit = hit_at(&view.camera, bvh, Vec2::new(*column as f32, *row as f32) + place);
-                    hit.is_some() != *object
-                })
-                .count()
-        };
-        let coarse = |index: usize| COARSE_FIRST + COARSE_STEP * index as f32;
-        let mut best = (usize::MAX, Vec2::ZERO);
-        let mut disagreements = [0; 3];
-        for (row, column) in (0..COARSE_COUNT).flat_map(|row| (0..COARSE_COUNT).map(move |column| (row, column))) {
-            let place = Vec2::new(coarse(column), coarse(row));
-            let count = disagreements_at(place);
-            if count < best.0 {
-                best = (count, place);
-            }
-            if row == column && row % 2 == 1 {
-                disagreements[row / 2] = count;
-            }
-        }
-        // Refine; of several places that are equally good, the mean is taken.
-        let (mut sum, mut ties, mut least) = (DVec2::ZERO, 0usize, usize::MAX);
-        for (y, x) in (-3..=3).flat_map(|y| (-3..=3).map(move |x| (y, x))) {
-            let place = best.1 + Vec2::new(x as f32, y as f32) * (COARSE_STEP / 4.0);
-            let count = disagreements_at(place);
-            if count < least {
-                (sum, ties, least) = (DVec2::ZERO, 0, count);
-            }
-            if count == least {
-                sum += place.as_dvec2();
-                ties += 1;
-            }
-        }
-        // A mask that follows the mesh nowhere says nothing.
-        (least * 5 < pixels.len() * 2).then(|| MaskEdges {
-            count: pixels.len(),
-            centre: sum / ties as f64,
-            disagreements,
-        })
-    }
-}
-
-/// Pixels on either side of the mask's edge: (row, column, is object).
-fn mask_edge_pixels(view: &View) -> Vec<(usize, usize, bool)> {
-    let states = &view.states;
-    let mut pixels = Vec::new();
-    for row in 1..states.height().saturating_sub(1) {
-        for column in 1..states.width().saturating_sub(1) {
-            let state = states[(row, column)];
-            let neighbours = [(row - 1, column), (row + 1, column), (row, column - 1), (row, column + 1)];
-            let differs = neighbours
-                .iter()
-                .any(|&place| states[place] != PixelState::Ignored && states[place].is_surface() != state.is_surface());
-            if state != PixelState::Ignored && differs {
-                pixels.push((row, column, state.is_surface()));
-            }
-        }
-    }
-    pixels
 }
 
 /// The measurement from the photos' edges alone. The profiles of all views are added up; the error is by leaving out
@@ -239,7 +203,7 @@ pub fn measure_by_photo_edges(views: &[&View], bvh: &Bvh) -> Option<CentreMeasur
             variance[axis] += departure * departure * (count - 1.0) / count;
         }
     }
-    let error = if count < 2.0 { [f64::from(COARSE_STEP); 2] } else { variance.map(f64::sqrt) };
+    let error = if count < 2.0 { [f64::from(mask_edges::COARSE_STEP); 2] } else { variance.map(f64::sqrt) };
     // An edge of the photo that lies right of the mesh's says that the mesh is drawn too far left: pixel centres are
     // at smaller coordinates than the scene has them.
     Some(CentreMeasurement {
@@ -253,8 +217,9 @@ pub fn measure_by_photo_edges(views: &[&View], bvh: &Bvh) -> Option<CentreMeasur
 }
 
 /// Chooses the convention of a scene that was read under the convention `assumed`: the measured one where the evidence
-/// is clear, else `assumed`. The finding holds the figures, in the source's own coordinates.
-pub fn decide(scene: &Scene, assumed: PixelCentre) -> (PixelCentre, Finding) {
+/// is clear, else `assumed`. The finding holds the figures, in the source's own coordinates. Intrinsics that were made `scale`
+/// times larger are off by so many times the distance between conventions.
+pub fn decide(scene: &Scene, assumed: PixelCentre, scale: f64) -> (PixelCentre, Finding) {
     let measurement =
         Bvh::build(&scene.mesh.positions, &scene.mesh.triangles).ok().and_then(|bvh| measure(scene, &bvh));
     let name = |convention| if convention == PixelCentre::Integer { "(0, 0)" } else { "(0.5, 0.5)" };
@@ -267,11 +232,11 @@ pub fn decide(scene: &Scene, assumed: PixelCentre) -> (PixelCentre, Finding) {
                 .remedy("give --pixel-centre integer or half if you know better"),
         );
     };
-    let shift = assumed.shift_pixels();
-    let clear = [(PixelCentre::Integer, 0.0), (PixelCentre::Half, 0.5)]
-        .into_iter()
-        .find(|(_, place)| measurement.clearly_at(place + shift));
-    let figures = measurement.figures(shift);
+    let conventions = [PixelCentre::Integer, PixelCentre::Half];
+    let places = conventions.map(|own| RIGHT + scale * (place_of(own) - place_of(assumed)));
+    let clear = measurement.clear_place(&places);
+    let clear = conventions.into_iter().zip(places).find(|(_, place)| Some(*place) == clear);
+    let figures = measurement.figures(assumed, scale);
     match clear {
         Some((convention, _)) => (
             convention,
@@ -297,21 +262,56 @@ pub fn decide(scene: &Scene, assumed: PixelCentre) -> (PixelCentre, Finding) {
 pub fn check(scene: &Scene, bvh: &Bvh, report: &mut Report) {
     report.pixel_centre = measure(scene, bvh);
     let Some(measurement) = report.pixel_centre else { return };
-    if measurement.clearly_at(0.0) || measurement.clearly_at(1.0) {
+    let place = measurement.clear_place(&[0.0, RIGHT, 1.0]).filter(|place| *place != RIGHT);
+    if let Some(place) = place {
         report.findings.push(
             Finding::new(
                 Severity::Warning,
                 "pixel-centre-off",
                 format!(
                     "the photos are half a pixel off the mesh: pixel centres are at {}, not at (0.5, 0.5)",
-                    measurement.figures(0.0)
+                    measurement.in_words()
                 ),
             )
-            .remedy(if measurement.clearly_at(0.0) {
+            .remedy(if place < RIGHT {
                 "give --pixel-centre integer: what the source says of its convention is not so"
             } else {
                 "give --pixel-centre half: what was given or the source says of its convention is not so"
             }),
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_view_that_is_off_does_not_move_the_others() {
+        let mut places = vec![DVec2::new(0.5, 0.52); 7];
+        places.push(DVec2::new(-0.7, 0.45));
+        let (centre, error) = summary(&places);
+        assert_eq!(centre, [0.5, 0.52]);
+        assert!(error.iter().all(|error| (0.001..0.02).contains(error)), "{error:?}");
+        assert!(summary(&places[..1]).1[0] > LARGEST_ERROR_PIXELS, "a single view decides nothing");
+    }
+
+    #[test]
+    fn masks_that_disagree_many_times_less_at_one_place_decide() {
+        let measurement = CentreMeasurement {
+            evidence: Evidence::Masks,
+            centre_pixels: [Some(0.85), Some(1.01)],
+            standard_error_pixels: [0.15, 0.01],
+            edge_count: 3436,
+            view_count: 8,
+            disagreement: Some([0.4, 0.269, 0.026]),
+        };
+        assert_eq!(measurement.clear_place(&[0.5, 1.0]), Some(1.0));
+        let fat = CentreMeasurement { disagreement: Some([0.4, 0.3, 0.2]), ..measurement };
+        assert_eq!(fat.clear_place(&[0.5, 1.0]), None, "a mesh that is too fat");
+        let exact =
+            CentreMeasurement { centre_pixels: [Some(0.45), Some(0.52)], standard_error_pixels: [0.02; 2], ..fat };
+        assert_eq!(exact.clear_place(&[0.5, 1.0]), Some(0.5));
+        assert_eq!(measurement.clear_place(&[0.5, 1.5]), None, "what was not tried does not decide");
     }
 }

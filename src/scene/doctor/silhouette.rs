@@ -1,8 +1,10 @@
 //! Do the masks agree with the mesh's silhouette?
 
 use super::probe::Probe;
+use super::trial::Lie;
 use super::{Report, names_of, worst_first};
 use crate::error::{Finding, Place, Severity};
+use crate::image::file::place_in_stored;
 use crate::math::statistics::quantile;
 use crate::scene::{PixelState, Scene, View};
 
@@ -13,9 +15,15 @@ const FATAL_OVERLAP: f64 = 0.2;
 
 /// Intersection over union of a view's mask and the mesh's silhouette, on the probed pixels that say something.
 pub(crate) fn overlap(view: &View, probes: &[Probe]) -> f64 {
+    overlap_of(view, probes, Lie::AS_IT_IS)
+}
+
+/// The same of a mask that lies another way.
+pub(super) fn overlap_of(view: &View, probes: &[Probe], lie: Lie) -> f64 {
     let (mut both, mut either) = (0usize, 0usize);
+    let size = (view.states.width(), view.states.height());
     for probe in probes {
-        let state = view.states[(probe.row, probe.column)];
+        let state = view.states[place_in_stored(lie.0, size, (probe.row, probe.column))];
         if state == PixelState::Ignored {
             continue;
         }

@@ -18,11 +18,12 @@ const SPREAD: f64 = 0.06;
 /// How far a factor may be off a whole number, or one over it, to be taken for that.
 const OFF_WHOLE: f64 = 0.08;
 
-/// Scales the intrinsics of views to the size of their photos, where they are clearly for another one, and tells.
+/// Scales the intrinsics of views to the size of their photos, where they are clearly for another one, and tells. Returns by how
+/// much.
 ///
 /// `centre_shift` is what is added to the source's principal points to count from the corner of the first pixel.
-pub fn fit(views: &mut [SourceView], loaded: &[LoadedPhoto], centre_shift: f64, findings: &mut Vec<Finding>) {
-    let Some(factor) = common_factor(views, loaded, centre_shift) else { return };
+pub fn fit(views: &mut [SourceView], loaded: &[LoadedPhoto], centre_shift: f64, findings: &mut Vec<Finding>) -> f64 {
+    let Some(factor) = common_factor(views, loaded, centre_shift) else { return 1.0 };
     let whole = if factor > 1.0 { factor.round() } else { 1.0 / (1.0 / factor).round() };
     if (factor / whole - 1.0).abs() > OFF_WHOLE {
         findings.push(
@@ -33,7 +34,7 @@ pub fn fit(views: &mut [SourceView], loaded: &[LoadedPhoto], centre_shift: f64, 
             )
             .remedy("scale the intrinsics with the photos, or use the photos the cameras were made for"),
         );
-        return;
+        return 1.0;
     }
     views.iter_mut().for_each(|view| scale(view, whole, centre_shift));
     findings.push(
@@ -44,6 +45,7 @@ pub fn fit(views: &mut [SourceView], loaded: &[LoadedPhoto], centre_shift: f64, 
         )
         .remedy("look at the outlines over the photos (check -o FOLDER); if the photos were cropped, correct the intrinsics"),
     );
+    whole
 }
 
 /// How much larger the photos are than their principal points say, where all views agree that they are.

@@ -184,7 +184,13 @@ mod tests {
 
     /// How many of the 12 pixels of each view are object.
     fn objects_of(views: &[SourceView]) -> Vec<usize> {
-        let loaded = load_all(views, &vec![(4, 3); views.len()], Default::default(), None, &ReadSettings::default());
+        let loaded = load_all(
+            views,
+            &vec![(4, 3); views.len()],
+            Default::default(),
+            (None, &Default::default()),
+            &ReadSettings::default(),
+        );
         let count = |states: &Image<PixelState>| states.pixels().iter().filter(|state| state.is_surface()).count();
         loaded.unwrap().iter().map(|photo| count(&photo.states)).collect()
     }

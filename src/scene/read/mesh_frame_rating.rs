@@ -8,6 +8,7 @@ use super::source_mesh::SourceMesh;
 use crate::math::statistics::quantile;
 use crate::math::{evenly_spread, parallel};
 use crate::scene::doctor::probe::{Probe, probe_about};
+use crate::scene::doctor::ways::{self, Way};
 use crate::scene::doctor::{agreement, silhouette};
 use crate::scene::{Background, Camera, Mesh, Scene, View, WorldFromSource};
 use crate::trace::Bvh;
@@ -123,20 +124,37 @@ impl<'a> Rater<'a> {
     /// By the cameras and by what the photos show.
     pub fn rate(&mut self, frame: &DMat4) -> Rating {
         let seen = self.by_sight(frame);
+        let probes = self.probed(frame, &self.traced.clone());
         let Some(bvh) = &self.bvh else { return seen };
-        for &view in &self.traced {
-            let camera = moved(&self.cameras[view], frame, self.middle);
-            self.scene.views[view].camera = (self.in_pixels)(&camera, view);
-        }
-        let mut probes: Vec<Vec<Probe>> = vec![Vec::new(); self.scene.views.len()];
-        let shoot = |place: usize| probe_about(&self.scene.views[self.traced[place]], bvh, PROBES_PER_VIEW);
-        for (place, of_view) in parallel::map(self.traced.len(), shoot).into_iter().enumerate() {
-            probes[self.traced[place]] = of_view;
-        }
         let overlaps: Vec<f64> =
             self.masked.iter().map(|&view| silhouette::overlap(&self.scene.views[view], &probes[view])).collect();
         let overlap = (!overlaps.is_empty()).then(|| quantile(&overlaps, 0.5));
         Rating { agreement: agreement::measure(&self.scene, bvh, &probes), overlap, ..seen }
+    }
+
+    /// Which way the photos lie that may be turned by these `orientations`, by the mesh as it is.
+    pub fn ways(&mut self, orientations: &[Option<u8>]) -> Vec<Option<Way>> {
+        let all: Vec<usize> = (0..self.scene.views.len()).collect();
+        let probes = self.probed(&DMat4::IDENTITY, &all);
+        match &self.bvh {
+            Some(bvh) => ways::choose(&self.scene, bvh, &probes, orientations),
+            None => vec![None; all.len()],
+        }
+    }
+
+    /// Moves cameras to where they see the mesh in a frame, and shoots rays from them.
+    fn probed(&mut self, frame: &DMat4, views: &[usize]) -> Vec<Vec<Probe>> {
+        let mut probes: Vec<Vec<Probe>> = vec![Vec::new(); self.scene.views.len()];
+        let Some(bvh) = &self.bvh else { return probes };
+        for &view in views {
+            let camera = moved(&self.cameras[view], frame, self.middle);
+            self.scene.views[view].camera = (self.in_pixels)(&camera, view);
+        }
+        let shoot = |place: usize| probe_about(&self.scene.views[views[place]], bvh, PROBES_PER_VIEW);
+        for (place, of_view) in parallel::map(views.len(), shoot).into_iter().enumerate() {
+            probes[views[place]] = of_view;
+        }
+        probes
     }
 }
 

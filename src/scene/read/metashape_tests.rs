@@ -105,8 +105,14 @@ fn the_chunk_whose_photos_are_here_is_read_unless_another_is_asked_for() {
     assert_eq!(scene.views[0].mask, Some(root.join("3/0/masks/masks.zip/c7.png")));
     // The mask is of the size the photo was masked at, twice that of the photo that is here.
     let settings = crate::scene::ReadSettings::default();
-    let loaded =
-        super::super::photos::load_all(&scene.views, &[(40, 30)], Default::default(), None, &settings).unwrap();
+    let loaded = super::super::photos::load_all(
+        &scene.views,
+        &[(40, 30)],
+        Default::default(),
+        (None, &Default::default()),
+        &settings,
+    )
+    .unwrap();
     let object = loaded[0].states.pixels().iter().filter(|state| state.is_surface()).count();
     assert_eq!(object, 10 * 30);
     assert_eq!(read_project(&project, Some("0")).unwrap_err().kind(), ErrorKind::Missing, "its photo is not here");

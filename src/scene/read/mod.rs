@@ -4,11 +4,12 @@
 //! [`transforms`], [`metashape`], and the others of [`Format`]); each kind only lists files and reads cameras into a
 //! [`source::SourceScene`]. What follows is the same for all: true sizes of photos (`photo_size`, `calibrated_size`), mesh
 //! ([`mesh_file`], with `obj`, `ply`, `gltf` and `stl`) and its frame (`mesh_frame`), up axis and origin ([`world`]), photos,
-//! masks and lenses ([`photos`], `masks`), pixel centres. [`understood`] says on a page what was made of it all.
+//! masks and lenses ([`photos`], `masks`, `orientation`, `orientation_trial`), pixel centres. [`understood`] says on a page what was made of it all.
 //!
 //! What it refuses to do: guess. What is missing or contradictory is an error with place and remedy, or a finding; what
 //! was assumed is a finding. Whether the parts fit together is judged by [`doctor`](crate::scene::doctor), not here.
 
+mod again;
 mod alicevision;
 pub mod blended_mvs;
 mod bundler;
@@ -39,6 +40,7 @@ pub mod objects_with_lighting;
 mod openmvs;
 mod opensfm;
 mod orientation;
+mod orientation_trial;
 pub mod outliers;
 mod photo_index;
 mod photo_size;
@@ -68,11 +70,12 @@ pub use understood::{Understood, understand};
 
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::files::{as_stored, composed};
-use crate::image::file::MaskWay;
 use crate::scene::doctor::pixel_centre;
 use crate::scene::settings::{BackgroundChoice, ColourEncoding, MaskUse, PixelCentre, ReadSettings, Up};
 use crate::scene::{Background, Scene, View, WorldFromSource};
 pub(super) use mask_names::PHOTO_EXTENSIONS;
+use mesh_frame_rating::Rater;
+use orientation::Turns;
 use photos::LoadedPhoto;
 use source::{SourceCamera, SourceScene, SourceView};
 use std::path::Path;
@@ -124,7 +127,7 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
 
     // The photos.
     let encoding = if settings.encoding == ColourEncoding::Auto { source.encoding } else { settings.encoding };
-    let mut loaded = photos::load_all(&views, &sizes, encoding, None, settings)?;
+    let mut loaded = photos::load_all(&views, &sizes, encoding, (None, &Turns::new()), settings)?;
     let way_of_masks = photos::way_of_masks(&loaded);
     findings.extend(photos::told_of_lenses(&loaded));
     let mut background = match settings.background {
@@ -133,7 +136,8 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
         BackgroundChoice::Black => Background::Black,
     };
     let may_be_matte = settings.background == BackgroundChoice::Auto && background == Background::Environment;
-    if let Some(matte) = matte::find(&loaded).filter(|_| may_be_matte) {
+    let matte = matte::find(&loaded).filter(|_| may_be_matte);
+    if let Some(matte) = matte {
         matte::set_aside(&mut loaded, matte);
         findings.push(matte::told(matte, loaded.len()));
         if matte.is_masked {
@@ -159,7 +163,8 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
     let asked_centre =
         if settings.pixel_centre == PixelCentre::Auto { source.pixel_centre } else { settings.pixel_centre };
     let assumed_centre = if asked_centre == PixelCentre::Auto { source.default_pixel_centre } else { asked_centre };
-    calibrated_size::fit(&mut views, &loaded, assumed_centre.shift_pixels(), &mut findings);
+    let scaled = calibrated_size::fit(&mut views, &loaded, assumed_centre.shift_pixels(), &mut findings);
+    let open: Vec<Option<u8>> = loaded.iter().map(|photo| photo.open_orientation).collect();
     let file_sizes: Vec<(usize, usize)> = loaded.iter().map(|photo| photo.file_size).collect();
     let camera_in = |world: &WorldFromSource, camera: &SourceCamera, view: usize| {
         let camera = camera.in_world(world, file_sizes[view], assumed_centre.shift_pixels());
@@ -170,10 +175,20 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
         joined.push(join(view, photo, &WorldFromSource::default(), assumed_centre, settings.shrink, &mut findings));
     }
 
+    let in_source = |camera: &SourceCamera, view| camera_in(&WorldFromSource::default(), camera, view);
+    let cameras: Vec<SourceCamera> = views.iter().map(|view| view.camera).collect();
+    let mut turns = Turns::new();
+    if open.iter().any(Option::is_some) && !source_mesh.triangles.is_empty() {
+        let names: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
+        let mut rater = Rater::new(&source_mesh, &cameras, joined, &in_source);
+        turns = orientation_trial::decide(&mut rater, &names, &open, &mut findings);
+        joined = rater.into_views();
+        let loading = again::Loading { encoding, way_of_masks, matte, turns: &turns, settings };
+        again::turn(&mut joined, &views, &loading)?;
+    }
+
     // Both in one frame, turned so that +y is up.
     if source.is_of_a_tool {
-        let in_source = |camera: &SourceCamera, view| camera_in(&WorldFromSource::default(), camera, view);
-        let cameras: Vec<SourceCamera> = views.iter().map(|view| view.camera).collect();
         joined =
             mesh_frame::put_right(&mut source_mesh, (&cameras, joined), &in_source, &source.mesh_frames, &mut findings);
     }
@@ -204,11 +219,12 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
     }
     if asked_centre == PixelCentre::Auto {
         let (centre, finding) = if settings.shrink == 1 {
-            pixel_centre::decide(&scene, assumed_centre)
+            pixel_centre::decide(&scene, assumed_centre, scaled)
         } else {
-            decide_centre_unshrunk(&scene, &views, (encoding, way_of_masks), settings, assumed_centre)?
+            let loading = again::Loading { encoding, way_of_masks, matte: None, turns: &turns, settings };
+            again::decide_centre_unshrunk(&scene, &views, &loading, assumed_centre, scaled)?
         };
-        let shift = (centre.shift_pixels() - assumed_centre.shift_pixels()) / settings.shrink as f64;
+        let shift = scaled * (centre.shift_pixels() - assumed_centre.shift_pixels()) / settings.shrink as f64;
         scene.views.iter_mut().for_each(|view| view.camera.centre_pixels += shift as f32);
         scene.findings.push(finding);
     }
@@ -235,40 +251,6 @@ fn join(
         held_out: false,
         exposure_prior_stops: photo.exposure_prior_stops,
     }
-}
-
-/// Half a pixel is measured on photos as they are: a few are decoded once more, in full size.
-fn decide_centre_unshrunk(
-    scene: &Scene,
-    views: &[SourceView],
-    (encoding, way_of_masks): (ColourEncoding, MaskWay),
-    settings: &ReadSettings,
-    assumed: PixelCentre,
-) -> Result<(PixelCentre, Finding)> {
-    let few: Vec<SourceView> = views.iter().step_by(views.len().div_ceil(6)).cloned().collect();
-    let loaded = photos::load_all(
-        &few,
-        &photo_size::of_files(&few)?,
-        encoding,
-        Some(way_of_masks),
-        &ReadSettings { shrink: 1, ..settings.clone() },
-    )?;
-    let joined = few
-        .iter()
-        .zip(loaded)
-        .map(|(view, photo)| join(view, photo, &scene.world_from_source, assumed, 1, &mut Vec::new()))
-        .collect();
-    let full_size = Scene {
-        name: scene.name.clone(),
-        folder: None,
-        mesh: scene.mesh.clone(),
-        views: joined,
-        world_from_source: scene.world_from_source,
-        background: scene.background,
-        truth: None,
-        findings: Vec::new(),
-    };
-    Ok(pixel_centre::decide(&full_size, assumed))
 }
 
 /// Sorts the views by name, refuses names that occur twice and takes at most `most` of them, spread evenly.

@@ -16,6 +16,7 @@ use super::source::{MeshFrame, SourceCamera, SourceScene};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::files::folder_of;
 use crate::scene::lens::Lens;
+use crate::scene::settings::PixelCentre;
 use glam::{DMat3, DMat4, DVec3};
 use std::path::{Path, PathBuf};
 
@@ -102,7 +103,9 @@ pub fn read_neus(file: &Path) -> Result<SourceScene> {
     let scale = matrix_of("scale_mat_0".into())?.filter(|scale| scale.determinant().abs() > 1e-18);
     let frames =
         scale.map(|source_from_mesh| MeshFrame { name: "scale_mat, out of the unit sphere", source_from_mesh });
-    finish(folder, posed, frames.into_iter().collect())
+    let scene = finish(folder, posed, frames.into_iter().collect())?;
+    // Writers of this file put the first pixel's centre at (0, 0) or (0.5, 0.5) as they please: it is measured.
+    Ok(SourceScene { pixel_centre: PixelCentre::Auto, ..scene })
 }
 
 /// K and R of K R, K upright with a positive diagonal and 1 in its corner (Hartley and Zisserman 2004, A4.1.1); `None` when
@@ -191,6 +194,7 @@ mod tests {
             // The sign of a camera matrix means nothing: the same pixel, the same camera.
             assert!((camera.translation - translation).length() < 1e-9, "{}", camera.translation);
             assert_eq!(scene.mesh_frames[0].source_from_mesh.transform_point3(DVec3::ONE), DVec3::new(4.0, 3.0, 3.0));
+            assert_eq!(scene.pixel_centre, PixelCentre::Auto, "the format does not say");
         }
     }
 

@@ -119,8 +119,14 @@ mod tests {
         assert!((view.camera.rotation * DVec3::Y - DVec3::X).length() < 1e-12, "row by row");
         assert_eq!(view.camera.translation, DVec3::new(1.0, 2.0, 3.0));
         assert_eq!(view.size, Some((40, 30)));
-        let loaded =
-            photos::load_all(&scene.views, &[(40, 30)], scene.encoding, None, &ReadSettings::default()).unwrap();
+        let loaded = photos::load_all(
+            &scene.views,
+            &[(40, 30)],
+            scene.encoding,
+            (None, &Default::default()),
+            &ReadSettings::default(),
+        )
+        .unwrap();
         let radiance = loaded[0].photo.radiance(3, 3);
         assert!((f64::from(radiance.x) - (128.0f64 / 255.0).powf(2.2)).abs() < 2e-4, "{radiance}");
         assert!(loaded[0].states[(3, 3)].is_clipped());

@@ -2,17 +2,35 @@
 //!
 //! Programs that calibrate cameras disagree: some turn photos upright first, some take them as stored. A camera that is for
 //! the stored width and height wants the photo as stored; one for the exchanged sides wants it turned; another is for another
-//! photo. Where a source gives no size, the principal point tells: it lies near the middle of the picture.
+//! photo. Where a source gives no size, the principal point tells: it lies near the middle of the picture. A turn that leaves
+//! the sides as they are is not for the camera to say: the pixels do, in `orientation_trial`.
 
 use super::source::SourceView;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::file::{PhotoFile, swaps_sides};
+use std::collections::BTreeMap;
 
-/// The photo as its camera sees it, and what was done as a finding without a place.
+/// Photos that are to be turned by their EXIF orientation though their cameras do not say so, by the names of their views.
+pub type Turns = BTreeMap<String, Turn>;
+
+/// What is to be turned of a view.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Turn {
+    /// The mask, which may lie as the photo's file does or as its camera sees it.
+    pub mask: bool,
+}
+
+/// The photo as its camera sees it, what was done as a finding without a place, and the orientation where the camera does not
+/// say whether it applies: such a photo is turned only when it `must` be.
 ///
 /// # Errors
 /// `InvalidScene` when the camera is for neither size, with all of them.
-pub fn as_the_camera_sees(photo: PhotoFile, view: &SourceView, shared: &mut Vec<Finding>) -> Result<PhotoFile> {
+pub fn as_the_camera_sees(
+    photo: PhotoFile,
+    view: &SourceView,
+    must: bool,
+    shared: &mut Vec<Finding>,
+) -> Result<(PhotoFile, Option<u8>)> {
     let (stored, tag) = (photo.size(), photo.orientation);
     let swapped = (stored.1, stored.0);
     let can_turn = swaps_sides(tag) && stored != swapped;
@@ -47,19 +65,20 @@ pub fn as_the_camera_sees(photo: PhotoFile, view: &SourceView, shared: &mut Vec<
         None => can_turn && distance_to_middle(view, swapped) < distance_to_middle(view, stored),
     };
     if tag == 1 {
-        return Ok(photo);
+        return Ok((photo, None));
     }
-    let (code, message) = if turns {
-        ("photo-turned", format!("turned by the EXIF orientation {tag}: the cameras are for the upright picture"))
-    } else if swaps_sides(tag) && !can_turn {
-        let message = "is not applied: the picture is square, so that the camera does not say whether to turn it";
-        ("photo-as-stored", format!("the EXIF orientation {tag} {message}"))
+    if !swaps_sides(tag) || stored == swapped {
+        return Ok((if must { photo.turned() } else { photo }, Some(tag)));
+    }
+    shared.push(if turns {
+        let message = format!("turned by the EXIF orientation {tag}: the cameras are for the upright picture");
+        Finding::new(Severity::Note, "photo-turned", message)
     } else {
-        ("photo-as-stored", format!("the EXIF orientation {tag} is not applied: the cameras fit the picture as stored"))
-    };
-    let finding = Finding::new(Severity::Note, code, message);
-    shared.push(if turns { finding } else { finding.remedy("if photos lie on their side, turn them in an editor") });
-    Ok(if turns { photo.turned() } else { photo })
+        let message = format!("the EXIF orientation {tag} is not applied: the cameras are for the picture as stored");
+        Finding::new(Severity::Note, "photo-as-stored", message)
+            .remedy("if photos lie on their side, turn them in an editor")
+    });
+    Ok((if turns { photo.turned() } else { photo }, None))
 }
 
 /// How far the principal point is from the middle of a picture, in widths and heights of it.
@@ -99,25 +118,27 @@ mod tests {
     fn the_camera_decides_by_its_size_or_its_principal_point() {
         let seen = |tag, view: &SourceView| {
             let mut told = Vec::new();
-            let photo = as_the_camera_sees(photo(6, 4, tag), view, &mut told).unwrap();
-            (photo.size(), told.first().map(|finding| finding.code))
+            let (photo, open) = as_the_camera_sees(photo(6, 4, tag), view, false, &mut told).unwrap();
+            (photo.size(), told.first().map(|finding| finding.code).or(open.map(|_| "open")))
         };
         let stored = view(Some((6, 4)), (3.0, 2.0));
         let upright = view(Some((4, 6)), (2.0, 3.0));
         assert_eq!(seen(1, &stored), ((6, 4), None));
         assert_eq!(seen(6, &stored), ((6, 4), Some("photo-as-stored")));
         assert_eq!(seen(8, &upright), ((4, 6), Some("photo-turned")));
-        assert_eq!(seen(3, &stored), ((6, 4), Some("photo-as-stored")));
+        assert_eq!(seen(3, &stored), ((6, 4), Some("open")));
         assert_eq!(seen(6, &view(None, (1.5, 2.5))), ((4, 6), Some("photo-turned")));
         assert_eq!(seen(6, &view(None, (2.6, 1.9))), ((6, 4), Some("photo-as-stored")));
     }
 
     #[test]
     fn a_camera_for_another_photo_is_an_error_with_all_numbers() {
-        let error = as_the_camera_sees(photo(6, 4, 6), &view(Some((12, 8)), (6.0, 4.0)), &mut Vec::new()).unwrap_err();
+        let error =
+            as_the_camera_sees(photo(6, 4, 6), &view(Some((12, 8)), (6.0, 4.0)), false, &mut Vec::new()).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::InvalidScene);
         assert!(error.message().contains("6 x 4 (4 x 6") && error.message().contains("12 x 8"), "{error}");
-        let error = as_the_camera_sees(photo(6, 4, 1), &view(Some((4, 6)), (2.0, 3.0)), &mut Vec::new()).unwrap_err();
+        let error =
+            as_the_camera_sees(photo(6, 4, 1), &view(Some((4, 6)), (2.0, 3.0)), false, &mut Vec::new()).unwrap_err();
         assert!(
             error.message().contains("is 6 x 4 but") && error.message().contains("turned by 90 degrees"),
             "{error}"

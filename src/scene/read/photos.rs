@@ -1,5 +1,6 @@
 //! Photos and masks: decoded in parallel, kept compact, each pixel told what it is evidence for.
 
+use super::orientation::{Turn, Turns};
 use super::source::SourceView;
 use super::zip::Archive;
 use super::{masks, orientation, repeated};
@@ -36,6 +37,8 @@ pub struct LoadedPhoto {
     pub undistorted: Option<Undistorted>,
     /// What its mask says of the way that the masks are written in; `None` without one.
     pub mask_facts: Option<MaskFacts>,
+    /// Its EXIF orientation where the camera does not say whether that applies.
+    pub open_orientation: Option<u8>,
     /// What was noticed of it alone.
     pub findings: Vec<Finding>,
     /// What was noticed without a place, which other photos may share.
@@ -53,6 +56,7 @@ impl LoadedPhoto {
             exposure_prior_stops: None,
             undistorted: None,
             mask_facts: None,
+            open_orientation: None,
             findings: Vec::new(),
             shared: Vec::new(),
         }
@@ -66,19 +70,21 @@ pub fn way_of_masks(loaded: &[LoadedPhoto]) -> MaskWay {
 
 /// Decodes all views, whose files are of these sizes; the first error in the order of `views` is returned. What several photos
 /// have in common is told once, with the first of them. Masks are read in the way of `masks`, or in the one that they say
-/// together.
+/// together. Photos are turned where their cameras or `turns` say so.
 pub fn load_all(
     views: &[SourceView],
     sizes: &[(usize, usize)],
     encoding: ColourEncoding,
-    masks: Option<MaskWay>,
+    (masks, turns): (Option<MaskWay>, &Turns),
     settings: &ReadSettings,
 ) -> Result<Vec<LoadedPhoto>> {
     let pixels: usize = sizes.iter().map(|(width, height)| width * height).sum();
     let shrink = settings.shrink;
     let as_half = pixels / (shrink * shrink) * std::mem::size_of::<Vec3>() > MOST_FLOAT_BYTES;
     let packed = if settings.masks == MaskUse::Use { masks::archives_of_masks(views)? } else { BTreeMap::new() };
-    let load = |view: &SourceView, masks| load(view, encoding, settings, as_half, (masks, &packed));
+    let load = |view: &SourceView, masks| {
+        load(view, encoding, settings, as_half, (masks, &packed), turns.get(&view.name).copied())
+    };
     let loaded = parallel::map_items(views, |view| load(view, masks));
     let mut loaded = loaded.into_iter().collect::<Result<Vec<_>>>()?;
     if masks.is_none() {
@@ -187,6 +193,7 @@ fn load(
     settings: &ReadSettings,
     as_half: bool,
     (way, packed): (Option<MaskWay>, &BTreeMap<PathBuf, Archive>),
+    turn: Option<Turn>,
 ) -> Result<LoadedPhoto> {
     let (mut findings, mut shared) = (Vec::new(), Vec::new());
     let options = PhotoOptions {
@@ -201,7 +208,7 @@ fn load(
     let mut file = file::read_photo(&view.photo, &options)?;
     shared.append(&mut file.findings);
     let stored = (file.size(), file.orientation);
-    let file = orientation::as_the_camera_sees(file, view, &mut shared)?;
+    let (file, open_orientation) = orientation::as_the_camera_sees(file, view, turn.is_some(), &mut shared)?;
     let PhotoFile { pixels, is_eight_bit, clipped, alpha, is_inside, exposure_stops, .. } = file;
     let is_float = clipped.is_none();
     let (photo, mut states) = match pixels {
@@ -223,7 +230,10 @@ fn load(
                 let read = masks::read_mask(mask, packed)?;
                 mask_facts = Some(read.facts());
                 let way = way.unwrap_or_else(|| MaskWay::of_set([read.facts()]));
-                let MaskValues { values, are_opacity, told } = read.into_values(way);
+                let MaskValues { mut values, are_opacity, told } = read.into_values(way);
+                if turn.is_some_and(|turn| turn.mask) {
+                    values = file::turned(values, stored.1);
+                }
                 shared.extend(told);
                 let (values, scaled) = masks::resized(values, mask, &photo, packed);
                 shared.extend(scaled);
@@ -251,7 +261,17 @@ fn load(
         factor => shrink(&photo, &states, factor),
     };
     let exposure_prior_stops = exposure_stops;
-    Ok(LoadedPhoto { photo, states, file_size, exposure_prior_stops, undistorted, mask_facts, findings, shared })
+    Ok(LoadedPhoto {
+        photo,
+        states,
+        file_size,
+        exposure_prior_stops,
+        undistorted,
+        mask_facts,
+        open_orientation,
+        findings,
+        shared,
+    })
 }
 
 /// A pinhole sees less than 180 degrees.

@@ -4,6 +4,7 @@ use super::locate;
 use super::outliers::bounds_of_most;
 use super::source::SourceView;
 use crate::error::Result;
+use crate::scene::settings::PixelCentre;
 use crate::scene::{Background, Mesh, ReadSettings, Scene};
 use glam::Vec3;
 use std::collections::BTreeMap;
@@ -33,6 +34,8 @@ pub struct Understood {
     pub field_of_view_degrees: (f32, f32),
     /// Number of views whose lens was undone.
     pub undistorted: usize,
+    /// Where the source puts the first pixel's centre, by its format or by the settings; `Auto` where that is measured.
+    pub pixel_centre: PixelCentre,
     /// Number of views with a mask.
     pub masks: usize,
     /// Number of photos that are linear.
@@ -101,6 +104,10 @@ pub fn understand(path: &Path, settings: &ReadSettings, scene: &Scene) -> Result
             .iter()
             .filter(|view| by_name.get(view.name.as_str()).is_some_and(|source| source.lens.is_some()))
             .count(),
+        pixel_centre: match settings.pixel_centre {
+            PixelCentre::Auto => source.pixel_centre,
+            given => given,
+        },
         masks: scene.views.iter().filter(|view| view.has_mask()).count(),
         linear: scene.views.iter().filter(|view| view.photo.is_linear()).count(),
         up_in_source: world.rotation.row(1).to_array(),
@@ -149,6 +156,11 @@ impl fmt::Display for Understood {
                 format!("{encoded} photos of 8 bits by the curve of sRGB, {linear} of linear radiance")
             }
         };
+        let centre = match self.pixel_centre {
+            PixelCentre::Auto => "measured: see pixel-centre-measured or pixel-centre-assumed below",
+            PixelCentre::Half => "at (0.5, 0.5) of the source: its format or a setting says so",
+            PixelCentre::Integer => "at (0, 0) of the source: its format or a setting says so",
+        };
         let frames = match self.frames {
             Frames::Shared => "the mesh stands in the frame of the cameras",
             Frames::Moved => {
@@ -170,6 +182,7 @@ impl fmt::Display for Understood {
         writeln!(formatter, "frames      {frames}")?;
         writeln!(formatter, "cameras     {} views, {held_out}", self.views)?;
         writeln!(formatter, "photos      {} pixels", sizes.join(", "))?;
+        writeln!(formatter, "pixels      the centre of the first is {centre}")?;
         writeln!(formatter, "lens        {angle} degrees wide, {lens}")?;
         writeln!(formatter, "colour      {colour}")?;
         writeln!(formatter, "masks       {masks}")?;
