@@ -11,9 +11,12 @@ use glam::{DMat3, DMat4};
 /// A frame in which this share of the views looks at the mesh fits, one in which less than the other does fails.
 const FITTING_SHARE: f64 = 0.8;
 const FAILING_SHARE: f64 = 0.5;
-/// Photos that agree by this and masks that overlap by this leave no doubt.
+/// Photos that agree by this and masks that overlap by this speak for a frame; where they do by less than the larger, another
+/// may do better: a round object agrees with itself when it is turned.
 const SOUND_AGREEMENT: f64 = 0.7;
 const SOUND_OVERLAP: f64 = 0.8;
+const SURE_AGREEMENT: f64 = 0.9;
+const SURE_OVERLAP: f64 = 0.9;
 /// A frame in which photos agree by less than this is not taken for their agreement.
 const LEAST_AGREEMENT: f64 = 0.5;
 /// A frame in which masks overlap by less does not bring back a mesh that is out of sight.
@@ -22,15 +25,29 @@ const LEAST_OVERLAP: f64 = 0.3;
 /// it lacks.
 const LEAST_GAIN: f64 = 0.15;
 const LEAST_GAIN_SHARE: f64 = 0.4;
+/// Where nothing speaks against the mesh as it is, another frame must make up for this share of what it lacks.
+const LEAST_GAIN_SHARE_OF_SOUND: f64 = 0.5;
+const LEAST_GAIN_OF_SOUND: f64 = 0.05;
 /// What one measure may lose where the other gains.
 const MOST_LOSS: f64 = 0.1;
 
-/// Whether nothing that was measured speaks against the frame, and something for it.
-fn is_sound(rating: &Rating) -> bool {
+/// Whether nothing that was measured speaks against the frame, and something for it, by these measures.
+fn is_sound(rating: &Rating, least_agreement: f64, least_overlap: f64) -> bool {
     rating.views >= FAILING_SHARE
         && (rating.agreement.is_some() || rating.overlap.is_some())
-        && rating.agreement.is_none_or(|agreement| agreement >= SOUND_AGREEMENT)
-        && rating.overlap.is_none_or(|overlap| overlap >= SOUND_OVERLAP)
+        && rating.agreement.is_none_or(|agreement| agreement >= least_agreement)
+        && rating.overlap.is_none_or(|overlap| overlap >= least_overlap)
+}
+
+/// Whether a frame is better than a sound one by more than half of what photos or masks lack there, and loses nothing.
+fn is_better_than_sound(other: &Rating, own: &Rating) -> bool {
+    let gain = |other: Option<f64>, own: Option<f64>| match (other, own) {
+        (Some(new), Some(old)) => (new - old) / (1.0 - old).max(LEAST_GAIN_OF_SOUND / LEAST_GAIN_SHARE_OF_SOUND),
+        (None, Some(_)) => f64::NEG_INFINITY,
+        (_, None) => 0.0,
+    };
+    let gains = [gain(other.agreement, own.agreement), gain(other.overlap, own.overlap)];
+    gains.iter().any(|gain| *gain > LEAST_GAIN_SHARE_OF_SOUND) && gains.iter().all(|gain| *gain >= 0.0)
 }
 
 /// Whether photos or masks say that one frame is clearly better than what there is.
@@ -77,10 +94,15 @@ pub fn put_right(
     }
     let mut rater = Rater::new(mesh, cameras, views, in_pixels);
     let as_it_is = rater.rate(&DMat4::IDENTITY);
-    if is_sound(&as_it_is) {
+    if is_sound(&as_it_is, SURE_AGREEMENT, SURE_OVERLAP) {
         return rater.into_views();
     }
-    let frames = known(own);
+    let is_doubtless = is_sound(&as_it_is, SOUND_AGREEMENT, SOUND_OVERLAP);
+    let mut frames = known(own);
+    if is_doubtless {
+        // In another unit of length, photos and masks would not agree so well.
+        frames.retain(|frame| !frame.changes_units);
+    }
     let tried = frames.len();
     let rate = |frame: Trial| {
         let in_sight = rater.by_sight(&frame.source_from_mesh).views >= FITTING_SHARE;
@@ -92,6 +114,7 @@ pub fn put_right(
     let is_lost = as_it_is.views < FAILING_SHARE;
     let is_wanted = |own: &&(Rating, Trial)| match is_lost {
         true => is_credible(own),
+        false if is_doubtless => is_better_than_sound(&own.0, &as_it_is),
         false => is_clearly_better(&own.0, &as_it_is),
     };
     let wanted: Vec<&(Rating, Trial)> = rated.iter().filter(is_wanted).collect();
@@ -127,6 +150,7 @@ pub fn put_right(
             )
             .remedy("export mesh and cameras from the same project in the same coordinate system"),
         ),
+        None if is_doubtless => {}
         None => findings.extend(told_of_trials(&as_it_is, &rated, tried, own)),
     }
     rater.into_views()
@@ -245,7 +269,11 @@ mod tests {
 
     /// An uneven ball about a place that all cameras look at, and photos of the pattern on it.
     fn seen() -> (SourceMesh, Vec<View>) {
-        let centre = DVec3::new(0.0, 0.0, 5.0);
+        seen_with(DVec3::new(0.0, 0.0, 5.0), DVec3::new(1.5, 1.0, 0.8), &ring())
+    }
+
+    /// The same of other half axes, about another place, by other cameras.
+    fn seen_with(centre: DVec3, half_axes: DVec3, cameras: &[SourceCamera]) -> (SourceMesh, Vec<View>) {
         let mut ball = SourceMesh::default();
         let (rings, sectors) = (16u32, 32u32);
         for ring in 0..=rings {
@@ -253,7 +281,7 @@ mod tests {
                 let theta = std::f64::consts::PI * f64::from(ring) / f64::from(rings);
                 let phi = std::f64::consts::TAU * f64::from(sector) / f64::from(sectors);
                 let normal = DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
-                ball.positions.push(centre + normal * DVec3::new(1.5, 1.0, 0.8));
+                ball.positions.push(centre + normal * half_axes);
                 let [a, b] = [ring * sectors + sector, ring * sectors + (sector + 1) % sectors];
                 if ring < rings {
                     ball.triangles.extend([[a, a + sectors, b], [b, a + sectors, b + sectors]]);
@@ -262,7 +290,7 @@ mod tests {
         }
         let positions: Vec<Vec3> = ball.positions.iter().map(|point| point.as_vec3()).collect();
         let bvh = Bvh::build(&positions, &ball.triangles).unwrap();
-        let mut views = grey(&ring());
+        let mut views = grey(cameras);
         for view in &mut views {
             let shade = |row: usize, column: usize| {
                 let ray = view.camera.ray_through(glam::Vec2::new(column as f32 + 0.5, row as f32 + 0.5));
@@ -314,5 +342,47 @@ mod tests {
         let findings = put(&mut larger, &views, &[]);
         assert_eq!(findings[0].code, "mesh-frames-tried", "{findings:?}");
         assert!(larger.positions == before && findings[0].message.contains("Of 19 other frames"), "{}", findings[0]);
+    }
+
+    #[test]
+    fn a_frame_that_does_well_gives_way_to_one_that_lacks_less_than_half_as_much() {
+        let rating = |agreement: f64, overlap: Option<f64>| Rating {
+            views: 1.0,
+            points: 1.0,
+            agreement: Some(agreement),
+            overlap,
+        };
+        let own = rating(0.75, None);
+        assert!(is_sound(&own, SOUND_AGREEMENT, SOUND_OVERLAP) && !is_sound(&own, SURE_AGREEMENT, SURE_OVERLAP));
+        assert!(is_better_than_sound(&rating(0.99, None), &own));
+        assert!(!is_better_than_sound(&rating(0.85, None), &own), "gloss and noise do as much");
+        let masked = rating(0.78, Some(0.83));
+        assert!(is_better_than_sound(&rating(0.99, Some(0.99)), &masked));
+        assert!(!is_better_than_sound(&rating(0.95, Some(0.8)), &masked), "masks speak against it");
+        assert!(!is_better_than_sound(&rating(0.95, None), &masked), "nothing is in sight of the masks");
+        assert!(!is_better_than_sound(&rating(0.99, Some(0.89)), &rating(0.97, Some(0.89))), "both are about alike");
+    }
+
+    #[test]
+    fn a_round_object_that_is_turned_is_noticed_though_photos_agree_well() {
+        let about_origin: Vec<SourceCamera> = ring()
+            .into_iter()
+            .map(|camera| SourceCamera {
+                translation: camera.translation + camera.rotation * DVec3::new(0.0, 0.0, 5.0),
+                ..camera
+            })
+            .collect();
+        let (ball, views) = seen_with(DVec3::ZERO, DVec3::new(1.12, 1.0, 0.88), &about_origin);
+        let z_up = DMat4::from_mat3(DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y));
+        let mut turned = moved_by(&ball, z_up.inverse());
+        let mut rater = Rater::new(&turned, &about_origin, views.clone(), &in_pixels);
+        let before = rater.rate(&DMat4::IDENTITY).agreement.unwrap();
+        assert!((SOUND_AGREEMENT..SURE_AGREEMENT).contains(&before), "{before}");
+        for (mesh, is_moved) in [(&mut turned, true), (&mut ball.clone(), false)] {
+            let mut findings = Vec::new();
+            put_right(mesh, (&about_origin, views.clone()), &in_pixels, &[], &mut findings);
+            let off = mesh.positions.iter().zip(&ball.positions).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+            assert!(off < 1e-9 && findings.len() == usize::from(is_moved), "off by {off}: {findings:?}");
+        }
     }
 }
