@@ -225,7 +225,13 @@ mod tests {
             file::write_png_srgb8(&root.join("large.png"), &halves(width, height)).unwrap();
             let views = [view(root, "a", "large.png")];
             if width == 6 {
-                let loaded = load_all(&views, &[(4, 3)], Default::default(), None, &ReadSettings::default());
+                let loaded = load_all(
+                    &views,
+                    &[(4, 3)],
+                    Default::default(),
+                    (None, &Default::default()),
+                    &ReadSettings::default(),
+                );
                 assert!(loaded.err().unwrap().message().contains("6 x 5"), "another shape");
             } else {
                 assert_eq!(objects_of(&views), [6]);
@@ -233,7 +239,10 @@ mod tests {
         }
         file::write_png_srgb8(&root.join("small.png"), &halves(2, 2)).unwrap();
         let views = [view(root, "a", "small.png")];
-        assert!(load_all(&views, &[(4, 3)], Default::default(), None, &ReadSettings::default()).is_err());
+        assert!(
+            load_all(&views, &[(4, 3)], Default::default(), (None, &Default::default()), &ReadSettings::default())
+                .is_err()
+        );
     }
 
     #[test]
