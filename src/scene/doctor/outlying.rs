@@ -19,8 +19,8 @@ const DEVIATIONS: f64 = 1.4826;
 /// A photo that falls behind the median by so many deviations, and by so much, is tried: an explanation speaks for itself.
 const TRIED_DEVIATIONS: f64 = 3.0;
 const TRIED_DISTANCE: f64 = 0.15;
-/// One of which even the best of its neighbours falls behind by so many, and by so much, is named without an explanation: one that
-/// belongs may have gloss or far neighbours, which lower its median, but not all of them.
+/// One of which even the best of its neighbours falls behind by so many, and by so much, is named without an explanation: one
+/// that belongs may have gloss or far neighbours, which lower its median, but not all of them.
 const NAMED_DEVIATIONS: f64 = 6.0;
 const NAMED_DISTANCE: f64 = 0.3;
 /// Below this, a photo is named however much the others spread.
@@ -88,8 +88,10 @@ pub(super) fn check(scene: &Scene, trial: &Trial, found: Vec<Option<f64>>, repor
                     "the photo matches the camera of {} (correlation {there:.2}) and not its own ({own:.2})",
                     names[other]
                 );
-                Finding::new(Severity::Warning, "photo-misplaced", message)
-                    .remedy("look for the photo of this camera: this one is a copy of another or has another's name; or exclude the view")
+                Finding::new(Severity::Warning, "photo-misplaced", message).remedy(
+                    "look for the photo of this camera: this one is a copy of another or has another's name; or \
+                         exclude the view",
+                )
             }
             None if own < limits.low || best < limits.named => {
                 search.is_left_out[view] = true;

@@ -4,7 +4,8 @@
 //! [`transforms`], [`metashape`], and the others of [`Format`]); each kind only lists files and reads cameras into a
 //! [`source::SourceScene`]. What follows is the same for all: true sizes of photos (`photo_size`, `calibrated_size`), mesh
 //! ([`mesh_file`], with `obj`, `ply`, `gltf` and `stl`) and its frame (`mesh_frame`), up axis and origin ([`world`]), photos,
-//! masks and lenses ([`photos`], `masks`, `orientation`, `orientation_trial`), pixel centres. [`understood`] says on a page what was made of it all.
+//! masks and lenses ([`photos`], `masks`), how photos lie (`orientation`, `orientation_trial`), pixel centres. [`understood`]
+//! says on a page what was made of it all.
 //!
 //! What it refuses to do: guess. What is missing or contradictory is an error with place and remedy, or a finding; what
 //! was assumed is a finding. Whether the parts fit together is judged by [`doctor`](crate::scene::doctor), not here.
