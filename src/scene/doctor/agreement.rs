@@ -9,7 +9,7 @@
 //! It refuses to judge surfaces that look everywhere alike, and mirrors, whose pictures move with the camera.
 
 use super::probe::Probe;
-use super::trial::{Given, Lie, Trial};
+use super::trial::{Given, JUDGED_ABOVE, Lie, Trial, is_clearly_better};
 use super::{Report, outlying};
 use crate::error::{Finding, Severity};
 use crate::math::statistics::quantile;
@@ -18,10 +18,6 @@ use crate::trace::Bvh;
 
 /// Of fewer views nothing is said.
 const FEWEST_VIEWS: usize = 3;
-/// Another order of the photos, or another way they lie, is believed when the correlation rises by so much, and by this share
-/// of what it lacks.
-const LEAST_GAIN: f64 = 0.1;
-const LEAST_GAIN_SHARE: f64 = 0.2;
 /// Where most views correlate by less than this, photos belong to other cameras or another mesh; where they do by less than
 /// [`JUDGED_ABOVE`], something of them is off.
 const HARDLY: f64 = 0.2;
@@ -29,17 +25,10 @@ const HARDLY: f64 = 0.2;
 const USUAL: f64 = 0.7;
 /// A shift of all photos is no explanation where they correlate by less than this after it.
 const LEAST_SHIFTED: f64 = 0.35;
-/// Where most views correlate by less than this, that itself is told, and nothing is said of single ones.
-pub(super) const JUDGED_ABOVE: f64 = 0.5;
 
 /// How the photos of a scene agree, the median over the views, in [-1, 1]; `None` where they share too little.
 pub(crate) fn measure(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>]) -> Option<f64> {
     Trial::new(scene, bvh, probes).of_all(&Given::own(scene.views.len()), FEWEST_VIEWS)
-}
-
-/// Whether an agreement is clearly better than another.
-pub(super) fn is_clearly_better(other: f64, own: f64) -> bool {
-    other - own > (LEAST_GAIN_SHARE * (1.0 - own)).max(LEAST_GAIN)
 }
 
 /// Measures how the photos agree, and names those that do not belong to their cameras.

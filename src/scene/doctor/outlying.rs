@@ -7,8 +7,7 @@
 //!
 //! Photos that are the same picture are told by their content.
 
-use super::agreement::{JUDGED_ABOVE, is_clearly_better};
-use super::trial::{Given, Lie, Trial};
+use super::trial::{Given, JUDGED_ABOVE, Lie, Trial, is_clearly_better};
 use super::{Report, copies, names_of, worst_first};
 use crate::error::{Finding, Place, Severity};
 use crate::math::statistics::quantile;

@@ -18,6 +18,17 @@ const NEIGHBOURS: usize = 6;
 const FEWEST_SHARED: usize = 40;
 /// Below this radiance a pixel is dark: its logarithm is noise.
 const DARK: f32 = 2e-3;
+/// Another order of the photos, or another way they lie, is believed when the correlation rises by so much, and by this share
+/// of what it lacks.
+const LEAST_GAIN: f64 = 0.1;
+const LEAST_GAIN_SHARE: f64 = 0.2;
+/// Where most views correlate by less than this, that itself is told, and nothing is said of single ones.
+pub(super) const JUDGED_ABOVE: f64 = 0.5;
+
+/// Whether an agreement is clearly better than another.
+pub(super) fn is_clearly_better(other: f64, own: f64) -> bool {
+    other - own > (LEAST_GAIN_SHARE * (1.0 - own)).max(LEAST_GAIN)
+}
 
 /// How a photo lies in its picture: what is to be done to it, as the EXIF orientation of that number says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,9 +1,8 @@
 //! Photos that may lie one of two ways, as stored or turned by their EXIF orientation: which one agrees with their cameras?
 
-use super::agreement::is_clearly_better;
 use super::probe::Probe;
 use super::silhouette;
-use super::trial::{Given, Lie, Trial};
+use super::trial::{Given, Lie, Trial, is_clearly_better};
 use crate::math::statistics::quantile;
 use crate::scene::Scene;
 use crate::trace::Bvh;
