@@ -4,7 +4,7 @@
 //! is the correlation of the logarithms of radiance over the shared points; exposures, gains and a common reflectance drop
 //! out of it. A photo that was given the camera of another one correlates with nobody. What explains it is looked for by
 //! trying: the photos of all cameras moved on by one or two, all of them turned or mirrored; of single ones
-//! [`outlying`](super::outlying) speaks.
+//! [`outlying`] speaks.
 //!
 //! It refuses to judge surfaces that look everywhere alike, and mirrors, whose pictures move with the camera.
 
