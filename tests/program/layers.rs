@@ -97,7 +97,8 @@ fn every_module_of_the_library_has_a_rank() {
     for line in std::fs::read_to_string(source).unwrap().lines() {
         let line = line.trim();
         let Some(module) = line.strip_prefix("pub ").unwrap_or(line).strip_prefix("mod ") else { continue };
-        let module = module.trim_end_matches(';');
+        // One that is written out there holds names of others alone.
+        let Some(module) = module.strip_suffix(';') else { continue };
         modules += 1;
         assert!(module.ends_with("_tests") || rank(module).is_some(), "module {module} has no rank here");
     }
