@@ -33,6 +33,15 @@ pub(super) fn tell_opaque(context: &Context, rect: Rect) {
     context.data_mut(|data| data.insert_temp(opaque_key(), Some(rect)));
 }
 
+fn lost_key() -> Id {
+    Id::unique("the last frame was lost")
+}
+
+/// Whether what was recorded for the last frame never reached the adapter, as where the window had another size by then.
+pub(super) fn was_lost(context: &Context) -> bool {
+    context.data(|data| data.get_temp(lost_key()).unwrap_or(false))
+}
+
 /// What takes egui's shapes and puts the kept picture in their place.
 pub(super) struct Repaint {
     canvas: Arc<Mutex<Canvas>>,
@@ -88,7 +97,15 @@ impl egui_wgpu::CallbackTrait for Painting {
         _resources: &mut egui_wgpu::CallbackResources,
     ) -> Vec<wgpu::CommandBuffer> {
         let wanted = self.context.tessellate(self.shapes.clone(), screen.pixels_per_point);
-        lock(&self.canvas).follow((device, queue), screen, encoder, &wanted, self.opaque, self.background)
+        let mut canvas = lock(&self.canvas);
+        let was_lost = std::mem::replace(&mut canvas.is_on_its_way, true);
+        if was_lost {
+            canvas.picture = None;
+        }
+        self.context.data_mut(|data| data.insert_temp(lost_key(), was_lost));
+        let commands = canvas.follow((device, queue), screen, encoder, &wanted, self.opaque, self.background);
+        self.context.data_mut(|data| data.insert_temp(lost_key(), false));
+        commands
     }
 
     fn paint(
@@ -123,6 +140,8 @@ struct Canvas {
     /// Textures that the last frame drew for the last time.
     last_drawn: Vec<TextureId>,
     drawn: Vec<Drawn>,
+    /// A frame was recorded, and the window's pass, which comes after it, was not yet.
+    is_on_its_way: bool,
 }
 
 impl Drop for Canvas {
@@ -141,6 +160,7 @@ impl Canvas {
             versions: HashMap::new(),
             last_drawn: Vec::new(),
             drawn: Vec::new(),
+            is_on_its_way: false,
         }
     }
 
@@ -198,7 +218,8 @@ impl Canvas {
     }
 
     /// Copies the picture into the window.
-    fn show(&self, pass: &mut wgpu::RenderPass<'_>) {
+    fn show(&mut self, pass: &mut wgpu::RenderPass<'_>) {
+        self.is_on_its_way = false;
         if let (Some((_, copy)), Some(picture)) = (&self.tools, &self.picture) {
             copy.draw(pass, &picture.copied);
         }
@@ -257,9 +278,12 @@ impl Canvas {
     }
 
     fn drawn_of(&self, primitive: &ClippedPrimitive, screen: &egui_wgpu::ScreenDescriptor) -> Drawn {
-        let (rect, identity) = match &primitive.primitive {
-            // What it paints, it alone knows.
-            Primitive::Callback(callback) => (callback.rect, None),
+        let (scale, size) = (screen.pixels_per_point, screen.size_in_pixels);
+        let (bounds, identity) = match &primitive.primitive {
+            // What it paints, it alone knows; nothing beyond its pixels.
+            Primitive::Callback(callback) => {
+                (PixelRect::exactly(callback.rect.intersect(primitive.clip_rect), scale, size), None)
+            }
             Primitive::Mesh(mesh) => {
                 let mut hasher = DefaultHasher::new();
                 let clip = primitive.clip_rect;
@@ -273,10 +297,10 @@ impl Canvas {
                     hasher.write(bytemuck::bytes_of(&place));
                     hasher.write(&vertex.color.to_array());
                 }
-                (mesh.calc_bounds(), Some(hasher.finish()))
+                let rect = mesh.calc_bounds().intersect(primitive.clip_rect);
+                (PixelRect::around(rect, scale, size), Some(hasher.finish()))
             }
         };
-        let rect = rect.intersect(primitive.clip_rect);
-        Drawn { identity, bounds: PixelRect::around(rect, screen.pixels_per_point, screen.size_in_pixels) }
+        Drawn { identity, bounds }
     }
 }

@@ -26,6 +26,8 @@ const NAMED_DISTANCE: f64 = 0.3;
 const LOW: f64 = 0.35;
 /// An explanation makes up for this part of what a photo falls behind.
 const LEAST_PART: f64 = 0.5;
+/// Photos that fall behind whose cameras are tried for each other: a capture may have hundreds.
+const MOST_BEHIND: usize = 32;
 /// Cameras beside a camera, in the order of names, whose photos are tried on it.
 const BESIDE: usize = 3;
 
@@ -196,11 +198,16 @@ impl Search<'_> {
         (there >= needed && is_clearly_better(there, own)).then_some(Fault::Of(other, there))
     }
 
-    /// Cameras that a photo may be of: those that fall behind too, its neighbours, and those beside it in the order of names.
+    /// Cameras that a photo may be of: those that fall behind most, its neighbours, and those beside it in the order of names.
     fn others(&self, view: usize, behind: &[(f64, usize)]) -> Vec<usize> {
         let beside = view.saturating_sub(BESIDE)..(view + BESIDE + 1).min(self.given.len());
-        let mut others: Vec<usize> =
-            behind.iter().map(|(_, other)| *other).chain(self.trial.neighbours(view)).chain(beside).collect();
+        let mut others: Vec<usize> = behind
+            .iter()
+            .take(MOST_BEHIND)
+            .map(|(_, other)| *other)
+            .chain(self.trial.neighbours(view))
+            .chain(beside)
+            .collect();
         others.sort_unstable();
         others.dedup();
         others.retain(|&other| other != view && !self.is_left_out[other]);

@@ -51,12 +51,17 @@ pub fn folder_of_masks(scene: &Path) -> Option<PathBuf> {
 
 /// Whether a folder by its name, in lower case, may hold masks and no photos.
 pub fn may_hold_masks(folder: &str) -> bool {
-    ["mask", "silhouette", "matte"].iter().any(|word| folder.contains(word))
+    let is_of_masks =
+        |word: &str| ["mask", "masks", "masked", "silhouette", "silhouettes", "matte", "mattes"].contains(&word);
+    folder.split(|letter: char| !letter.is_alphabetic()).any(is_of_masks)
 }
 
 /// A folder in a scene's folder that by its name may hold masks, but is none of those that are read.
 pub fn unread_folder_of_masks(scene: &Path) -> Option<PathBuf> {
-    folders_in(scene).into_iter().find(|folder| may_hold_masks(&name_of(folder).to_lowercase()))
+    folders_in(scene).into_iter().find(|folder| {
+        let name = name_of(folder).to_lowercase();
+        may_hold_masks(&name) && !FOLDER_NAMES.contains(&name.as_str())
+    })
 }
 
 /// A mask and the names it may go by.
@@ -235,6 +240,12 @@ mod tests {
     fn found(masks: &mut Masks, photo: &str) -> Option<String> {
         let path = masks.of_photo(Path::new(photo))?;
         Some(path.file_name().unwrap().to_string_lossy().into_owned())
+    }
+
+    #[test]
+    fn folders_are_of_masks_by_a_word_of_their_name() {
+        assert!(["masks", "photo_masks", "mask2", "scan-silhouettes"].into_iter().all(may_hold_masks));
+        assert!(!["formatted", "unmasked", "images"].into_iter().any(may_hold_masks));
     }
 
     #[test]

@@ -32,6 +32,15 @@ impl PixelRect {
         }
     }
 
+    /// The pixels of a rectangle in points with hard edges, as a viewport and a scissor round them.
+    pub fn exactly(rect: Rect, pixels_per_point: f32, size: [u32; 2]) -> Self {
+        let rounded = |value: f32, most: u32| (value * pixels_per_point).round().clamp(0.0, most as f32) as u32;
+        PixelRect {
+            min: [rounded(rect.min.x, size[0]), rounded(rect.min.y, size[1])],
+            max: [rounded(rect.max.x, size[0]), rounded(rect.max.y, size[1])],
+        }
+    }
+
     /// In points, whose borders become these pixels again when they are rounded.
     pub fn in_points(&self, pixels_per_point: f32) -> Rect {
         let point = |at: [u32; 2]| pos2(at[0] as f32 / pixels_per_point, at[1] as f32 / pixels_per_point);

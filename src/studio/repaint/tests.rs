@@ -1,6 +1,7 @@
 //! A window of which only what changed is drawn looks as one that is drawn whole.
 
 use super::Repaint;
+use crate::studio::stage::{Stage, StageFrame};
 use crate::window_tests::adapter::{has_adapter, rendered};
 use eframe::egui::{self, Color32, ColorImage, TextureHandle, TextureOptions, pos2, vec2};
 use egui_kittest::Harness;
@@ -9,6 +10,7 @@ use egui_kittest::Harness;
 struct Changing {
     time: usize,
     picture: Option<TextureHandle>,
+    stage: Stage,
 }
 
 impl Changing {
@@ -17,7 +19,7 @@ impl Changing {
         if keeps {
             creation.egui_ctx.add_plugin(Repaint::new(state.target_format));
         }
-        Changing { time: 0, picture: None }
+        Changing { time: 0, picture: None, stage: Stage::new(state) }
     }
 }
 
@@ -39,9 +41,16 @@ impl eframe::App for Changing {
             if let Some(picture) = &self.picture {
                 ui.image((picture.id(), vec2(40.0, 40.0)));
             }
+            // Hides what is behind it, and is drawn with every frame.
+            let place = egui::Rect::from_min_size(pos2(180.3, 20.6), vec2(70.0, 50.0));
+            ui.scope_builder(egui::UiBuilder::new().max_rect(place), |ui| self.stage.show(ui, &StageFrame::default()));
             let place = pos2(100.0 + 9.0 * time as f32, 90.0);
             ui.painter().circle_filled(place, 14.0, Color32::from_rgba_unmultiplied(20, 200, 90, 120));
         });
+        if time == 2 {
+            let above = context.layer_painter(egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("shade")));
+            above.rect_filled(context.content_rect(), 0.0, Color32::from_black_alpha(120));
+        }
         if (3..6).contains(&time) {
             egui::Window::new("Above").fixed_pos(pos2(80.0, 40.0)).show(&context, |ui| ui.label("half of it"));
         }
@@ -64,6 +73,10 @@ fn what_is_kept_and_mended_is_what_would_be_drawn() {
             harness.state_mut().time = time;
             // Windows of egui take a frame to find their size, and fade in.
             harness.run_steps(20);
+            for _ in 0..2 {
+                rendered(harness).unwrap();
+                harness.step();
+            }
             rendered(harness).unwrap()
         });
         let apart = one.pixels().zip(other.pixels()).filter(|(one, other)| {

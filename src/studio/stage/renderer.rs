@@ -21,6 +21,7 @@ use crate::light::Environment;
 use crate::material::{LobeModel, MaterialMaps};
 use crate::scene::Mesh;
 use crate::studio::copy::Copy;
+use crate::studio::repaint::was_lost;
 use drawing::Targets;
 use eframe::{egui, wgpu};
 use glam::Vec3;
@@ -99,6 +100,8 @@ pub(super) struct StageRenderer {
     /// What the picture was made by, and of.
     pictured: Option<(ScreenUniform, ScreenVariant)>,
     is_shown: bool,
+    /// A frame was recorded, and the window's pass, which comes after it, was not yet.
+    is_on_its_way: bool,
     status: StageStatus,
 }
 
@@ -139,6 +142,7 @@ impl StageRenderer {
             drawn: None,
             pictured: None,
             is_shown: false,
+            is_on_its_way: false,
             status: StageStatus::default(),
             maker,
         }
@@ -160,6 +164,10 @@ impl StageRenderer {
         self.is_shown = !screen.contains(&0);
         if !self.is_shown {
             return;
+        }
+        // What was recorded for a frame that never came to be drawn is recorded again.
+        if std::mem::replace(&mut self.is_on_its_way, true) || was_lost(context) {
+            (self.drawn, self.pictured) = (None, None);
         }
         let sizes = self.sizes(screen, frame.look.resolution_scale, pixels_per_point);
         let (mut changed, pictures_changed) = self.follow_content(frame, context);
@@ -193,7 +201,8 @@ impl StageRenderer {
     }
 
     /// Shows the picture in the pass of the window.
-    pub fn paint(&self, pass: &mut wgpu::RenderPass<'static>) {
+    pub fn paint(&mut self, pass: &mut wgpu::RenderPass<'static>) {
+        self.is_on_its_way = false;
         if let Some(targets) = self.targets.as_ref().filter(|_| self.is_shown) {
             self.copy.draw(pass, &targets.copied);
         }
