@@ -13,7 +13,7 @@ mod changes;
 #[allow(clippy::unwrap_used)]
 mod tests;
 
-use super::copy::Copy;
+use super::copy::{Copy, target};
 use changes::{Drawn, PixelRect};
 use eframe::{egui, egui_wgpu, wgpu};
 use egui::epaint::textures::TexturesDelta;
@@ -260,17 +260,7 @@ impl Canvas {
         let Some((_, copy)) = self.tools.as_ref().filter(|_| !self.picture.as_ref().is_some_and(is_same)) else {
             return;
         };
-        let texture = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("repaint"),
-            size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: self.window_format,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
-        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let view = target(device, "repaint", size, self.window_format);
         let copied = copy.of(device, &view, true);
         self.picture = Some(Picture { size, pixels_per_point: scale, view, copied });
         // Nothing of it is drawn yet, be it the background alone.

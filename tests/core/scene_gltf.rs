@@ -3,22 +3,12 @@
 #![allow(clippy::unwrap_used, clippy::disallowed_methods)]
 
 use super::scene_fixture::folder;
+use super::scene_meshes::{area, has};
 use patina::scene::{Mesh, read_mesh};
 use patina::{ErrorKind, Finding};
 
 fn read(content: &[u8]) -> (Mesh, Vec<Finding>) {
-    let (_keep, folder) = folder();
-    let path = folder.join("a.glb");
-    std::fs::write(&path, content).unwrap();
-    read_mesh(&path).unwrap_or_else(|error| panic!("{error}"))
-}
-
-fn area(mesh: &Mesh) -> f32 {
-    (0..mesh.triangles.len()).map(|triangle| 0.5 * mesh.area_vector(triangle).length()).sum()
-}
-
-fn has(findings: &[Finding], code: &str) -> bool {
-    findings.iter().any(|finding| finding.code == code)
+    super::scene_meshes::read("a.glb", content)
 }
 
 /// A GLB file of one node: `json` with the length of the binary part in the place of `LENGTH`.

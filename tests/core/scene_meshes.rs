@@ -9,18 +9,18 @@ use patina::scene::{Mesh, read_mesh};
 use patina::{Finding, Place};
 use std::path::Path;
 
-fn read(name: &str, content: impl AsRef<[u8]>) -> (Mesh, Vec<Finding>) {
+pub fn read(name: &str, content: impl AsRef<[u8]>) -> (Mesh, Vec<Finding>) {
     let (_keep, folder) = folder();
     let path = folder.join(name);
     std::fs::write(&path, content).unwrap();
     read_mesh(&path).unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn area(mesh: &Mesh) -> f32 {
+pub fn area(mesh: &Mesh) -> f32 {
     (0..mesh.triangles.len()).map(|triangle| 0.5 * mesh.area_vector(triangle).length()).sum()
 }
 
-fn has(findings: &[Finding], code: &str) -> bool {
+pub fn has(findings: &[Finding], code: &str) -> bool {
     findings.iter().any(|finding| finding.code == code)
 }
 

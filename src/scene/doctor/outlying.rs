@@ -62,8 +62,9 @@ pub(super) fn check(scene: &Scene, trial: &Trial, found: Vec<Option<f64>>, repor
             let own = own.filter(|own| !is_done[view] && *own < limits.tried)?;
             Some((own, view))
         };
-        let behind: Vec<(f64, usize)> = agreement.iter().enumerate().filter_map(is_behind).collect();
-        let Some(&(own, view)) = behind.iter().min_by(|a, b| a.0.total_cmp(&b.0)) else { break };
+        let mut behind: Vec<(f64, usize)> = agreement.iter().enumerate().filter_map(is_behind).collect();
+        behind.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let Some(&(own, view)) = behind.first() else { break };
         is_done[view] = true;
         let best = trial.best_of_view(view, &search.found, &search.is_left_out).unwrap_or(own);
         let needed = (own + LEAST_PART * (limits.middle - own)).max(JUDGED_ABOVE);
@@ -164,7 +165,7 @@ impl Search<'_> {
         self.trial.of_view(camera, given, |other| self.is_left_out[other] || also == Some(other))
     }
 
-    /// What explains a photo that agrees by `own`, so that it agrees by what is `needed`. `behind` are all that fall behind.
+    /// What explains a photo that agrees by `own`, so that it agrees by what is `needed`. `behind` are all that fall behind, the worst first.
     fn fault(&self, view: usize, own: f64, needed: f64, behind: &[(f64, usize)]) -> Option<Fault> {
         let states = &self.scene.views[view].states;
         let mut given = self.given.clone();

@@ -245,13 +245,7 @@ mod tests {
         let mut lost = mesh(DVec3::new(900.0, 0.0, 0.0));
         assert_eq!(put(&mut lost, &views, &[])[0].code, "mesh-frame-unknown");
         // A thousandth of it would be in the sight of cameras that stand around the origin.
-        let about_origin: Vec<SourceCamera> = ring()
-            .into_iter()
-            .map(|camera| SourceCamera {
-                translation: camera.translation + camera.rotation * DVec3::new(0.0, 0.0, 5.0),
-                ..camera
-            })
-            .collect();
+        let about_origin = ring_about_origin();
         let mut findings = Vec::new();
         let mut beside = mesh(DVec3::new(40.0, 3.0, 0.0));
         let before = beside.positions.clone();
@@ -265,6 +259,15 @@ mod tests {
             "{}",
             findings[0]
         );
+    }
+
+    /// The ring of cameras about the origin.
+    fn ring_about_origin() -> Vec<SourceCamera> {
+        let moved = |camera: SourceCamera| SourceCamera {
+            translation: camera.translation + camera.rotation * DVec3::new(0.0, 0.0, 5.0),
+            ..camera
+        };
+        ring().into_iter().map(moved).collect()
     }
 
     /// An uneven ball about a place that all cameras look at, and photos of the pattern on it.
@@ -365,13 +368,7 @@ mod tests {
 
     #[test]
     fn a_round_object_that_is_turned_is_noticed_though_photos_agree_well() {
-        let about_origin: Vec<SourceCamera> = ring()
-            .into_iter()
-            .map(|camera| SourceCamera {
-                translation: camera.translation + camera.rotation * DVec3::new(0.0, 0.0, 5.0),
-                ..camera
-            })
-            .collect();
+        let about_origin = ring_about_origin();
         let (ball, views) = seen_with(DVec3::ZERO, DVec3::new(1.12, 1.0, 0.88), &about_origin);
         let z_up = DMat4::from_mat3(DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y));
         let mut turned = moved_by(&ball, z_up.inverse());

@@ -3,13 +3,11 @@
 
 use super::mesh_frame_rating::Rater;
 use super::orientation::{Turn, Turns};
+use super::repeated;
 use crate::error::{Finding, Place, Severity};
 use crate::math::statistics::quantile;
 use crate::scene::doctor::ways::Way;
 use std::collections::BTreeMap;
-
-/// Names that are shown of those that share a finding.
-const SHOWN: usize = 6;
 
 /// What was made of the photos of one orientation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -70,21 +68,11 @@ fn told(tag: u8, verdict: Verdict, views: &[usize], names: &[&str], ways: &[Opti
             ),
         ),
     };
-    let which = match views {
-        [view] => {
-            return finished(Finding::new(Severity::Note, code, message).at(Place::View(names[*view].into())), verdict);
-        }
-        _ if views.len() == names.len() => format!("all {} photos", views.len()),
-        _ => {
-            let shown: Vec<&str> = views.iter().take(SHOWN).map(|&view| names[view]).collect();
-            let more = if views.len() > SHOWN { " and others" } else { "" };
-            format!("{} of {} photos: {}{more}", views.len(), names.len(), shown.join(", "))
-        }
+    let names: Vec<&str> = views.iter().map(|&view| names[view]).collect();
+    let finding = match repeated::which(&names, ways.len()) {
+        None => Finding::new(Severity::Note, code, message).at(Place::View(names[0].to_owned())),
+        Some(which) => Finding::new(Severity::Note, code, format!("{message} ({which})")),
     };
-    finished(Finding::new(Severity::Note, code, format!("{message} ({which})")), verdict)
-}
-
-fn finished(finding: Finding, verdict: Verdict) -> Finding {
     match verdict {
         Verdict::Unknown => finding.remedy(
             "look at the outlines over the photos (check -o FOLDER): where they do not fit, turn the photos in an editor",

@@ -135,7 +135,6 @@ pub fn told_of_lenses(loaded: &[LoadedPhoto]) -> Option<Finding> {
 /// One finding of those that photos share, with the names of the photos. Where they differ in how much there is of it, the
 /// worst is told.
 fn gather(views: &[SourceView], loaded: &[LoadedPhoto]) -> Vec<Finding> {
-    const SHOWN: usize = 6;
     let is_same = |one: &Finding, other: &Finding| {
         let both_measured = one.extent > 0.0 && other.extent > 0.0;
         let key = |finding: &Finding| (finding.code, finding.severity, finding.remedy.clone());
@@ -156,12 +155,8 @@ fn gather(views: &[SourceView], loaded: &[LoadedPhoto]) -> Vec<Finding> {
     let told = groups.into_iter().filter_map(|(findings, names)| {
         let (worst, varies) = repeated::worst_of(findings.iter().copied())?;
         let finding = findings[worst];
-        let count = names.len();
-        let which = match count {
-            _ if count == views.len() && count > 1 => format!("all {count} photos"),
-            1 => return Some(finding.clone().at(Place::View(names[0].to_owned()))),
-            _ if count <= SHOWN => format!("{count} of {} photos: {}", views.len(), names.join(", ")),
-            _ => format!("{count} of {} photos: {} and others", views.len(), names[..SHOWN].join(", ")),
+        let Some(which) = repeated::which(&names, views.len()) else {
+            return Some(finding.clone().at(Place::View(names[0].to_owned())));
         };
         let which = if varies { format!("view {}, the most of {which}", names[worst]) } else { which };
         Some(Finding { message: format!("{} ({which})", finding.message), ..finding.clone() })

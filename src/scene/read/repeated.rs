@@ -56,6 +56,17 @@ fn name_of(place: &Place) -> String {
     }
 }
 
+/// Which of `all` photos these are, as a message says it; `None` for a single one, whose place says it.
+pub fn which(names: &[&str], all: usize) -> Option<String> {
+    let count = names.len();
+    match count {
+        _ if count == all && count > 1 => Some(format!("all {count} photos")),
+        1 => None,
+        _ if count <= SHOWN => Some(format!("{count} of {all} photos: {}", names.join(", "))),
+        _ => Some(format!("{count} of {all} photos: {} and others", names[..SHOWN].join(", "))),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

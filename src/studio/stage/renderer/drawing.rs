@@ -1,6 +1,7 @@
 //! What is drawn into which target.
 
 use super::StageRenderer;
+use crate::studio::copy::target;
 use crate::studio::stage::pipelines::{DEPTH_FORMAT, PICTURE_FORMAT, RADIANCE_FORMAT};
 use crate::studio::stage::uniforms::Sizes;
 use crate::studio::stage::variants::{BehindVariant, MeshVariant, ScreenVariant};
@@ -24,20 +25,7 @@ impl StageRenderer {
         if self.targets.as_ref().is_some_and(|targets| targets.sizes == *sizes) {
             return false;
         }
-        let size = sizes.target;
-        let target = |label, format| {
-            let texture = self.maker.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-                view_formats: &[],
-            });
-            texture.create_view(&wgpu::TextureViewDescriptor::default())
-        };
+        let target = |label, format| target(&self.maker.device, label, sizes.target, format);
         let picture = target("stage picture", PICTURE_FORMAT);
         self.targets = Some(Targets {
             sizes: *sizes,
