@@ -3,11 +3,12 @@
 use super::act::{Act, keys, turns};
 use super::layout::Layout;
 use super::model::store::Store;
-use super::model::{FitStatus, Model, Workspace};
+use super::model::{FitStatus, Model};
 use super::pace::Pace;
 use super::panel::{self, Memory};
 use super::repaint::Repaint;
 use super::stage::{Stage, StageStatus};
+use super::workspace::Workspace;
 use super::{perform, theme};
 use egui::{Context, ViewportCommand};
 use std::path::PathBuf;
@@ -167,7 +168,7 @@ impl Studio {
         } else if self.model.switches.alone {
             let frame = egui::Frame::NONE;
             egui::CentralPanel::no_frame().frame(frame).show(ui, |ui| {
-                panel::show(super::layout::Panel::Stage, ui, &mut self.model, &mut self.memory);
+                panel::show(super::workspace::Panel::Stage, ui, &mut self.model, &mut self.memory);
             });
         } else {
             panel::menu::show(ui, &mut self.model);

@@ -1,6 +1,6 @@
 //! The window. It holds no algorithm: what it shows is made by the library, what it does goes through [`crate::job`].
 //!
-//! There are two workspaces: scenes, and object mode ([`model::Workspace`]).
+//! There are two workspaces: scenes, and object mode ([`workspace::Workspace`], with the panels of each).
 //!
 //! Read [`app`] first: one frame is news taken in, panels drawn, acts done. [`model`] is what the window knows, without a
 //! widget; [`act`] lists everything a person can do, once, for menus, palette, keys and help; [`perform`] does it.
@@ -25,6 +25,7 @@ pub mod picture;
 mod repaint;
 pub mod stage;
 pub mod theme;
+pub mod workspace;
 
 pub use app::StudioOptions;
 pub use launch::run;

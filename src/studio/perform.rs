@@ -2,13 +2,14 @@
 
 use super::act::Act;
 use super::act::availability::availability;
-use super::layout::{Layout, Panel};
+use super::layout::Layout;
 use super::model::edits::PhotoLook;
 use super::model::lights::LightName;
 use super::model::log::Log;
 use super::model::tasks::TaskKind;
-use super::model::{Dialog, Model, PickFor, SaveWhat, Workspace};
+use super::model::{Dialog, Model, PickFor, SaveWhat};
 use super::stage::Layer;
+use super::workspace::{Panel, Workspace};
 use crate::error::{Error, ErrorKind, Place};
 use crate::image::display::{DisplaySettings, ToneCurve};
 use crate::job::Command;

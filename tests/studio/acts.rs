@@ -5,10 +5,10 @@ use eframe::egui::{Event, ViewportCommand};
 use egui_kittest::kittest::NodeT;
 use patina::studio::act::availability::availability;
 use patina::studio::act::{Act, ActInfo, Group, LIST};
-use patina::studio::layout::Panel;
 use patina::studio::model::tasks::TaskKind;
-use patina::studio::model::{Dialog, FitStatus, LightName, Workspace};
+use patina::studio::model::{Dialog, FitStatus, LightName};
 use patina::studio::stage::{Layer, Navigation};
+use patina::studio::workspace::{Panel, Workspace};
 
 /// The title of an act's menu.
 fn menu_of(info: &ActInfo) -> &'static str {

@@ -3,8 +3,8 @@
 use super::support::{Key, Modifiers, TestStudio};
 use eframe::egui::OutputCommand;
 use patina::fit::{FitSettings, Method, Preset};
-use patina::studio::layout::Panel;
 use patina::studio::model::FitStatus;
+use patina::studio::workspace::Panel;
 
 #[test]
 fn a_fit_is_started_paused_stepped_continued_and_stopped_by_hand() {

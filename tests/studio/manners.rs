@@ -4,11 +4,11 @@ use super::support::{Key, Modifiers, TestStudio};
 use egui_kittest::kittest::NodeT;
 use patina::image::histogram::auto_exposure;
 use patina::studio::act::{Act, LIST};
-use patina::studio::layout::Panel;
 use patina::studio::model::Dialog;
 use patina::studio::model::lights::LightName;
 use patina::studio::model::store::ThemeChoice;
 use patina::studio::stage::Navigation;
+use patina::studio::workspace::Panel;
 
 /// Frames until a change counts as one step of undo.
 const SETTLED: usize = 6;

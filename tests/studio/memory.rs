@@ -1,8 +1,8 @@
 //! What is remembered from one start to the next.
 
 use super::support::{Key, Modifiers, TestStudio, finished_run, small_scene};
-use patina::studio::layout::Panel;
 use patina::studio::model::store::ThemeChoice;
+use patina::studio::workspace::Panel;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

@@ -11,10 +11,9 @@ use patina::object::picture::render_exact;
 use patina::object::transport::TexelDirections;
 use patina::scene::{Camera, Mesh};
 use patina::studio::act::Act;
-use patina::studio::layout::Panel;
-use patina::studio::model::Workspace;
 use patina::studio::model::object::ObjectStatus;
 use patina::studio::model::object_form::Effort;
+use patina::studio::workspace::{Panel, Workspace};
 use std::path::Path;
 
 /// Side of the photo of the mesh in pixels, and its field of view in radians.

@@ -6,9 +6,9 @@ use eframe::egui::{Event, PointerButton, Pos2};
 use egui_kittest::kittest::NodeT;
 use patina::error::{Finding, Place, Severity};
 use patina::studio::act::Act;
-use patina::studio::layout::Panel;
 use patina::studio::model::log::Message;
 use patina::studio::panel::curves::stage_words;
+use patina::studio::workspace::Panel;
 
 #[test]
 fn a_panel_that_has_nothing_to_show_says_what_would_fill_it() {

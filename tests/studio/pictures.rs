@@ -9,10 +9,10 @@ use egui_kittest::Harness;
 use image::RgbaImage;
 use patina::object::starts::ModelKind;
 use patina::studio::act::Act;
-use patina::studio::layout::Panel;
 use patina::studio::model::LightName;
 use patina::studio::model::object_form::Effort;
 use patina::studio::model::store::ThemeChoice;
+use patina::studio::workspace::Panel;
 use std::path::PathBuf;
 use std::sync::Arc;
 

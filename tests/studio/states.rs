@@ -6,8 +6,8 @@ use patina::error::{Error, ErrorKind};
 use patina::fit::Method;
 use patina::scene::demo::DemoSettings;
 use patina::studio::act::Act;
-use patina::studio::layout::Panel;
 use patina::studio::model::{FitStatus, Phase};
+use patina::studio::workspace::Panel;
 use std::cell::RefCell;
 use std::sync::atomic::AtomicBool;
 

@@ -3,9 +3,9 @@
 
 use super::support::{Key, Modifiers, TestStudio, finished_run, small_scene};
 use patina::studio::act::Act;
-use patina::studio::layout::Panel;
 use patina::studio::model::FitStatus;
 use patina::studio::stage::Layer;
+use patina::studio::workspace::Panel;
 
 #[test]
 fn photos_stand_on_the_mesh_until_there_are_materials() {

@@ -10,7 +10,8 @@ use crate::job::demo;
 use crate::job::prepare::RunSettings;
 use crate::lab::scale::{self, ScaleCase};
 use crate::scene::demo::DemoSettings;
-use crate::studio::layout::{Layout, Panel};
+use crate::studio::layout::Layout;
+use crate::studio::workspace::Panel;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 

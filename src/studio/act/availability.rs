@@ -2,7 +2,8 @@
 
 use super::{Act, Group};
 use crate::studio::model::tasks::TaskKind;
-use crate::studio::model::{FitStatus, Model, Workspace};
+use crate::studio::model::{FitStatus, Model};
+use crate::studio::workspace::Workspace;
 
 /// `Ok` when the act can be done; otherwise why not, as a short sentence without a full stop.
 pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {

@@ -334,30 +334,6 @@ impl Act {
         }
     }
 
-    /// The list within its menu in which it stands, if it does: menus are no longer than a small window.
-    pub fn list(self) -> Option<&'static str> {
-        match self {
-            own if crate::studio::layout::Panel::of(own).is_some() => Some("Panels"),
-            own if own.navigation().is_some() => Some("Navigation as in"),
-            Act::LayerPhotos
-            | Act::LayerLit
-            | Act::LayerDiffuse
-            | Act::LayerSpecular
-            | Act::LayerRoughness
-            | Act::LayerNormal
-            | Act::LayerPhotoError
-            | Act::LayerCoverage
-            | Act::LayerDisagreement
-            | Act::LayerTimesSeen
-            | Act::LayerDiffuseDeviation
-            | Act::LayerSpecularDeviation
-            | Act::LayerRoughnessDeviation
-            | Act::LayerLobeSharing
-            | Act::LayerChoice => Some("Layers of the surface"),
-            _ => None,
-        }
-    }
-
     /// Its label.
     pub fn name(self) -> &'static str {
         self.info().name

@@ -5,12 +5,13 @@ use super::log::Message;
 use super::object::RelitObject;
 use super::object_form::{ObjectForm, is_photo};
 use super::tasks::TaskKind;
-use super::{Done, Model, Workspace};
+use super::{Done, Model};
 use crate::error::{Error, ErrorKind, Place};
 use crate::export::run_folder::new_run_folder;
 use crate::files::unrepeated;
 use crate::job::object::{self, ObjectJobOptions, ObjectOutcome, ObjectRequest, ReopenedObject};
 use crate::light::Environment;
+use crate::studio::workspace::Workspace;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

@@ -15,7 +15,7 @@ const CUT: f64 = 0.02;
 
 /// Lower and upper corner of what the photos were taken of; of the whole mesh without cameras.
 pub fn subject(mesh: &Mesh, scene: Option<&Scene>) -> (Vec3, Vec3) {
-    let whole = super::opening::bounds(mesh);
+    let whole = bounds(mesh);
     let Some(scene) = scene.filter(|scene| !scene.views.is_empty()) else { return whole };
     let every_camera = scene.views.len().div_ceil(MOST_CAMERAS);
     let every_triangle = mesh.triangles.len().div_ceil(MOST_TRIANGLES).max(1);
@@ -44,6 +44,11 @@ pub fn subject(mesh: &Mesh, scene: Option<&Scene>) -> (Vec3, Vec3) {
     let corner = |share: f64| Vec3::new(end(0, share), end(1, share), end(2, share));
     let (low, high) = (corner(CUT), corner(1.0 - CUT));
     if (high - low).length() > 1e-4 * (whole.1 - whole.0).length() { (low, high) } else { whole }
+}
+
+/// Lower and upper corner of a mesh; a box about the origin for one without vertices.
+pub(super) fn bounds(mesh: &Mesh) -> (Vec3, Vec3) {
+    mesh.bounds().unwrap_or((Vec3::NEG_ONE, Vec3::ONE))
 }
 
 fn is_in_the_middle(camera: &crate::scene::Camera, point_in_world: Vec3) -> bool {

@@ -1,7 +1,8 @@
 //! What was noticed, newest last: findings, errors, what was done.
 
-use super::offers::{self, Offer};
+use super::offers::{self, Change, Offer};
 use super::tasks::TaskKind;
+use super::words::{capitalised, without_flags};
 use crate::error::{Error, Finding, Place, Severity};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -63,7 +64,7 @@ impl From<&Finding> for Message {
     fn from(finding: &Finding) -> Self {
         Message {
             severity: finding.severity,
-            remedy: offers::without_flags(&finding.remedy),
+            remedy: without_flags(&finding.remedy),
             offers: offers::of_finding(finding),
             file: file_of(&finding.target),
             place: finding.target.clone(),
@@ -77,7 +78,7 @@ impl From<&Error> for Message {
         Message {
             severity: Severity::Fatal,
             is_error: true,
-            remedy: offers::without_flags(error.remedy_text()),
+            remedy: without_flags(error.remedy_text()),
             file: file_of(error.place()),
             place: error.place().clone(),
             ..Message::note(error.message())
@@ -91,12 +92,6 @@ fn file_of(place: &Place) -> Option<PathBuf> {
         Place::File(path) | Place::Line(path, _) | Place::Byte(path, _) => Some(path.clone()),
         _ => None,
     }
-}
-
-/// A text with its first letter large.
-pub fn capitalised(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// The newest messages.
@@ -168,8 +163,11 @@ impl Log {
         &self.messages
     }
 
-    pub(super) fn messages_mut(&mut self) -> &mut [Message] {
-        &mut self.messages
+    /// What was taken is no longer offered.
+    pub(super) fn no_longer_offers(&mut self, change: &Change) {
+        for message in &mut self.messages {
+            message.offers.retain(|own| own.change != *change);
+        }
     }
 
     /// The newest message.

@@ -6,7 +6,7 @@ use super::{Done, Model};
 use crate::image::RgbImage;
 use crate::job::materials::{MaterialShown, Materials, OpenedMaterial};
 use crate::neural::between::Part;
-use crate::studio::layout::Panel;
+use crate::studio::workspace::Panel;
 use std::path::PathBuf;
 use std::sync::Arc;
 

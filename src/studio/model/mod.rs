@@ -3,7 +3,7 @@
 //! [`Model`] joins the parts: [`project`] is what is open, [`fit`] the job and [`advance`](crate::job::advance) how far it is, [`phase`] the one
 //! state that labels follow, [`known`] what the solver is sure of, [`laid`] photos on the mesh and the cache that relights,
 //! [`edits`] what undo covers, [`lights`] the shelf, [`tasks`] work beside the window and [`done`] what it brings, [`log`]
-//! what was noticed, [`store`] what is remembered. [`opening`] and [`starting`] are how a folder becomes a project and a
+//! what was noticed, with what it [`offers`] and how [`offering`] does it, [`words`] how settings and flags are said, [`store`] what is remembered. [`opening`] and [`starting`] are how a folder becomes a project and a
 //! project a fit, [`viewing`] where the eye stands, [`dialogs`] what is asked in windows over the window, [`exporting`] a run on its way to
 //! other programs, [`importing`] a folder on its way to a scene, [`rescaling`] sets
 //! the scale by a known patch. In object mode
@@ -25,6 +25,7 @@ pub mod log;
 pub mod materials;
 pub mod object;
 pub mod object_form;
+pub mod offering;
 pub mod offers;
 pub mod opening;
 pub mod other_run;
@@ -36,6 +37,7 @@ pub mod starting;
 pub mod store;
 pub mod tasks;
 pub mod viewing;
+pub mod words;
 
 pub use dialogs::{Dialog, PickFor, SaveRequest, SaveWhat};
 pub use done::Done;
@@ -49,8 +51,8 @@ use crate::error::{Place, Result};
 use crate::job::kept::Kept;
 use crate::light::day::Day;
 use crate::studio::act::Act;
-use crate::studio::layout::Panel;
 use crate::studio::stage::eye::OrbitEye;
+use crate::studio::workspace::{Panel, Workspace};
 use edits::History;
 use glam::{Vec2, Vec3};
 use lights::{Shelf, ShelfLight};
@@ -59,16 +61,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use store::{Preferences, Store};
 use tasks::{TaskKind, Tasks, Wake};
-
-/// Which half of the studio the window shows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Workspace {
-    /// Maps and light from photos of a place.
-    #[default]
-    Scene,
-    /// Light and measured reflectance from photos of one object.
-    Object,
-}
 
 /// Switches of the stage that undo does not cover.
 #[derive(Clone, Copy, Debug, PartialEq)]

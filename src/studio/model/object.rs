@@ -1,7 +1,8 @@
 //! The estimation of object mode as the window knows it: the job, in which state it is, what it told.
 
 use super::lights::LightName;
-use super::log::{Log, Message, capitalised};
+use super::log::{Log, Message};
+use super::words::capitalised;
 use crate::image::{GreyImage, RgbImage};
 use crate::job::object::{MaterialLook, ObjectJob, ObjectLook, ObjectNews, ObjectOutcome, PhotoSeen, ReopenedObject};
 use crate::light::Environment;

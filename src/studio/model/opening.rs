@@ -5,7 +5,7 @@ use super::lights::{LightName, ShelfLight};
 use super::log::Message;
 use super::project::Atlas;
 use super::tasks::TaskKind;
-use super::{Cursor, Done, Edits, Model, Project, StageSwitches, Workspace};
+use super::{Cursor, Done, Edits, Model, Project, StageSwitches};
 use crate::error::{Finding, Severity};
 use crate::export::RunFolder;
 use crate::fit::{FitSettings, Suited};
@@ -21,6 +21,7 @@ use crate::render::Surface;
 use crate::scene::demo::DemoSettings;
 use crate::scene::{Mesh, ReadSettings, Scene};
 use crate::studio::stage::eye::OrbitEye;
+use crate::studio::workspace::Workspace;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -357,7 +358,7 @@ impl Model {
         }
         let warnings = open.iter().filter(|finding| finding.severity == Severity::Warning).count();
         if warnings > 0 {
-            self.activate = Some(crate::studio::layout::Panel::Messages);
+            self.activate = Some(crate::studio::workspace::Panel::Messages);
         }
     }
 
@@ -428,9 +429,4 @@ fn view_errors(report: &crate::insight::report::ReportData, scene: Option<&Scene
     let Some(scene) = scene else { return Vec::new() };
     let of = |name: &str| report.views.iter().find(|line| line.name == name).map(|line| line.raw.rmse_linear as f32);
     scene.views.iter().map(|view| of(&view.name)).collect()
-}
-
-/// Lower and upper corner of a mesh; a box about the origin for one without vertices.
-pub fn bounds(mesh: &Mesh) -> (glam::Vec3, glam::Vec3) {
-    mesh.bounds().unwrap_or((glam::Vec3::NEG_ONE, glam::Vec3::ONE))
 }

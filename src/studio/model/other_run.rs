@@ -64,6 +64,6 @@ impl Model {
     pub(super) fn other_was_read(&mut self, other: OtherRun) {
         self.log.note(format!("{} can be compared in the Photo panel", other.name));
         self.other_run = Some(Arc::new(other));
-        self.activate = Some(crate::studio::layout::Panel::Photo);
+        self.activate = Some(crate::studio::workspace::Panel::Photo);
     }
 }

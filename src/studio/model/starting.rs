@@ -10,7 +10,7 @@ use crate::job::open::{self, OpenStage};
 use crate::job::prepare::{Prepared, RunSettings, prepare_with};
 use crate::job::{self, Command, JobHandle, JobOptions, background};
 use crate::render::Surface;
-use crate::studio::layout::Panel;
+use crate::studio::workspace::Panel;
 use std::path::PathBuf;
 use std::sync::Arc;
 

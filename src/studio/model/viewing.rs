@@ -13,8 +13,8 @@ use crate::material::MaterialMaps;
 use crate::render::Parameters;
 use crate::render::picture::PictureSettings;
 use crate::scene::Camera;
-use crate::studio::layout::Panel;
 use crate::studio::stage::eye::{Eye, OrbitEye};
+use crate::studio::workspace::Panel;
 use std::sync::Arc;
 
 impl Model {
@@ -32,7 +32,7 @@ impl Model {
             && self.switches.looking_through
             && let (Some(camera), Some(project)) = (self.chosen_camera(), &self.project)
         {
-            self.eye = OrbitEye::from_camera(&camera, super::opening::bounds(&project.mesh));
+            self.eye = OrbitEye::from_camera(&camera, super::framing::bounds(&project.mesh));
         }
         self.switches.looking_through = on && self.chosen_camera().is_some();
         if !self.switches.looking_through {

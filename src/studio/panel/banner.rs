@@ -1,7 +1,7 @@
 //! An error across the window: a sentence and a remedy, until it is dismissed.
 
 use crate::studio::model::Model;
-use crate::studio::model::log::capitalised;
+use crate::studio::model::words::capitalised;
 use crate::studio::theme;
 use egui::{Align2, Area, Context, Frame, Id, Order, RichText, Stroke, vec2};
 

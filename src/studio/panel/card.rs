@@ -7,8 +7,9 @@ use crate::insight::report::ReportData;
 use crate::insight::report::number;
 use crate::studio::act::Act;
 use crate::studio::model::known::Told;
-use crate::studio::model::{FitStatus, Model, Workspace};
+use crate::studio::model::{FitStatus, Model};
 use crate::studio::theme;
+use crate::studio::workspace::Workspace;
 use egui::{Align2, Area, Context, Frame, Grid, Id, Order, RichText, Stroke, Ui, vec2};
 
 /// Draws the card, if a fit has just finished.

@@ -180,7 +180,7 @@ pub fn stage_words(stage: &str) -> String {
     let words = match kind {
         "wide light" => "Light (coarse)".to_owned(),
         "narrow light" => "Light (fine)".to_owned(),
-        other => crate::studio::model::log::capitalised(other),
+        other => crate::studio::model::words::capitalised(other),
     };
     words + &level
 }

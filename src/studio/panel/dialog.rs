@@ -1,5 +1,8 @@
 //! Windows over the window: the palette of acts, help, a path, how to save.
 
+mod export;
+mod import;
+
 use super::act_line;
 use crate::insight::report::number;
 use crate::studio::act::{Act, ActInfo, Group, LIST};
@@ -48,12 +51,12 @@ pub fn show(context: &Context, model: &mut Model) {
                 }
             }
             Dialog::Import(request) => {
-                if super::import::show(ui, model, request) {
+                if import::show(ui, model, request) {
                     next = Dialog::None;
                 }
             }
             Dialog::Export(request) => {
-                if super::export::show(ui, model, request) {
+                if export::show(ui, model, request) {
                     next = Dialog::None;
                 }
             }
@@ -78,7 +81,7 @@ fn room(context: &Context) -> Vec2 {
 }
 
 /// Makes a dialog so wide, or as wide as the window allows.
-pub(super) fn set_width(ui: &mut Ui, width: f32) {
+fn set_width(ui: &mut Ui, width: f32) {
     ui.set_width(width.min(room(ui.ctx()).x));
 }
 

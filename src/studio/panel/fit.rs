@@ -139,7 +139,8 @@ fn presets(ui: &mut Ui, model: &mut Model) {
                     false => "Changed from the default".to_owned(),
                 };
                 for (name, value, usual) in differences {
-                    text += &format!("\n{}: {value} instead of {usual}", form::words(&name));
+                    text +=
+                        &format!("\n{}: {value} instead of {usual}", crate::studio::model::words::of_setting(&name));
                 }
                 let settings =
                     FitSettings { exclude: own.exclude.clone(), seed: own.seed, method: own.method, ..settings };

@@ -2,6 +2,7 @@
 
 use crate::fit::describe::{SettingDescription, ValueKind};
 use crate::fit::{FitSettings, Method};
+use crate::studio::model::words;
 use crate::studio::theme;
 use egui::{Checkbox, ComboBox, DragValue, Grid, RichText, Ui};
 use std::collections::HashMap;
@@ -76,7 +77,7 @@ fn grid<'a>(
     Grid::new(id).num_columns(2).spacing([10.0, 4.0]).show(ui, |ui| {
         for setting in described {
             let changed = settings.get(&setting.name).ok() != default.get(&setting.name).ok();
-            let text = RichText::new(words(&setting.name));
+            let text = RichText::new(words::of_setting(&setting.name));
             let text = if changed { text.color(theme::palette(ui.visuals()).accent) } else { text };
             let label = ui.label(text).on_hover_text(help(setting, &default));
             if memory.sought.as_deref() == Some(setting.name.as_str()) {
@@ -99,21 +100,6 @@ fn is_read(name: &str, settings: &FitSettings) -> bool {
         Method::Adam => !name.starts_with("solver-"),
         Method::Solver | Method::Automatic => !Method::means_adam(&[name.to_owned()]),
     }
-}
-
-/// A setting's name in words: `map-size` becomes `Map size`.
-pub fn words(name: &str) -> String {
-    let named = [
-        ("solver-rounds", "Light iterations"),
-        ("solver-refine", "Whole-pixel refinement"),
-        ("bounces", "Max bounces"),
-        ("exposure", "Per-photo exposure compensation"),
-        ("background", "Background pixels"),
-    ];
-    if let Some((_, words)) = named.iter().find(|(own, _)| *own == name) {
-        return (*words).into();
-    }
-    crate::studio::model::log::capitalised(&name.replace('-', " "))
 }
 
 fn help(setting: &SettingDescription, default: &FitSettings) -> String {
@@ -144,9 +130,9 @@ fn field(
         }
         ValueKind::Choice => {
             let mut chosen = before.clone();
-            let response = ComboBox::from_id_salt(name).selected_text(words(&chosen)).show_ui(ui, |ui| {
+            let response = ComboBox::from_id_salt(name).selected_text(words::of_setting(&chosen)).show_ui(ui, |ui| {
                 for (value, meaning) in setting.possible_values.iter().zip(&setting.possible_value_help) {
-                    ui.selectable_value(&mut chosen, value.clone(), words(value)).on_hover_text(meaning);
+                    ui.selectable_value(&mut chosen, value.clone(), words::of_setting(value)).on_hover_text(meaning);
                 }
             });
             response.response.labelled_by(label);

@@ -1,6 +1,8 @@
 //! The fitted environment: as a map of all directions and as two balls, beside the truth where one is known.
 
-use super::{empty, light_known};
+mod known;
+
+use super::empty;
 use crate::image::RgbImage;
 use crate::image::display::DisplaySettings;
 use crate::light::Environment;
@@ -26,7 +28,7 @@ pub struct LightMemory {
     picture: Option<(Arc<Environment>, Arc<RgbImage>)>,
     truth: Option<(Arc<Environment>, Arc<RgbImage>)>,
     shows_known: bool,
-    known: light_known::KnownMemory,
+    known: known::KnownMemory,
 }
 
 /// Draws the panel.
@@ -42,7 +44,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut LightMemory) {
         );
     });
     if memory.shows_known {
-        return light_known::show(ui, model, &mut memory.known);
+        return known::show(ui, model, &mut memory.known);
     }
     let truth = model.shelf.find(&LightName::Truth).map(|light| Arc::clone(&light.environment));
     let display = model.edits.display;
@@ -98,7 +100,7 @@ pub fn draw(
 }
 
 /// Azimuth and elevation in degrees of a place on a map of all directions, with their names.
-pub(super) fn place_words(place: Place, size: (usize, usize)) -> [(&'static str, f32); 2] {
+fn place_words(place: Place, size: (usize, usize)) -> [(&'static str, f32); 2] {
     let direction = direction_of_angles(
         place.column / size.0 as f32 * std::f32::consts::TAU,
         place.row / size.1 as f32 * std::f32::consts::PI,

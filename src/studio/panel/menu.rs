@@ -2,12 +2,38 @@
 
 use super::act_line;
 use crate::studio::act::{Act, ActInfo, Group, LIST};
-use crate::studio::layout::Panel;
-use crate::studio::model::{Model, Workspace};
+use crate::studio::model::Model;
+use crate::studio::workspace::{Panel, Workspace};
 use egui::{Align, Button, Layout, Ui};
 
 /// Room that the switch of workspaces takes, in points.
 const ROOM: f32 = 220.0;
+
+impl Act {
+    /// The list within its menu in which it stands, if it does: menus are no longer than a small window.
+    pub fn list(self) -> Option<&'static str> {
+        match self {
+            own if Panel::of(own).is_some() => Some("Panels"),
+            own if own.navigation().is_some() => Some("Navigation as in"),
+            Act::LayerPhotos
+            | Act::LayerLit
+            | Act::LayerDiffuse
+            | Act::LayerSpecular
+            | Act::LayerRoughness
+            | Act::LayerNormal
+            | Act::LayerPhotoError
+            | Act::LayerCoverage
+            | Act::LayerDisagreement
+            | Act::LayerTimesSeen
+            | Act::LayerDiffuseDeviation
+            | Act::LayerSpecularDeviation
+            | Act::LayerRoughnessDeviation
+            | Act::LayerLobeSharing
+            | Act::LayerChoice => Some("Layers of the surface"),
+            _ => None,
+        }
+    }
+}
 
 /// Draws the menu bar.
 pub fn show(ui: &mut Ui, model: &mut Model) {

@@ -3,7 +3,8 @@
 use super::empty;
 use crate::error::{Place, Severity};
 use crate::studio::model::Model;
-use crate::studio::model::log::{Message, capitalised};
+use crate::studio::model::log::Message;
+use crate::studio::model::words::capitalised;
 use crate::studio::theme;
 use egui::{RichText, ScrollArea, Ui};
 

@@ -8,13 +8,10 @@ pub mod card;
 pub mod curve_copies;
 pub mod curves;
 pub mod dialog;
-pub mod export;
 pub mod fit;
 pub mod form;
 pub mod guide;
-pub mod import;
 pub mod light;
-pub mod light_known;
 pub mod maps;
 pub mod menu;
 pub mod messages;
@@ -32,9 +29,9 @@ pub mod welcome;
 
 use super::act::availability::availability;
 use super::act::{Act, ActInfo};
-use super::layout::Panel;
 use super::model::Model;
 use super::theme::PANEL_MARGIN;
+use super::workspace::Panel;
 use egui::{Align, Button, Layout, Margin, Response, RichText, Ui};
 
 /// What panels keep between frames.

@@ -51,7 +51,7 @@ fn plausible(ui: &mut Ui, model: &mut Model) {
     });
     for doubt in &own.doubts {
         let colours = crate::studio::theme::palette(ui.visuals());
-        ui.label(RichText::new(crate::studio::model::log::capitalised(doubt)).color(colours.warning));
+        ui.label(RichText::new(crate::studio::model::words::capitalised(doubt)).color(colours.warning));
     }
     match own.factor {
         _ if own.doubts.is_empty() => {

@@ -3,8 +3,9 @@
 use crate::insight::report::number;
 use crate::studio::act::Act;
 use crate::studio::model::tasks::TaskKind;
-use crate::studio::model::{Model, Phase, Workspace};
+use crate::studio::model::{Model, Phase};
 use crate::studio::theme;
+use crate::studio::workspace::Workspace;
 use egui::{Align, Layout, ProgressBar, RichText, Ui};
 
 /// Draws the line.

@@ -172,7 +172,7 @@ fn opening(ui: &mut Ui, model: &mut Model) {
     ui.add_space(14.0);
     Frame::group(ui.style()).inner_margin(12.0).show(ui, |ui| {
         ui.label(RichText::new("Opening").strong());
-        ui.label(crate::studio::model::log::capitalised(what));
+        ui.label(crate::studio::model::words::capitalised(what));
         ui.add(egui::ProgressBar::new(*share).desired_width(420.0f32.min(ui.available_width())).show_percentage());
     });
 }

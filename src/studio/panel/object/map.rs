@@ -5,11 +5,11 @@ use crate::image::display::DisplaySettings;
 use crate::measured::Category;
 use crate::neural::between::{MaterialMap, MaterialPlace};
 use crate::studio::act::Act;
-use crate::studio::layout::Panel;
 use crate::studio::model::Model;
 use crate::studio::model::materials::Choice;
 use crate::studio::panel::act_button_named;
 use crate::studio::theme;
+use crate::studio::workspace::Panel;
 use egui::{Align2, FontId, Pos2, Rect, RichText, Sense, Stroke, Ui, pos2, remap, vec2};
 
 /// Side of a sphere on the map in points.

@@ -3,13 +3,13 @@
 use crate::image::display::DisplaySettings;
 use crate::measured::Category;
 use crate::studio::act::Act;
-use crate::studio::layout::Panel;
 use crate::studio::model::Model;
 use crate::studio::model::materials::{Choice, OpenedTile};
 use crate::studio::model::tasks::TaskKind;
 use crate::studio::panel::{act_button_named, empty};
 use crate::studio::picture::ThumbnailCache;
 use crate::studio::theme;
+use crate::studio::workspace::Panel;
 use egui::{ComboBox, Rect, RichText, ScrollArea, Sense, Stroke, StrokeKind, TextEdit, Ui, pos2, vec2};
 use std::sync::Arc;
 

@@ -15,8 +15,8 @@ pub mod setup;
 pub mod starts;
 pub mod toolbar;
 
-use crate::studio::layout::Panel;
 use crate::studio::model::Model;
+use crate::studio::workspace::Panel;
 use egui::Ui;
 
 /// What the panels keep between frames.

@@ -3,10 +3,11 @@
 use crate::image::value_scale::{Palette, ValueScale};
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::job::object::PhotoSeen;
-use crate::studio::model::{Model, Workspace};
+use crate::studio::model::Model;
 use crate::studio::panel::empty;
 use crate::studio::picture::scale_bar::scale_bar;
 use crate::studio::picture::{self, Compare, Comparison, Overlay, PictureView, Source};
+use crate::studio::workspace::Workspace;
 use egui::{ComboBox, RichText, Ui, vec2};
 use std::sync::Arc;
 

@@ -3,8 +3,8 @@
 use super::frame;
 use crate::image::value_scale::{Palette, ValueScale, three_digits};
 use crate::studio::model::edits::PhotoLook;
-use crate::studio::model::log::capitalised;
 use crate::studio::model::tasks::TaskKind;
+use crate::studio::model::words::capitalised;
 use crate::studio::model::{FitStatus, Model};
 use crate::studio::picture::scale_bar::scale_bar;
 use crate::studio::stage::eye::Eye;

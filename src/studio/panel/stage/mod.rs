@@ -3,13 +3,13 @@
 mod decorate;
 mod frame;
 mod gauges;
+mod pictured;
 mod relit;
 mod traced;
 
 use crate::error::Finding;
 use crate::insight::cursor::place_in_view;
 use crate::studio::act::Act;
-use crate::studio::layout::Panel;
 use crate::studio::model::edits::PhotoLook;
 use crate::studio::model::laid::CachedOf;
 use crate::studio::model::lights::LightName;
@@ -17,6 +17,7 @@ use crate::studio::model::log::Message;
 use crate::studio::model::{Cursor, Model};
 use crate::studio::stage::eye::Eye;
 use crate::studio::stage::{self, Backdrop, Layer, Stage, StageFrame};
+use crate::studio::workspace::Panel;
 use decorate::{colour_bar, decorate};
 use egui::{CursorIcon, Pos2, Rect, Response, Ui};
 use frame::FrameCache;

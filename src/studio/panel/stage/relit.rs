@@ -1,8 +1,8 @@
 //! The view relit from cached transport: asked for whenever eye, maps or light differ, shown at once, and until the path
 //! tracer has something better.
 
-use super::traced::{key_of, size_of_picture};
-use crate::image::{Image, RgbImage};
+use super::pictured::{key_of, side_by_side, size_of_picture};
+use crate::image::RgbImage;
 use crate::job::relit::{Relighter, RelitLight, RelitRequest};
 use crate::studio::model::lights::LightName;
 use crate::studio::model::{FitStatus, Model};
@@ -224,12 +224,4 @@ fn view_key(camera: &crate::scene::Camera, names: &[LightName], cached: &Arc<sup
     numbers.iter().for_each(|number| number.to_bits().hash(&mut hasher));
     (camera.width, camera.height, names.len(), Arc::as_ptr(cached) as usize).hash(&mut hasher);
     hasher.finish()
-}
-
-/// The first picture left of a place in [0, 1] of the width, the second right of it.
-pub(super) fn side_by_side(first: &RgbImage, second: &RgbImage, wipe: f32) -> RgbImage {
-    let border = (wipe * first.width() as f32) as usize;
-    Image::from_fn(first.width(), first.height(), |row, column| {
-        if column < border { first[(row, column)] } else { second[(row, column)] }
-    })
 }

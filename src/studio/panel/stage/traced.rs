@@ -1,5 +1,6 @@
 //! The path-traced preview: asked for when nothing moves, shown as long as it is of what is on the stage.
 
+use super::pictured::{key_of, side_by_side, size_of_picture};
 use crate::image::RgbImage;
 use crate::job::pictures::parameters_with;
 use crate::job::preview::{Preview, PreviewRequest};
@@ -13,8 +14,6 @@ use std::sync::Arc;
 
 /// Paths a pixel at which the preview rests.
 const SAMPLES: usize = 128;
-/// Pixels of the preview, at most; more are drawn coarser.
-const MOST_PIXELS: f32 = 1.0e6;
 
 /// The preview of each side of the line between two lights.
 #[derive(Default)]
@@ -182,7 +181,7 @@ impl Traced {
         (Arc::as_ptr(&first) as usize, Arc::as_ptr(&second) as usize, wipe.to_bits()).hash(&mut hasher);
         let key = hasher.finish();
         if self.joined.as_ref().is_none_or(|(own, _)| *own != key) {
-            self.joined = Some((key, Arc::new(super::relit::side_by_side(&first, &second, wipe))));
+            self.joined = Some((key, Arc::new(side_by_side(&first, &second, wipe))));
         }
         let picture = self.joined.as_ref().map(|(_, picture)| Arc::clone(picture));
         told(picture, samples.min(other_samples))
@@ -196,38 +195,4 @@ impl Traced {
         }
         self.joined = None;
     }
-}
-
-/// Width and height in pixels of a picture of the stage; a large stage is drawn coarser.
-pub(super) fn size_of_picture(ui: &Ui, size: Vec2) -> (usize, usize) {
-    let full = size * ui.ctx().pixels_per_point();
-    let scale = (MOST_PIXELS / (full.x * full.y).max(1.0)).sqrt().min(1.0);
-    ((full.x * scale) as usize, (full.y * scale) as usize)
-}
-
-/// A number that changes whenever the picture would.
-pub(super) fn key_of(
-    model: &Model,
-    frame: &StageFrame,
-    name: &LightName,
-    maps: &Arc<MaterialMaps>,
-    size: (usize, usize),
-) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    let camera = frame.eye.as_camera(size.0, size.1);
-    let mut numbers: Vec<f32> = vec![model.edits.relight.turn_degrees, model.edits.relight.strength_stops];
-    numbers.extend(camera.rotation_camera_from_world.to_cols_array());
-    numbers.extend(camera.translation_camera_from_world.to_array());
-    numbers.extend(camera.focal_pixels.to_array());
-    numbers.extend(camera.centre_pixels.to_array());
-    for number in numbers {
-        number.to_bits().hash(&mut hasher);
-    }
-    let light = model.shelf.find(name).map_or(0, |light| Arc::as_ptr(&light.environment) as usize);
-    let fitted = model.shelf.find(&LightName::Fitted).map_or(0, |light| Arc::as_ptr(&light.environment) as usize);
-    (name, light, fitted, Arc::as_ptr(maps) as usize, size).hash(&mut hasher);
-    let relight = &model.edits.relight;
-    (relight.matched, relight.as_background, relight.is_background_blurred).hash(&mut hasher);
-    (relight.ground, model.edits.fit.bounces).hash(&mut hasher);
-    hasher.finish() | 1
 }

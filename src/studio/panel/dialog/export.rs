@@ -4,8 +4,9 @@ use crate::export::texture::TextureFormat;
 use crate::insight::report::number;
 use crate::job::export::Format;
 use crate::studio::model::exporting::ExportRequest;
-use crate::studio::model::log::capitalised;
+use crate::studio::model::words::capitalised;
 use crate::studio::model::{Dialog, Model, PickFor};
+use crate::studio::panel::heading;
 use crate::studio::theme;
 use egui::{Button, Checkbox, ComboBox, Grid, RichText, ScrollArea, TextEdit, Ui};
 
@@ -14,9 +15,9 @@ const SIZES: [usize; 5] = [512, 1024, 2048, 4096, 8192];
 
 /// Draws the dialog; true once it is done with.
 pub(super) fn show(ui: &mut Ui, model: &mut Model, request: &mut ExportRequest) -> bool {
-    super::dialog::set_width(ui, 560.0);
+    super::set_width(ui, 560.0);
     ui.heading("Export");
-    super::heading(ui, "Formats");
+    heading(ui, "Formats");
     for format in Format::ALL {
         let (name, what) = words(format);
         let mut is_on = request.has(format);
@@ -58,7 +59,7 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, request: &mut ExportRequest) 
             .on_hover_text("Each format gets a folder of its name; an earlier export there is replaced");
         ui.end_row();
     });
-    super::heading(ui, "What will be lost");
+    heading(ui, "What will be lost");
     let can_go = ahead(ui, request);
     ui.add_space(6.0);
     let mut done = false;

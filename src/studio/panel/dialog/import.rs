@@ -2,15 +2,16 @@
 
 use crate::job::capture_folder::{CaptureAxes, CaptureParts};
 use crate::studio::model::importing::ImportRequest;
-use crate::studio::model::log::capitalised;
+use crate::studio::model::words::capitalised;
 use crate::studio::model::{Dialog, Model, PickFor};
+use crate::studio::panel::heading;
 use crate::studio::theme;
 use egui::{Button, ComboBox, Grid, RichText, TextEdit, Ui};
 use std::path::Path;
 
 /// Draws the dialog; true once it is done with.
 pub(super) fn show(ui: &mut Ui, model: &mut Model, request: &mut ImportRequest) -> bool {
-    super::dialog::set_width(ui, 600.0);
+    super::set_width(ui, 600.0);
     ui.heading("Import a capture");
     ui.label("A folder with photos, a mesh and calibrated cameras. What is found is filled in; the rest is chosen.");
     ui.horizontal(|ui| {

@@ -1,12 +1,12 @@
 //! What each texel of the light is known by, as a picture with a legend: highlights, background, diffuse light and
 //! shadows, or belief alone. Only the solver tells it.
 
-use super::empty;
-use super::light::place_words;
+use super::place_words;
 use crate::image::RgbImage;
 use crate::image::display::{DisplaySettings, bytes_of_colour};
 use crate::job::solver_told::{mean_shares, scale_words};
 use crate::studio::model::Model;
+use crate::studio::panel::empty;
 use crate::studio::picture::{self, Overlay, PictureView, Source};
 use egui::{Color32, RichText, Sense, Ui, vec2};
 use glam::Vec3;
