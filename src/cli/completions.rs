@@ -1,9 +1,8 @@
 //! `patina completions`.
 
-use super::arguments::Arguments;
 use super::say;
 use crate::error::Result;
-use clap::{Args, CommandFactory};
+use clap::{Args, Command};
 use clap_complete::Shell;
 
 /// Options of `patina completions`.
@@ -14,10 +13,10 @@ pub struct CompletionsOptions {
     pub shell: Shell,
 }
 
-/// Prints the script that completes commands and options in a shell.
-pub fn completions(options: &CompletionsOptions) -> Result<()> {
+/// Prints the script that completes the commands and options of `patina` in a shell.
+pub fn completions(options: &CompletionsOptions, mut patina: Command) -> Result<()> {
     let mut script = Vec::new();
     // Into memory first: the generator panics where its output is refused.
-    clap_complete::generate(options.shell, &mut Arguments::command(), "patina", &mut script);
+    clap_complete::generate(options.shell, &mut patina, "patina", &mut script);
     say::text(&String::from_utf8_lossy(&script))
 }

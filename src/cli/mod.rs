@@ -36,7 +36,7 @@ pub mod turntable;
 
 use crate::error::{Error, ErrorKind, Result};
 use arguments::{Arguments, StudioOptions, Task};
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use std::ffi::OsString;
 use std::process::ExitCode;
 
@@ -73,7 +73,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Some(Task::Object(options)) => object::object(&options, json),
         Some(Task::Measured(task)) => measured::run(&task, json),
         Some(Task::Guide(options)) => guide::guide(&options, json),
-        Some(Task::Completions(options)) => completions::completions(&options),
+        Some(Task::Completions(options)) => completions::completions(&options, Arguments::command()),
         Some(Task::Studio(options)) => window(&options),
         None => window(&StudioOptions::default()),
     };

@@ -10,7 +10,7 @@
 //! out, [`figures`] are for who watches, `underway` within a step.
 //! [`by_name`] reads and sets each setting by its name, `describe` says with the command line's help what it means,
 //! [`presets`] are whole sets of them.
-//! [`solver`] is the other method, `solver_step` does its steps, [`known_maps`] are maps that it keeps, [`suited`] says which of both a scene
+//! [`solver`] is the other method, `solver_step` does its steps, [`known_maps`] are maps that it keeps and `keeping` how, [`suited`] says which of both a scene
 //! asks for, and what else it does.
 //! [`start`] chooses where to begin, [`gauge`] names the freedom that photographs leave, [`checkpoint`] saves it all.
 //!
@@ -34,6 +34,7 @@ pub mod fitter;
 pub mod gauge;
 mod gradient;
 mod held_out;
+mod keeping;
 pub mod known_maps;
 pub mod light_prior;
 mod limits;

@@ -1,7 +1,7 @@
 //! From a scene folder to something a fit can start on.
 
 use super::kept::{self, Kept};
-use super::known_maps;
+use super::run_with_maps::{check_surface, read};
 use super::stages::{OpenStage, Tell, told};
 use crate::atlas::{AtlasQuality, AtlasSettings, covered_texels};
 use crate::error::{Finding, Result};
@@ -90,7 +90,7 @@ pub fn prepare_with(
     tell: Tell,
 ) -> Result<Prepared> {
     if !settings.known_maps.as_os_str().is_empty() {
-        return known_maps::prepare(scene, findings, settings, timings, stop, tell);
+        return with_atlas_of_run(scene, findings, settings, timings, stop, tell);
     }
     // Charts keep their distance at the size the maps are stored in.
     let atlas_settings = AtlasSettings { resolution_texels: settings.fit.map_size, ..settings.atlas.clone() };
@@ -102,6 +102,29 @@ pub fn prepare_with(
     let mesh = atlas.mesh;
     let surface = told(OpenStage::Tracer, stop, tell, || timed(&mut timings, "tracer", || Surface::new(mesh)))?;
     Ok(Prepared { scene, surface: Arc::new(surface), quality: Some(atlas.quality), findings, timings })
+}
+
+/// Prepares a scene for a fit that keeps maps: with the run's own mesh and atlas.
+///
+/// # Errors
+/// What is missing or damaged in the run's folder; `InvalidScene` when the run is of another surface, `InvalidSetting` when the scene's own texture
+/// coordinates are asked for and differ.
+fn with_atlas_of_run(
+    scene: Arc<Scene>,
+    findings: Vec<Finding>,
+    settings: &RunSettings,
+    mut timings: Vec<StageTime>,
+    stop: &AtomicBool,
+    tell: Tell,
+) -> Result<Prepared> {
+    let run = &settings.known_maps;
+    let mesh = told(OpenStage::Maps, stop, tell, || {
+        let mesh = read(run)?.mesh;
+        check_surface(&scene.mesh, &mesh, &settings.atlas, run)?;
+        Ok(mesh)
+    })?;
+    let surface = told(OpenStage::Tracer, stop, tell, || timed(&mut timings, "tracer", || Surface::new(mesh)))?;
+    Ok(Prepared { scene, surface: Arc::new(surface), quality: None, findings, timings })
 }
 
 /// The surface with the atlas of a run.

@@ -140,7 +140,10 @@ pub fn estimate(
     watch(ObjectEvent::Stage("estimating"));
     let rounds = if known.reflectance.is_some() { settings.outer_loops.div_ceil(2) } else { settings.outer_loops };
     // A light that is given does not move: no prior asks anything of it, nor of its size.
-    let mut holder = if given.is_none() { LightHolder::new(settings, known, &light)? } else { LightHolder::default() };
+    let mut holder = match given {
+        None => LightHolder::new(settings, known.reflectance.is_some(), &light)?,
+        Some(_) => LightHolder::default(),
+    };
     // While the light is held the objective is one from round to round, and what was learned of it stays true.
     let mut memory = StepMemory::default();
     for round in 1..=rounds {

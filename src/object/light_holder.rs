@@ -1,6 +1,5 @@
 //! What holds the light through all rounds of an estimation: its prior, and the net of the deep one.
 
-use super::joint::Known;
 use super::light_step::{DeepTie, LightTerms, NewtonBudget, newton};
 use super::matrices::LightMatrix;
 use super::prior::deep::DeepPrior;
@@ -23,11 +22,12 @@ pub(super) struct LightHolder {
 }
 
 impl LightHolder {
-    /// The priors that the settings ask for, for an estimation that begins with `light`, beside what is known.
+    /// The priors that the settings ask for, for an estimation that begins with `light`; `is_alone` when nothing but
+    /// the light is unknown.
     ///
     /// # Errors
     /// A size for which there is no net.
-    pub fn new(settings: &ObjectSettings, known: &Known, light: &LogLight) -> Result<Self> {
+    pub fn new(settings: &ObjectSettings, is_alone: bool, light: &LogLight) -> Result<Self> {
         let (width, height) = (light.width, light.height);
         let mut holder = LightHolder::default();
         match settings.prior {
@@ -37,7 +37,6 @@ impl LightHolder {
                 let mut prior = DeepPrior::new(width, height, settings.net_channels, settings.seed)?;
                 prior.offset = light.mean().map(|mean| mean as f32);
                 let (net_steps, rate) = (settings.net_steps, settings.net_rate);
-                let is_alone = known.reflectance.is_some();
                 let weight = if is_alone { settings.net_weight } else { settings.net_weight_of_both };
                 let mut tie = DeepTie { prior, weight, net_steps, rate };
                 // Beside a reflectance that is wrong at first, what a light says in detail is wrong, too: a net that knows
