@@ -6,7 +6,7 @@
 //! parameters. The range of the gradients, which carries no derivative, is frozen.
 
 use super::bench::{Bench, PixelRecord};
-use super::gradients::central_difference;
+use super::difference::central_difference;
 use super::readers::{KINDS, Parameter, Readers};
 use super::report::Difference;
 use crate::fit::consistency::{Agreement, ViewGradient};

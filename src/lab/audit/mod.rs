@@ -2,7 +2,7 @@
 //!
 //! Paths are traced once ([`mod@bench`]) and kept; over kept paths the loss is a smooth function of the maps and the light,
 //! because nothing that depends on the sampling proposal is differentiated. A parameter is moved up and down by a small
-//! step in `f64`, only the pixels whose paths read it are added up again ([`readers`]), and the difference is compared
+//! step in `f64` (`difference`), only the pixels whose paths read it are added up again ([`readers`]), and the difference is compared
 //! with what the reverse pass of the fit says, run once in `f64` and once in `f32` ([`mod@gradients`]). The gradient of the
 //! views' disagreement, which takes second derivatives of the loss, is checked the same way ([`consistency`]).
 //! [`report`] puts it into groups: the four kinds of parameters, and the places where renderers tend to be wrong.
@@ -18,6 +18,7 @@
 pub mod bench;
 pub mod built_in;
 pub mod consistency;
+mod difference;
 pub mod gradients;
 pub mod readers;
 pub mod report;

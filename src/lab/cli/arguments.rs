@@ -213,31 +213,9 @@ pub struct BenchOptions {
 #[derive(Debug, Subcommand)]
 pub enum StudyTask {
     /// What consistency between views changes: errors of pictures, maps and light for its settings, over seeds.
-    Mvcl(MvclOptions),
+    Mvcl(crate::lab::cli::study::MvclOptions),
     /// What one photo tells of light and reflectance: figures 2 to 5 of the paper, and shadows.
     Ibrdf(crate::lab::cli::object_study::StudyIbrdfOptions),
     /// Make the tables and plots of all studies from the results that are kept.
     Tables(crate::lab::cli::study::TablesOptions),
-}
-
-/// Options of `patina-lab study mvcl`.
-#[derive(Debug, Args)]
-pub struct MvclOptions {
-    /// Exchange folders with their truth; without one, a vase made and photographed in code.
-    pub scenes: Vec<PathBuf>,
-    /// Number of seeds: 1, 2, 3 and so on.
-    #[arg(long, default_value_t = 5)]
-    pub seeds: usize,
-    /// Halved photographs, few steps and few paths.
-    #[arg(long)]
-    pub quick: bool,
-    /// Optimiser steps of the first step; 60 when quick, else the default of a fit.
-    #[arg(long)]
-    pub steps_diffuse: Option<usize>,
-    /// Optimiser steps of the second step; 90 when quick, else the default of a fit.
-    #[arg(long)]
-    pub steps_all: Option<usize>,
-    /// Which cases, for how long, and where they are kept.
-    #[command(flatten)]
-    pub sitting: super::study::SittingOptions,
 }

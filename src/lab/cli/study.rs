@@ -1,6 +1,5 @@
 //! `patina-lab study`: sittings of studies, and the tables of what they left.
 
-use super::arguments::MvclOptions;
 use crate::cli::interrupt::stop_on_interrupt;
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::lab::consistency::{self, StudyOptions};
@@ -34,6 +33,28 @@ fn seconds(text: &str) -> std::result::Result<f64, String> {
         Ok(seconds) if (0.0..1e9).contains(&seconds) => Ok(seconds),
         _ => Err("give a number of seconds, 0 or more".into()),
     }
+}
+
+/// Options of `patina-lab study mvcl`.
+#[derive(Debug, Args)]
+pub struct MvclOptions {
+    /// Exchange folders with their truth; without one, a vase made and photographed in code.
+    pub scenes: Vec<PathBuf>,
+    /// Number of seeds: 1, 2, 3 and so on.
+    #[arg(long, default_value_t = 5)]
+    pub seeds: usize,
+    /// Halved photographs, few steps and few paths.
+    #[arg(long)]
+    pub quick: bool,
+    /// Optimiser steps of the first step; 60 when quick, else the default of a fit.
+    #[arg(long)]
+    pub steps_diffuse: Option<usize>,
+    /// Optimiser steps of the second step; 90 when quick, else the default of a fit.
+    #[arg(long)]
+    pub steps_all: Option<usize>,
+    /// Which cases, for how long, and where they are kept.
+    #[command(flatten)]
+    pub sitting: SittingOptions,
 }
 
 /// Options of `patina-lab study tables`.

@@ -18,6 +18,7 @@ pub mod clock;
 pub mod contestant;
 pub mod entry;
 pub mod judge;
+pub mod options;
 pub mod pace;
 pub mod race;
 pub mod reach;
@@ -25,4 +26,5 @@ pub mod snapshot;
 pub mod tables;
 
 pub use contestant::Contestant;
-pub use race::{ContestOptions, run};
+pub use options::ContestOptions;
+pub use race::run;

@@ -2,7 +2,7 @@
 
 use super::contestant::Contestant;
 use super::judge::{COLUMNS, COMPARED, IMAGE, Judge};
-use super::race::ContestOptions;
+use super::options::ContestOptions;
 use super::reach::time_to_reach;
 use super::snapshot::Snapshot;
 use crate::error::Result;

@@ -3,6 +3,8 @@
 //! Pictures are written by the program's own writers or by the crates it reads with, the rest is text. A scene has three
 //! photos and a mesh beside it, so that what its reader lists can be read on.
 
+mod scenes;
+
 use crate::error::{Error, ErrorKind, Result};
 use crate::image::{Image, RgbImage, file, transfer};
 use crate::scene::read::numpy;
@@ -218,7 +220,7 @@ fn doc(bytes: &[u8]) -> Vec<u8> {
 
 /// Scenes of every format.
 fn scenes() -> Result<Vec<Kind>> {
-    use super::scenes as own;
+    use scenes as own;
     let mut blended = scene(
         "blended-mvs",
         "blended_images/",

@@ -9,7 +9,6 @@
 
 pub mod corpus;
 pub mod mutate;
-mod scenes;
 
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::image::file::{self, PhotoOptions};

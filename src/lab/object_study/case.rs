@@ -1,7 +1,7 @@
 //! One case: estimate, then measure against the truth.
 
+use super::asked::{Case, Figure};
 use super::inputs::{Inputs, Photographed};
-use super::plan::{Case, Figure};
 use crate::error::Result;
 use crate::image::RgbImage;
 use crate::insight::truth::environment_errors;

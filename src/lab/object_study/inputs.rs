@@ -1,7 +1,7 @@
 //! The photos of a study: measured reflectance itself under a light finer than any that is fitted.
 
 use super::StudyOptions;
-use super::plan::{Case, Figure, Spoilt};
+use super::asked::{Case, Figure, Spoilt};
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::image::RgbImage;
 use crate::light::Environment;

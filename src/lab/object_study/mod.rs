@@ -2,11 +2,12 @@
 //!
 //! [`representation`] is figure 2: models against tables, which `contender` fits. For the others [`inputs`] photographs:
 //! the measured reflectance itself, asked at every part of a light that is finer than any that is fitted. [`case`]
-//! estimates and measures one case. [`mod@plan`] says which cases there are, [`crate::lab::study`] takes them and keeps
+//! estimates and measures one case. [`asked`] is what a case asks, [`mod@plan`] says which cases there are, [`crate::lab::study`] takes them and keeps
 //! what came of them, [`tables`] makes the tables of it.
 //!
 //! What this folder refuses to do: fit anything to the truth, or leave out a case that failed.
 
+pub mod asked;
 pub mod case;
 mod contender;
 pub mod inputs;
@@ -21,8 +22,9 @@ use crate::lab::study::line::CaseInputs;
 use crate::lab::study::{Results, Sitting, StudyCase, Tally};
 use crate::neural::Trained;
 use crate::object::page::{Shown, enlarged, stops_of};
+use asked::Case;
 use inputs::{Inputs, Photographed};
-use plan::{Case, plan};
+use plan::plan;
 use representation::Representation;
 use std::path::{Path, PathBuf};
 

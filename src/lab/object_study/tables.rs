@@ -1,7 +1,7 @@
 //! The tables of a study of object mode, out of the lines of its results file.
 
+use super::asked::Figure;
 use super::case::MEASURES;
-use super::plan::Figure;
 use super::{VERSION, representation};
 use crate::error::Result;
 use crate::lab::study::{CaseLine, Results};

@@ -16,6 +16,7 @@ pub mod results;
 pub mod sitting;
 
 pub use line::CaseLine;
+pub use order::StudyCase;
 pub use pattern::CasePattern;
 pub use results::Results;
-pub use sitting::{Sitting, StudyCase, Tally};
+pub use sitting::{Sitting, Tally};

@@ -1,7 +1,32 @@
-//! The order in which cases are taken: whenever a study ends, what it has is a fair sample of the whole.
+//! Cases, and the order in which they are taken: whenever a study ends, what it has is a fair sample of the whole.
 
-use super::sitting::StudyCase;
+use super::line::{CaseInputs, part_of};
 use std::collections::HashMap;
+
+/// A case that can be done.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StudyCase {
+    /// Its name: `part/...`, unlike any other of the study.
+    pub key: String,
+    /// Cases of one block are rivals on the same input, and are done one after the other.
+    pub block: String,
+    /// Seed of everything random in it.
+    pub seed: u64,
+    /// What it is made from: a line of other inputs is of another case.
+    pub inputs: CaseInputs,
+}
+
+impl StudyCase {
+    /// A case without inputs.
+    pub fn new(key: String, block: String, seed: u64) -> Self {
+        StudyCase { key, block, seed, inputs: CaseInputs::new() }
+    }
+
+    /// The part of the study it belongs to.
+    pub fn part(&self) -> &str {
+        part_of(&self.key)
+    }
+}
 
 /// Places of the cases in the order in which they are taken.
 ///

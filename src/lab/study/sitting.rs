@@ -1,38 +1,13 @@
 //! One sitting of a study: takes cases that are not done yet until the list, the budget or the patience ends.
 
-use super::line::{CaseInputs, CaseLine, part_of};
-use super::order::interleaved;
+use super::line::{CaseInputs, CaseLine};
+use super::order::{StudyCase, interleaved};
 use super::pattern::CasePattern;
 use super::results::Results;
 use crate::error::{Error, ErrorKind, Result};
 use std::collections::{BTreeMap, HashSet};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-
-/// A case that can be done.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StudyCase {
-    /// Its name: `part/...`, unlike any other of the study.
-    pub key: String,
-    /// Cases of one block are rivals on the same input, and are done one after the other.
-    pub block: String,
-    /// Seed of everything random in it.
-    pub seed: u64,
-    /// What it is made from: a line of other inputs is of another case.
-    pub inputs: CaseInputs,
-}
-
-impl StudyCase {
-    /// A case without inputs.
-    pub fn new(key: String, block: String, seed: u64) -> Self {
-        StudyCase { key, block, seed, inputs: CaseInputs::new() }
-    }
-
-    /// The part of the study it belongs to.
-    pub fn part(&self) -> &str {
-        part_of(&self.key)
-    }
-}
 
 /// How a sitting goes about it.
 pub struct Sitting<'a> {

@@ -1,6 +1,6 @@
 //! Cameras of three photos of 12 x 9 pixels in the words of each program.
 
-use super::corpus::{PHOTOS, Target};
+use super::{PHOTOS, Target};
 use crate::scene::read::numpy;
 
 /// BlendedMVS.
