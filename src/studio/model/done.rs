@@ -1,7 +1,7 @@
 //! What tasks beside the window bring back to it.
 
 use super::lights::ShelfLight;
-use super::{LightName, PickFor, laid, materials, object, opening, other_run, rescaling, starting};
+use super::{LightName, PickFor, laid, materials, object, opened, other_run, rescaling, starting};
 use crate::error::Finding;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -9,17 +9,17 @@ use std::sync::Arc;
 /// What a task brings.
 pub enum Done {
     /// A scene was read.
-    SceneRead(Box<opening::SceneRead>),
+    SceneRead(Box<opened::SceneRead>),
     /// It was checked.
-    SceneChecked(Box<opening::SceneChecked>),
+    SceneChecked(Box<opened::SceneChecked>),
     /// The atlas and the tracer of a scene are made.
-    Prepared(Box<opening::PreparedScene>),
+    Prepared(Box<opened::PreparedScene>),
     /// The photos of a scene were laid on its mesh.
     PhotosLaid(Box<laid::LaidPhotos>),
     /// The transport of a surface was cached.
     TransportCached(Box<laid::CachedOf>),
     /// A run folder was read.
-    RunOpened(Box<opening::RunRead>),
+    RunOpened(Box<opened::RunRead>),
     /// A run was read, to compare with the one that is open.
     OtherRun(Box<other_run::OtherRun>),
     /// A job was started.

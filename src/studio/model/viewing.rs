@@ -2,7 +2,7 @@
 
 use super::lights::LightName;
 use super::tasks::TaskKind;
-use super::{Done, Model};
+use super::{Cursor, Done, Model};
 use crate::error::Place;
 use crate::insight::surface_layers::{LayerSettings, SurfaceLayers, surface_layers};
 use crate::job::entanglement::{EntanglementSettings, entanglement};
@@ -18,6 +18,14 @@ use crate::studio::workspace::Panel;
 use std::sync::Arc;
 
 impl Model {
+    /// Forgets the place under the cursor unless it is pinned.
+    pub fn move_cursor(&mut self, cursor: Option<Cursor>) {
+        let pinned = self.cursor.is_some_and(|own| own.pinned);
+        if !pinned {
+            self.cursor = cursor;
+        }
+    }
+
     /// Moves the eye so that what the photos show fills the viewport.
     pub fn frame_scene(&mut self) {
         if let Some(project) = &self.project {

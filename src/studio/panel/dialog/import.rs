@@ -4,7 +4,6 @@ use crate::job::capture_folder::{CaptureAxes, CaptureParts};
 use crate::studio::model::importing::ImportRequest;
 use crate::studio::model::words::capitalised;
 use crate::studio::model::{Dialog, Model, PickFor};
-use crate::studio::panel::heading;
 use crate::studio::theme;
 use egui::{Button, ComboBox, Grid, RichText, TextEdit, Ui};
 use std::path::Path;

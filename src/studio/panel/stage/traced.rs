@@ -4,8 +4,6 @@ use super::pictured::{key_of, side_by_side, size_of_picture};
 use crate::image::RgbImage;
 use crate::job::pictures::parameters_with;
 use crate::job::preview::{Preview, PreviewRequest};
-use crate::material::MaterialMaps;
-use crate::studio::model::lights::LightName;
 use crate::studio::model::{FitStatus, Model};
 use crate::studio::stage::{Layer, StageFrame};
 use egui::{Ui, Vec2};
