@@ -3,7 +3,8 @@
 //! Its material is the fitted model, a Diffuse BSDF plus a Principled BSDF that is all lobe; maps of one Principled BSDF alone
 //! lie beside, since Cycles lays that one's lobe over its diffuse part and darkens it towards grazing angles.
 
-use super::asset::{Asset, GRAZING_OF_VIEWS, LOW_IOR, MetalSplit};
+use super::asset::Asset;
+use super::asset::reflectance::{GRAZING_OF_VIEWS, LOW_IOR, MetalSplit};
 use super::environment_file::with_x_in_the_centre;
 use crate::error::{Error, ErrorKind, Result};
 use crate::files::write_bytes;

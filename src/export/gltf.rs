@@ -4,7 +4,8 @@
 //! as ratified. F0 is `((ior - 1) / (ior + 1))^2` times factor and texture of the specular colour, so that no reader needs an
 //! index of zero.
 
-use super::asset::{Asset, GRAZING_OF_HALF_VECTORS, LOW_IOR, MetalSplit};
+use super::asset::Asset;
+use super::asset::reflectance::{GRAZING_OF_HALF_VECTORS, LOW_IOR, MetalSplit};
 use super::texture::{Curve, Texture};
 use crate::error::{Error, ErrorKind, Result};
 use crate::image::Image;
@@ -211,7 +212,7 @@ mod tests {
     fn largest_f0(material: &Value) -> f32 {
         let ior = material["extensions"]["KHR_materials_ior"]["ior"].as_f64().unwrap();
         let factor = material["extensions"]["KHR_materials_specular"]["specularColorFactor"][0].as_f64().unwrap();
-        (super::super::asset::f0_of(ior) * factor) as f32
+        (super::super::asset::reflectance::f0_of(ior) * factor) as f32
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! MaterialX: an OpenPBR surface over OpenEXR maps, all linear.
 
-use super::asset::{Asset, Dielectric, GRAZING_OF_VIEWS, MetalSplit};
+use super::asset::Asset;
+use super::asset::reflectance::{Dielectric, GRAZING_OF_VIEWS, MetalSplit};
 use super::environment_file::smooth;
 use crate::error::Result;
 use crate::files::write_bytes;

@@ -1,6 +1,7 @@
 //! `convention.txt` of an export: what each number means, and what was lost.
 
-use super::asset::{Asset, MetalSplit};
+use super::asset::Asset;
+use super::asset::reflectance::MetalSplit;
 use super::whole_folder::FIRST_LINE;
 use crate::material::LobeModel;
 use crate::material::lobe::nearest::ggx_of_blinn_phong;

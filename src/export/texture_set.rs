@@ -1,6 +1,7 @@
 //! Maps alone, named as artists name them, in both workflows: base colour with metalness, and diffuse with specular.
 
-use super::asset::{Asset, DielectricRange, LARGEST_SPECULAR, MetalSplit};
+use super::asset::Asset;
+use super::asset::reflectance::{DielectricRange, LARGEST_SPECULAR, MetalSplit};
 use super::environment_file::write_both;
 use super::texture::{Curve, Texture, TextureFormat};
 use crate::error::Result;

@@ -7,7 +7,8 @@
 //! as its text asks, show the index alone: they do better with `specular`.
 //! Texture coordinates point up, as in Patina; the dome light's left border looks along -z, as in Patina.
 
-use super::asset::{Asset, GRAZING_OF_HALF_VECTORS, LOW_IOR, MetalSplit};
+use super::asset::Asset;
+use super::asset::reflectance::{GRAZING_OF_HALF_VECTORS, LOW_IOR, MetalSplit};
 use super::environment_file::smooth;
 use super::texture::{Curve, Texture};
 use crate::error::{Error, ErrorKind, Result};

@@ -2,8 +2,9 @@
 
 use super::super::pictures::{light_of, matched};
 use super::super::shown::exposure_of;
+use super::format::WEB_SHOWS;
 use super::sheets::{WEB_FILES, write_sheet};
-use super::{ExportEvent, Format, WEB_SHOWS};
+use super::{ExportEvent, Format};
 use crate::error::{Finding, Result, Severity};
 use crate::export::asset::Asset;
 use crate::export::sheet::Losses;

@@ -1,20 +1,26 @@
 //! Photos and masks: decoded in parallel, kept compact, each pixel told what it is evidence for.
 
+mod shrunk;
+mod values;
+
+pub use shrunk::shrink_linear;
+
 use super::orientation::{Turn, Turns};
 use super::source::SourceView;
 use super::zip::Archive;
 use super::{masks, orientation, repeated};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::image::Image;
 use crate::image::file::{self, Encoding, MaskFacts, MaskValues, MaskWay, PhotoFile, PhotoOptions, PhotoPixels};
-use crate::image::{Image, RgbImage};
 use crate::math::parallel;
 use crate::scene::lens::{Lens, Undistorted, undistort};
 use crate::scene::settings::{ColourEncoding, MaskUse, ReadSettings};
 use crate::scene::{Photo, PixelState};
 use glam::Vec3;
-use half::f16;
+use shrunk::shrink;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use values::{checked_floats, kept, mark};
 
 /// 8-bit values from here on are clipped: cameras and JPEG move a saturated 255 by one.
 pub const CLIPPED_BYTE: u8 = 254;
@@ -290,144 +296,6 @@ fn refuse_more_than_half_a_sphere(view: &SourceView, lens: &Lens, size: (usize, 
     ))
 }
 
-/// Sets the state of the pixels that a map marks; ignored pixels stay so.
-fn mark(states: &mut Image<PixelState>, map: Option<&Image<bool>>, state: PixelState, marks: impl Fn(bool) -> bool) {
-    let Some(map) = map else { return };
-    for (own, value) in states.pixels_mut().iter_mut().zip(map.pixels()) {
-        if marks(*value) && *own != PixelState::Ignored {
-            *own = state;
-        }
-    }
-}
-
-/// Radiance is finite and not negative: what is not is ignored or taken as 0.
-fn checked_floats(
-    mut image: RgbImage,
-    is_float: bool,
-    view: &SourceView,
-    findings: &mut Vec<Finding>,
-    shared: &mut Vec<Finding>,
-) -> (RgbImage, Image<PixelState>) {
-    let mut states = Image::filled(image.width(), image.height(), PixelState::Surface);
-    let width = image.width();
-    let (mut not_finite, mut negative) = (0usize, 0usize);
-    let mut first_bad = 0;
-    for (index, (pixel, state)) in image.pixels_mut().iter_mut().zip(states.pixels_mut()).enumerate() {
-        if !pixel.is_finite() {
-            if not_finite == 0 {
-                first_bad = index;
-            }
-            not_finite += 1;
-            *pixel = Vec3::ZERO;
-            *state = PixelState::Ignored;
-        } else if pixel.min_element() < 0.0 {
-            negative += 1;
-            *pixel = pixel.max(Vec3::ZERO);
-        }
-    }
-    if not_finite > 0 {
-        findings.push(
-            Finding::new(
-                Severity::Warning,
-                "photo-not-finite",
-                format!("{not_finite} pixels are not finite, this is the first: they are ignored"),
-            )
-            .at(Place::Pixel {
-                view: view.name.clone(),
-                row: first_bad / width.max(1),
-                column: first_bad % width.max(1),
-            })
-            .remedy("render or export the photo again if they matter")
-            .extent(not_finite as f64),
-        );
-    }
-    if negative > 0 && is_float {
-        findings.push(
-            Finding::new(
-                Severity::Note,
-                "photo-negative",
-                format!("{negative} pixels are negative: they are set to 0"),
-            )
-            .at(Place::View(view.name.clone()))
-            .extent(negative as f64),
-        );
-    } else if negative > 0 {
-        shared.push(Finding::new(
-            Severity::Note,
-            "colour-out-of-gamut",
-            "some colours are outside Rec. 709: their negative channels are set to 0",
-        ));
-    }
-    (image, states)
-}
-
-/// The smallest form that keeps what the file says. `of_bytes` photos are eight-bit photographs in another colour space.
-fn kept(image: RgbImage, mut states: Image<PixelState>, of_bytes: bool, as_half: bool) -> (Photo, Image<PixelState>) {
-    let survives_half = |value: f32| f16::from_f32(value).to_f32() == value;
-    if as_half || image.pixels().iter().all(|pixel| pixel.to_array().into_iter().all(survives_half)) {
-        for (pixel, state) in image.pixels().iter().zip(states.pixels_mut()) {
-            if pixel.max_element() > f16::MAX.to_f32() && *state == PixelState::Surface {
-                *state = PixelState::SurfaceClipped;
-            }
-        }
-        let half = image.map(|pixel| to_half(*pixel));
-        return (if of_bytes { Photo::MeanOfSrgb8(half) } else { Photo::Linear16(half) }, states);
-    }
-    (Photo::Linear32(image), states)
-}
-
-fn to_half(pixel: Vec3) -> [f16; 3] {
-    pixel.min(Vec3::splat(f16::MAX.to_f32())).to_array().map(f16::from_f32)
-}
-
-/// Averages squares of `factor` pixels in linear radiance; a rest of fewer pixels at the right and lower edge is cut.
-fn shrink(photo: &Photo, states: &Image<PixelState>, factor: usize) -> (Photo, Image<PixelState>) {
-    let (width, height) = ((photo.width() / factor).max(1), (photo.height() / factor).max(1));
-    let cells = |row: usize, column: usize| {
-        let rows = row * factor..((row + 1) * factor).min(photo.height());
-        rows.flat_map(move |r| (column * factor..((column + 1) * factor).min(photo.width())).map(move |c| (r, c)))
-    };
-    let small = Image::from_fn(width, height, |row, column| {
-        let (sum, count) = cells(row, column)
-            .fold((Vec3::ZERO, 0.0), |(sum, count), (r, c)| (sum + photo.radiance(r, c), count + 1.0));
-        sum / count
-    });
-    let small_states = Image::from_fn(width, height, |row, column| {
-        let (mut surface, mut clipped, mut ignored, mut count) = (0, false, false, 0);
-        for place in cells(row, column) {
-            let state = states[place];
-            count += 1;
-            surface += usize::from(state.is_surface());
-            clipped |= state.is_clipped();
-            ignored |= state == PixelState::Ignored;
-        }
-        match (ignored || (surface != 0 && surface != count), surface > 0, clipped) {
-            // A square across the silhouette is a mixture: evidence for neither side.
-            (true, _, _) => PixelState::Ignored,
-            (false, true, false) => PixelState::Surface,
-            (false, true, true) => PixelState::SurfaceClipped,
-            (false, false, false) => PixelState::Background,
-            (false, false, true) => PixelState::BackgroundClipped,
-        }
-    });
-    let halves = || small.map(|pixel| to_half(*pixel));
-    let photo = match photo {
-        Photo::Linear32(_) => Photo::Linear32(small),
-        Photo::Linear16(_) => Photo::Linear16(halves()),
-        Photo::Srgb8(_) | Photo::MeanOfSrgb8(_) => Photo::MeanOfSrgb8(halves()),
-    };
-    (photo, small_states)
-}
-
-/// A linear picture averaged over squares of `factor` pixels.
-pub fn shrink_linear(image: RgbImage, factor: usize) -> RgbImage {
-    if factor == 1 {
-        return image;
-    }
-    let states = Image::filled(image.width(), image.height(), PixelState::Surface);
-    shrink(&Photo::Linear32(image), &states, factor).0.to_linear()
-}
-
 /// Share of pixels of 8-bit photos by byte, over the channels: a histogram of 256 bins.
 pub fn histogram(bytes: &Image<[u8; 3]>, states: &Image<PixelState>) -> [u32; 256] {
     let mut counts = [0; 256];
@@ -472,22 +340,5 @@ mod tests {
         assert_eq!(told(&[2, 5]), ["note [stray]: 5 bytes (view 01, the most of all 2 photos)"]);
         assert_eq!(told(&[5, 5]), ["note [stray]: 5 bytes (all 2 photos)"]);
         assert_eq!(told(&[0, 5]), ["note [stray] view 01: 5 bytes"]);
-    }
-
-    #[test]
-    fn shrinking_averages_radiance_and_sets_mixtures_aside() {
-        let bytes = Image::from_fn(5, 4, |row, column| [if row < 2 && column == 0 { 255 } else { 0 }, 0, 0]);
-        let mut states = Image::filled(5, 4, PixelState::Surface);
-        states[(0, 0)] = PixelState::SurfaceClipped;
-        states[(0, 2)] = PixelState::Background;
-        let (photo, small) = shrink(&Photo::Srgb8(bytes.clone()), &states, 2);
-        assert_eq!((photo.width(), photo.height()), (2, 2));
-        let expected = crate::scene::photo::linear_from_srgb8([255, 0, 0]).x / 2.0;
-        assert!((photo.radiance(0, 0).x - expected).abs() < 1e-3);
-        assert!(!photo.is_linear(), "it is a photograph of eight bits still, and is fitted as one");
-        assert_eq!(
-            small.pixels(),
-            [PixelState::SurfaceClipped, PixelState::Ignored, PixelState::Surface, PixelState::Surface]
-        );
     }
 }
