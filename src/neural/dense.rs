@@ -8,7 +8,7 @@
 
 pub use super::activation::Activation;
 use super::modulation::{Modulation, scale_and_shift};
-use super::product::{Rows, multiply};
+use super::product::{Rows, add_rows, multiply, sums_by_group};
 use crate::math::random::SequentialRandom;
 
 /// One layer: how many outputs, and which earlier layer's output it sees beside its predecessor's.
@@ -286,22 +286,6 @@ impl DenseNet {
             multiply(first, of_features.transpose(), d_features, false);
         }
         tape.adjoints = adjoints;
-    }
-}
-
-/// Sums of the rows of each group.
-fn sums_by_group(rows: &[f32], groups: usize, rows_per_group: usize, width: usize) -> Vec<f32> {
-    let mut sums = vec![0.0f32; groups * width];
-    for (block, sum) in rows.chunks(rows_per_group.max(1) * width).zip(sums.chunks_exact_mut(width)) {
-        add_rows(block, sum);
-    }
-    sums
-}
-
-/// Adds every row to `sum`.
-pub(super) fn add_rows(rows: &[f32], sum: &mut [f32]) {
-    for row in rows.chunks_exact(sum.len()) {
-        sum.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
     }
 }
 

@@ -80,6 +80,22 @@ pub fn multiply(left: Rows, right: Rows, into: &mut [f32], add: bool) {
     }
 }
 
+/// Sums of the rows of each group.
+pub(super) fn sums_by_group(rows: &[f32], groups: usize, rows_per_group: usize, width: usize) -> Vec<f32> {
+    let mut sums = vec![0.0f32; groups * width];
+    for (block, sum) in rows.chunks(rows_per_group.max(1) * width).zip(sums.chunks_exact_mut(width)) {
+        add_rows(block, sum);
+    }
+    sums
+}
+
+/// Adds every row to `sum`.
+pub(super) fn add_rows(rows: &[f32], sum: &mut [f32]) {
+    for row in rows.chunks_exact(sum.len()) {
+        sum.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -12,8 +12,9 @@
 //! 5. [`cached`]: the same light without rays, for scenes whose geometry is known and stays. [`relight`]: a view of it
 //!    under any light, at once.
 //! 6. [`picture`]: pictures and layers. [`first_hits`]: primary rays traced once.
-//!    [`progressive`]: a picture that refines. [`ground`]: the shadow on a ground that is not there. [`regions`] and [`measured_regions`]: pictures in which parts of the
-//!    surface have measured reflectance in place of the maps'; nothing is fitted there, so no record is kept.
+//!    [`progressive`]: a picture that refines, by [`passes`]. [`ground`]: the shadow on a ground that is not there.
+//!    [`regions`] and [`measured_regions`]: pictures in which parts of the surface have measured reflectance in place of
+//!    the maps'; nothing is fitted there, so no record is kept.
 //!
 //! The record replaces a second tracing pass: it lives for one pixel, so memory grows neither with the picture nor
 //! with the number of steps, and the reverse pass casts no ray. Silhouettes do not move (geometry and cameras are
@@ -26,6 +27,7 @@ pub mod first_hits;
 pub mod ground;
 pub mod measured_regions;
 pub mod packet;
+pub mod passes;
 pub mod path;
 pub mod picture;
 pub mod picture_settings;

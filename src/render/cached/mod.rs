@@ -8,7 +8,7 @@
 //! 4. [`bounce`]: light between surfaces as a sparse matrix with its transpose; [`surroundings`] and
 //!    [`seen_light`]: the same as lobes see it.
 //! 5. [`footprint`]: what a camera sees, as shading points with lists of texels.
-//! 6. [`traced`] is what rays find out; [`transport`]: all of it together, and the radiance it gives. Sums run on several numbers at a time
+//! 6. [`traced`] is what rays find out; [`transport`]: all of it together, `shade`: the radiance it gives. Sums run on several numbers at a time
 //!    (`math::vector`).
 //!
 //! For fixed roughness the result is linear in the light; for fixed light and roughness it is linear in diffuse and
@@ -34,6 +34,7 @@ pub mod lobe_sum;
 pub mod points;
 pub mod seen_light;
 pub mod settings;
+mod shade;
 pub mod surroundings;
 pub mod traced;
 pub mod transport;
