@@ -7,7 +7,7 @@
 //!
 //! [`open`] opens scenes and runs, begins fits and takes them up; [`prepare`] turns a scene into a surface with an atlas,
 //! [`kept`] keeps on disk what opening takes long to make,
-//! `run_with_maps` reads the run whose maps and atlas are kept, [`known_maps`] settles what they decide,
+//! [`run_with_maps`] reads the run whose maps and atlas are kept, [`known_maps`] settles what they decide,
 //! [`worker`] is the thread and [`handle`] what a watcher holds of it, `save` keeps the run folder whole while it runs,
 //! [`budget`] limits how long that is,
 //! [`outcome`] renders, scores and writes the run folder, [`demo`] makes the built-in scene,
@@ -51,7 +51,7 @@ pub mod preview;
 pub mod regions;
 pub mod relight;
 pub mod relit;
-mod run_with_maps;
+pub mod run_with_maps;
 mod save;
 pub mod shown;
 pub mod slot;

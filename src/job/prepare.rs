@@ -107,8 +107,8 @@ pub fn prepare_with(
 /// Prepares a scene for a fit that keeps maps: with the run's own mesh and atlas.
 ///
 /// # Errors
-/// What is missing or damaged in the run's folder; `InvalidScene` when the run is of another surface, `InvalidSetting` when the scene's own texture
-/// coordinates are asked for and differ.
+/// What is missing or damaged in the run's folder; `InvalidScene` when the run is of another surface, `InvalidSetting` when
+/// the scene's own texture coordinates are asked for and differ.
 fn with_atlas_of_run(
     scene: Arc<Scene>,
     findings: Vec<Finding>,

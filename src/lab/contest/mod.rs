@@ -1,7 +1,7 @@
 //! The proof of speed against error: several methods fit the same exchange scene, each in a process of its own, and the
 //! maps and lights they have at rising seconds are judged alike. `patina bench fit`.
 //!
-//! [`Contestant`] names the methods. [`entry`] is what a process of this program does; `tests/mitsuba/fit_exchange.py`
+//! [`options`] says what is compared, [`Contestant`] names the methods. [`entry`] is what a process of this program does; `tests/mitsuba/fit_exchange.py`
 //! is its counterpart. Both write [`snapshot`]s, timed by a [`clock`] that starts with the process; [`pace`] makes Adam
 //! end with its time. [`race`] starts the processes, [`judge`] scores what they wrote, [`tables`] and [`reach`] say it.
 //!

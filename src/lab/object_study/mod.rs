@@ -2,8 +2,8 @@
 //!
 //! [`representation`] is figure 2: models against tables, which `contender` fits. For the others [`inputs`] photographs:
 //! the measured reflectance itself, asked at every part of a light that is finer than any that is fitted. [`case`]
-//! estimates and measures one case. [`asked`] is what a case asks, [`mod@plan`] says which cases there are, [`crate::lab::study`] takes them and keeps
-//! what came of them, [`tables`] makes the tables of it.
+//! estimates and measures one case. [`asked`] is what a case asks, [`mod@plan`] says which cases there are,
+//! [`crate::lab::study`] takes them and keeps what came of them, [`tables`] makes the tables of it.
 //!
 //! What this folder refuses to do: fit anything to the truth, or leave out a case that failed.
 

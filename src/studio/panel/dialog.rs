@@ -1,4 +1,5 @@
-//! Windows over the window: the palette of acts, help, a path, how to save.
+//! Windows over the window: the palette of acts, help, a path, how to save. Those of export and import
+//! have files of their own.
 
 mod export;
 mod import;
