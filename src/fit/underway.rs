@@ -22,6 +22,8 @@ pub(crate) struct Underway<'a> {
     pub seconds_left: f64,
     /// Views of the scene with the logarithms of their gains; empty where gains are not fitted.
     pub(super) log_gains: Vec<(usize, f32)>,
+    /// Whether a fit may end here; else it is only to be seen.
+    pub is_reached: bool,
 }
 
 /// Hears of it.

@@ -233,7 +233,7 @@ impl Worker {
             let seconds_left =
                 underway.seconds_left + if seconds_after_next.is_finite() { seconds_after_next } else { 0.0 };
             teller.send(Event::WithinStep(StepTime { seconds, seconds_left, finishing_seconds }));
-            if is_limited {
+            if is_limited && underway.is_reached {
                 *reached = Some(underway.reached());
             }
             let Some(before) = snapshot.last().filter(|_| snapshot.is_seen()) else { return };

@@ -51,13 +51,15 @@ impl Preconditioner {
     }
 }
 
-/// The way to the least of pixels' squares and beliefs' parabola, about. `None` when `stop` was raised.
+/// The way to the least of pixels' squares and beliefs' parabola, about; `ahead` hears of it after each iteration, with how many
+/// are done. `None` when `stop` was raised.
 pub(super) fn conjugate_gradients(
     system: &mut PixelSystem,
     rows: Rows,
     beliefs: &Parabola,
     step: Step,
     stop: &AtomicBool,
+    ahead: &mut dyn FnMut(usize, &[Lanes]),
 ) -> Option<Vec<Lanes>> {
     let mut diagonal = system.diagonal(rows);
     diagonal.par_iter_mut().enumerate().for_each(|(texel, diagonal)| {
@@ -73,7 +75,7 @@ pub(super) fn conjugate_gradients(
     let mut product = vec![[0.0f32; 8]; residual.len()];
     let mut power = dot(&residual, &direction);
     let first = power;
-    for _ in 0..step.iterations {
+    for iteration in 1..=step.iterations {
         if stop.load(Ordering::Relaxed) {
             return None;
         }
@@ -106,6 +108,7 @@ pub(super) fn conjugate_gradients(
             (0..8).for_each(|k| direction[k] = kept * direction[k] + down[k]);
         });
         power = next;
+        ahead(iteration, &way);
     }
     Some(way)
 }

@@ -20,7 +20,7 @@ use super::refine::log_gains;
 use super::report::ErrorSums;
 use super::scene::SolverScene;
 use super::sight::{Lit, Sight, Slopes, lanes_of};
-use super::way::{ENDS_OF_PARTS, OnTheWay, Step, Trace, Watch, weight_of};
+use super::way::{ENDS_OF_PARTS, Showing, Step, Trace, Watch, weight_of};
 use crate::material::Material;
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
@@ -129,11 +129,13 @@ impl SolverScene {
         let mut place =
             descent.down(descent.place(&start, sight, (&shown, texture_scale)), &FIRST_STEPS, &mut trace)?;
         if lit == Lit::Yes {
-            trace.begin((ENDS_OF_PARTS[0], ENDS_OF_PARTS[1]), 1.0);
+            // What is gone from the dielectric is not seen, and comes first.
+            trace.begin((ENDS_OF_PARTS[0].midpoint(ENDS_OF_PARTS[1]), ENDS_OF_PARTS[1]), 1.0);
             place = descent.or_plain(place, (&start, &shown, texture_scale), &mut trace)?;
         }
         if lit == Lit::Yes && self.is_scale_open() {
-            place = descent.under_light_again(place, estimate, (&shown, texture_scale))?;
+            trace.begin((ENDS_OF_PARTS[1], ENDS_OF_PARTS[2]), 1.0);
+            place = descent.under_light_again(place, estimate, (&shown, texture_scale), &mut trace)?;
         }
         // Where the scale is given, nothing was done between.
         let from = ENDS_OF_PARTS[if self.is_scale_open() { 2 } else { 1 }];
@@ -176,6 +178,7 @@ impl Descent<'_> {
         place: Place,
         estimate: &Estimate,
         (shown, texture_scale): (&[bool], f32),
+        trace: &mut Trace,
     ) -> Option<Place> {
         let here = Estimate {
             texels: place.texels.clone(),
@@ -187,7 +190,13 @@ impl Descent<'_> {
             },
             ..Estimate::default()
         };
-        (self.light, self.light_shares) = self.scene.light_again(here, self.stop)?;
+        let gains = place.learned.as_ref().map_or(&[][..], |learned| &learned.gains);
+        let mut seen = |share: f64, light: &[[f32; 3]]| {
+            let showing = Showing { light, ..self.showing(shown, gains) };
+            trace.within_step(share, &showing, || place.texels.clone());
+        };
+        let found = self.scene.light_again(here, self.stop, &mut seen)?;
+        (self.light, self.light_shares) = found;
         let sight = self.sight(&place.texels, FIRST_STEPS[0].slopes)?;
         Some(Place { learned: place.learned, ..self.place(&place.texels, sight, (shown, texture_scale)) })
     }
@@ -216,25 +225,9 @@ impl Descent<'_> {
         self.down(begun, &FIRST_STEPS, trace)
     }
 
-    /// Leaves a step on the trace. While reflectances may go beyond 1, who watches sees them as they would be if the way ended
-    /// here: under a light that is raised.
-    pub(super) fn leave(
-        &self,
-        trace: &mut Trace,
-        objective: [Objective; 2],
-        (texels, beliefs): (&[Material<f32>], &Neighbours),
-        Learned { gains, .. }: &Learned,
-        weight: f64,
-    ) {
-        let share = trace.step(objective, weight);
-        let Some(watch) = &mut trace.watch else { return };
-        if self.most_diffuse <= 1.0 {
-            return watch(OnTheWay { texels, light: &self.light, gains, share });
-        }
-        let scale = LightScale::told_by(texels, beliefs.shown());
-        let light = scale.of_light(&self.light, &self.scene.told_by_background());
-        let texels: Vec<Material<f32>> = texels.par_iter().map(|texel| scale.under(texel)).collect();
-        watch(OnTheWay { texels: &texels, light: &light, gains, share });
+    /// What texels are shown by on the way.
+    pub(super) fn showing<'b>(&'b self, shown: &'b [bool], gains: &'b [[f32; 3]]) -> Showing<'b> {
+        Showing { scene: self.scene, light: &self.light, most_diffuse: self.most_diffuse, shown, gains }
     }
 
     /// A place to begin at, around which texture has such a scale.
@@ -256,7 +249,21 @@ impl Descent<'_> {
             let before = by.objective(self.pixels, &sight, beliefs.energies(&texels));
             let parabola = beliefs.parabola(&texels);
             let equations = Rows { pieces: &sight.pieces, pixels: &rows };
-            let way = conjugate_gradients(&mut self.system, equations, &parabola, *step, self.stop)?;
+            let most = self.most_diffuse;
+            let showing = Showing {
+                scene: self.scene,
+                light: &self.light,
+                most_diffuse: most,
+                shown: beliefs.shown(),
+                gains: &by.gains,
+            };
+            // As it is judged after them, with widths lobes are integrated anew.
+            let weight_of_iterations = if moves_widths { 0.5 } else { 0.8 } * step.weight();
+            let mut ahead = |done: usize, way: &[Lanes]| {
+                let weight = weight_of_iterations * done as f64 / step.iterations as f64;
+                trace.within_step(weight, &showing, || stepped(&texels, way, 1.0, most));
+            };
+            let way = conjugate_gradients(&mut self.system, equations, &parabola, *step, self.stop, &mut ahead)?;
             let after_it = steps.get(number + 1).map_or(Slopes::OfReflectances, |next| next.slopes);
             let (mut share, mut after) = (1.0f32, before);
             for _ in 0..=HALVINGS {
@@ -273,7 +280,7 @@ impl Descent<'_> {
                 }
                 share *= 0.5;
             }
-            self.leave(trace, [before, after], (&texels, &beliefs), &by, step.weight());
+            trace.step([before, after], step.weight(), (&self.showing(beliefs.shown(), &by.gains), &texels));
             learned = Some(by);
         }
         Some(Place { texels, sight, learned, beliefs, is_exact })

@@ -22,11 +22,13 @@ const OPENNESS: f64 = 0.5;
 
 impl SolverScene {
     /// The light by the estimate's maps, which stay, holes filled, and what its texels are known by; the estimate's own where no
-    /// block has maps. `None` when `stop` was raised.
+    /// block has maps. `seen` hears of the light after each round, with the share of the rounds that are done. `None` when `stop` was
+    /// raised.
     pub(super) fn light_again(
         &self,
         mut estimate: Estimate,
         stop: &AtomicBool,
+        seen: &mut dyn FnMut(f64, &[[f32; 3]]),
     ) -> Option<(Vec<[f32; 3]>, Vec<EvidenceShares>)> {
         let prior = open_prior(self.observations.mean, OPENNESS);
         let size = self.settings.light_size;
@@ -62,6 +64,7 @@ impl SolverScene {
             let (light, known) = self.solve_light(&equations, &surface, &shape, held, &estimate, stop)?;
             estimate.light = light;
             estimate.light_known.shares = known.shares;
+            seen((number + 1 - rounds) as f64 / ROUNDS as f64, &estimate.light);
         }
         self.fill_holes(&mut estimate.light);
         Some((estimate.light, estimate.light_known.shares))
@@ -90,7 +93,7 @@ mod tests {
         let mean = scene.mean_light(&truth);
         let begun = vec![[0, 1, 2].map(|c| (mean[c] / even[c]) as f32); truth.len()];
         estimate.light.clone_from(&begun);
-        let (found, shares) = scene.light_again(estimate.clone(), &AtomicBool::new(false)).unwrap();
+        let (found, shares) = scene.light_again(estimate.clone(), &AtomicBool::new(false), &mut |_, _| {}).unwrap();
         assert!(shares.len() == found.len() && shares.iter().flatten().any(|&share| share > 0.1));
         let error = |light: &[[f32; 3]]| -> f64 {
             let of_texel = |texel: usize| {
@@ -100,6 +103,6 @@ mod tests {
             (0..truth.len()).map(of_texel).sum::<f64>().sqrt()
         };
         assert!(error(&found) < 0.5 * error(&begun), "{} of {}", error(&found), error(&begun));
-        assert!(scene.light_again(estimate, &AtomicBool::new(true)).is_none());
+        assert!(scene.light_again(estimate, &AtomicBool::new(true), &mut |_, _| {}).is_none());
     }
 }

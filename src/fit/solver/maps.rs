@@ -12,6 +12,7 @@ use super::report::{ErrorSums, StepReport};
 use super::round::{BlockWork, Round, open_prior};
 use super::scene::SolverScene;
 use super::tile::{TILE, Tile};
+use super::way::{OnTheWay, Watch};
 use crate::material::Material;
 use crate::math::parallel;
 use crate::math::statistics::median;
@@ -21,7 +22,7 @@ use std::time::Instant;
 /// Most observations of a block.
 const MOST_OBSERVATIONS: usize = 256;
 /// Tiles that are solved before what they leave is put together, so that few wait.
-const TILES_AT_ONCE: usize = 128;
+const TILES_AT_ONCE: usize = 32;
 
 /// What a tile leaves.
 struct TileResult {
@@ -37,8 +38,8 @@ struct TileResult {
 }
 
 impl SolverScene {
-    /// Makes all maps. `None` when `stop` was raised: the estimate is of no use then.
-    pub fn make_maps(&self, estimate: &mut Estimate, stop: &AtomicBool) -> Option<StepReport> {
+    /// Makes all maps; `watch` sees tiles come. `None` when `stop` was raised: the estimate is of no use then.
+    pub fn make_maps(&self, estimate: &mut Estimate, stop: &AtomicBool, watch: &mut Watch) -> Option<StepReport> {
         let planes = self.transport.basis.planes(&estimate.light);
         let at_points = self.point_light(&estimate.texels, &planes);
         let round = self.round(estimate, &planes, &at_points);
@@ -49,6 +50,7 @@ impl SolverScene {
         let mut made: Vec<Tile> = Vec::new();
         let mut tails = TailSums::new(self.views.len());
         let tiles = self.tiles();
+        let mut seen = estimate.texels.clone();
         for group in tiles.chunks(TILES_AT_ONCE) {
             let results = parallel::map_items(group, |(first, blocks)| {
                 self.solve_tile(&round, *first, blocks, &prior, check.as_ref(), stop)
@@ -63,8 +65,12 @@ impl SolverScene {
                 if let (Some(check), Some(alternatives)) = (&mut check, result.alternatives) {
                     check.add(&alternatives, result.block_seconds, result.tile.seconds);
                 }
+                result.tile.materials().for_each(|(texel, own)| seen[texel] = own);
                 made.push(result.tile);
             }
+            // What judges choices and fills the gaps comes after.
+            let share = 0.95 * made.len() as f64 / tiles.len() as f64;
+            watch(OnTheWay { texels: &seen, light: &estimate.light, gains: &[], share, is_reached: false });
         }
         let choices = match check {
             Some(check) => Some(check.end(self, estimate, (&planes, &at_points), stop)?),
@@ -72,15 +78,10 @@ impl SolverScene {
         };
         estimate.variances.fill(TexelVariance::default());
         for tile in &made {
-            for (index, &texel) in tile.texels.iter().enumerate() {
-                let (lobe, texel) = (&tile.lobes[index], texel as usize);
+            for (index, (texel, own)) in tile.materials().enumerate() {
+                let lobe = &tile.lobes[index];
                 let [r, g, b, log_width] = lobe.square.map(|value| value as f32);
                 let variance = Material { diffuse: tile.variance[index], specular: [r, g, b], log_width };
-                let own = Material {
-                    diffuse: tile.rho[index],
-                    specular: [0, 1, 2].map(|c| (lobe.mean[c] as f32).clamp(0.0, 1.0)),
-                    log_width: lobe.mean[3].min(0.0) as f32,
-                };
                 estimate.set(texel, own, TexelVariance { variance, lobe_cluster_size: lobe.shared as f32 });
             }
         }

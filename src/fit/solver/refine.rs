@@ -205,8 +205,10 @@ pub(super) mod tests {
         let report = {
             let (mut seen, mut shares) = (Vec::new(), Vec::new());
             let report = scene.refine(estimate, &never, &mut |way| {
-                seen.push((way.texels.to_vec(), way.light.to_vec()));
                 shares.push(way.share);
+                if way.is_reached {
+                    seen.push((way.texels.to_vec(), way.light.to_vec()));
+                }
             });
             assert!(shares.is_sorted() && shares[0] > 0.0 && shares.last() == Some(&1.0), "{shares:?}");
             // Each step was told of, and the last with what stays; texels that no pixel shows are filled after it.

@@ -39,13 +39,14 @@ impl Descent<'_> {
         let begun = self.place(&choose(start, &plain_start), sight, (shown, texture_scale));
         // Where squares meet neighbours differ at once; a step makes that good before it is judged.
         let begun = Place { texels, learned: found.learned.clone(), ..begun };
-        let mixed = self.down(begun, &FIRST_STEPS[..1], &mut Trace::unseen())?;
+        let mixed = trace.trial(|trace| self.down(begun, &FIRST_STEPS[..1], trace))?;
         let objective = |place: &Place| by.objective(self.pixels, &place.sight, place.beliefs.energies(&place.texels));
         let (before, after) = (objective(&found), objective(&mixed));
         if after.total() >= before.total() {
             return Some(found);
         }
-        self.leave(trace, [before, after], (&mixed.texels, &mixed.beliefs), &by, 1.0);
+        let showing = self.showing(mixed.beliefs.shown(), &by.gains);
+        trace.step([before, after], 0.0, (&showing, &mixed.texels));
         Some(mixed)
     }
 

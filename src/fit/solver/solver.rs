@@ -46,7 +46,7 @@ impl SolverScene {
             SolverStep::Maps => {
                 let mut next = estimate.clone();
                 self.fill_holes(&mut next.light);
-                let report = self.make_maps(&mut next, stop)?;
+                let report = self.make_maps(&mut next, stop, watch)?;
                 *estimate = next;
                 Some(report)
             }

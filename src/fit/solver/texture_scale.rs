@@ -93,7 +93,7 @@ impl Contest<'_> {
                 .filter(|(index, _)| is_judge(pixels.pixel(*index).view as usize))
                 .for_each(|(_, row)| row.weight = 0.0);
             let rows = Rows { pieces: &now.pieces, pixels: &rows };
-            let way = conjugate_gradients(system, rows, &beliefs.parabola(&own), step, stop)?;
+            let way = conjugate_gradients(system, rows, &beliefs.parabola(&own), step, stop, &mut |_, _| {})?;
             let next = stepped(&own, &way, 1.0, scene.most_diffuse(*lit));
             let moved = now.moved(system, &difference(&own, &next));
             (own, seen) = (next, Some(moved));

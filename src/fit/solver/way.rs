@@ -1,8 +1,15 @@
 //! The steps of a [descent](super::descent), what they leave behind, and how far a descent is by its seconds.
 
+use super::light_scale::LightScale;
 use super::objective::Objective;
+use super::scene::SolverScene;
 use super::sight::Slopes;
 use crate::material::Material;
+use rayon::prelude::*;
+use std::time::{Duration, Instant};
+
+/// Something is shown as often as this, at most, of what is between two steps.
+const SHOWN_EVERY: Duration = Duration::from_millis(900);
 
 /// Shares of the seconds of a way with a light at the ends of its parts, as measured on photographs: the first steps, the
 /// choice between the starts, the light once more, the last steps.
@@ -29,19 +36,21 @@ pub(super) fn weight_of(steps: &[Step]) -> f64 {
     steps.iter().map(|step| step.weight()).sum()
 }
 
-/// Where a descent is after a step.
+/// Where a step of the solver is that takes long: a descent, or maps that are made tile by tile.
 pub struct OnTheWay<'a> {
     /// The texels, diffuse reflectances at most 1.
     pub texels: &'a [Material<f32>],
     /// Radiance of the light's texels.
     pub light: &'a [[f32; 3]],
-    /// Gain of each view and channel.
+    /// Gain of each view and channel; empty where they do not move.
     pub gains: &'a [[f32; 3]],
     /// Share of the whole way by its seconds, in (0, 1]; what comes after it is short.
     pub share: f64,
+    /// Whether one may end here: the objective is less than before. Else it is only to be seen.
+    pub is_reached: bool,
 }
 
-/// Hears of each step of a descent that is gone on from.
+/// Hears of each step of a descent that is gone on from, and now and then of what is between.
 pub type Watch<'a> = dyn FnMut(OnTheWay) + 'a;
 
 /// A part of a way.
@@ -61,12 +70,29 @@ pub(super) struct Trace<'a> {
     /// Who hears of it.
     pub(super) watch: Option<&'a mut Watch<'a>>,
     part: Part,
+    /// When something was shown last.
+    shown: Instant,
+    /// Whether it may not be gone on from where the way leads now: steps are only to be seen.
+    is_trial: bool,
+}
+
+/// What texels on the way are shown by.
+pub(super) struct Showing<'a> {
+    pub(super) scene: &'a SolverScene,
+    pub(super) light: &'a [[f32; 3]],
+    /// Largest diffuse reflectance of a texel.
+    pub(super) most_diffuse: f32,
+    /// Texels that pixels show.
+    pub(super) shown: &'a [bool],
+    /// Gain of each view and channel.
+    pub(super) gains: &'a [[f32; 3]],
 }
 
 impl<'a> Trace<'a> {
     /// Of a way that somebody may hear of.
     pub(super) fn of(watch: Option<&'a mut Watch<'a>>) -> Self {
-        Trace { steps: Vec::new(), watch, part: Part { from: 0.0, to: 1.0, weight: 1.0, done: 0.0 } }
+        let part = Part { from: 0.0, to: 1.0, weight: 1.0, done: 0.0 };
+        Trace { steps: Vec::new(), watch, part, shown: Instant::now(), is_trial: false }
     }
 
     /// Of a way that may not be gone on from: nobody hears of it.
@@ -74,16 +100,59 @@ impl<'a> Trace<'a> {
         Trace::of(None)
     }
 
+    /// Goes a way that may not be gone on from, whose steps are seen and not kept.
+    pub(super) fn trial<T>(&mut self, go: impl FnOnce(&mut Self) -> T) -> T {
+        self.is_trial = true;
+        let gone = go(self);
+        self.is_trial = false;
+        gone
+    }
+
     /// Begins a part whose steps have this weight in all.
     pub(super) fn begin(&mut self, (from, to): (f64, f64), weight: f64) {
         self.part = Part { from, to, weight, done: 0.0 };
     }
 
-    /// A step of such a weight is done; the share of the way by then.
-    pub(super) fn step(&mut self, objective: [Objective; 2], weight: f64) -> f64 {
-        self.steps.push(objective);
-        let Part { from, to, weight: whole, done } = &mut self.part;
-        *done += weight;
-        *from + (*to - *from) * (*done / *whole).min(1.0)
+    /// A step of such a weight is done, and left these texels.
+    pub(super) fn step(
+        &mut self,
+        objective: [Objective; 2],
+        weight: f64,
+        (showing, texels): (&Showing, &[Material<f32>]),
+    ) {
+        self.part.done += weight;
+        if !self.is_trial {
+            self.steps.push(objective);
+        }
+        self.show(showing, texels, self.part.share(0.0), !self.is_trial);
+    }
+
+    /// Within a step, of whose weight so much is done: shows what `texels` makes, unless something was shown just before.
+    pub(super) fn within_step(&mut self, weight: f64, showing: &Showing, texels: impl FnOnce() -> Vec<Material<f32>>) {
+        if self.watch.is_some() && self.shown.elapsed() > SHOWN_EVERY {
+            self.show(showing, &texels(), self.part.share(weight), false);
+        }
+    }
+
+    /// While reflectances may go beyond 1, who watches sees them as they would be if the way ended here: under a light that
+    /// is raised.
+    fn show(&mut self, showing: &Showing, texels: &[Material<f32>], share: f64, is_reached: bool) {
+        let Some(watch) = &mut self.watch else { return };
+        let &Showing { scene, light, gains, .. } = showing;
+        self.shown = Instant::now();
+        if showing.most_diffuse <= 1.0 {
+            return watch(OnTheWay { texels, light, gains, share, is_reached });
+        }
+        let scale = LightScale::told_by(texels, showing.shown);
+        let light = scale.of_light(light, &scene.told_by_background());
+        let texels: Vec<Material<f32>> = texels.par_iter().map(|texel| scale.under(texel)).collect();
+        watch(OnTheWay { texels: &texels, light: &light, gains, share, is_reached });
+    }
+}
+
+impl Part {
+    /// Share of the whole way once so much more weight is done.
+    fn share(&self, more: f64) -> f64 {
+        self.from + (self.to - self.from) * ((self.done + more) / self.weight).min(1.0)
     }
 }
