@@ -1,7 +1,8 @@
 //! Patina turns a photographed scene into materials one can relight.
 //!
-//! Given a mesh and calibrated photographs taken under one unknown daylight, it fits a diffuse, a specular and a
-//! roughness map and an HDR environment with a differentiable path tracer on the CPU.
+//! Given a mesh and calibrated photos taken under one unknown environment, it estimates diffuse, specular and roughness maps
+//! and that environment as an HDR image, on the CPU: by a solver over cached light transport (the default), or by Adam through
+//! a differentiable path tracer.
 //!
 //! # The map
 //! Dependencies point one way; `tests/program/layers.rs` fails when a lower layer imports a higher one.
@@ -9,7 +10,7 @@
 //! | folder | what it holds |
 //! |---|---|
 //! | `error`, `files` | errors with kind, place and remedy; files that are written whole or not at all |
-//! | `guide` | the guide: capture, formats, objective, benchmarks, limits |
+//! | `guide` | the guide: nine topics, also in the terminal and the window |
 //! | `math` | random numbers, frames, the sphere, sampling tables, statistics, numbers with derivatives |
 //! | `image` | linear images, image files, metrics |
 //! | `trace` | rays and the bounding volume hierarchy |
@@ -19,11 +20,11 @@
 //! | `neural` | the invertible neural model of reflectance: flow, training, fit, sampler |
 //! | `scene` | mesh, cameras, photographs, their readers and the pre-flight check |
 //! | `atlas` | from any mesh to a texture atlas |
-//! | `render` | where light is added up: the path tracer and its reverse pass |
-//! | `fit` | where a texel is changed: losses, consistency, Adam, schedule, checkpoint |
+//! | `render` | where light is added up: the path tracer with its reverse pass, and cached transport |
+//! | `fit` | where a texel is changed: the solver, Adam, losses, consistency, schedule, checkpoint |
 //! | `insight` | coverage, comparison, report |
 //! | `export` | the run folder and the files in it |
-//! | `object` | light and measured reflectance from one photo |
+//! | `object` | environment and measured reflectance from one photo |
 //! | `job` | the only door between a fit and whoever watches it |
 //! | `cli` | the command line; it holds no algorithm |
 //! | `studio` | the window, behind the feature of that name; it holds no algorithm either |

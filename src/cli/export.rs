@@ -22,7 +22,7 @@ pub struct ExportArguments {
     /// Kind of the texture files; in GLB and USD png8 chooses 8 bits and all others 16.
     #[arg(long, value_enum, default_value = "png16")]
     pub textures: TextureFormat,
-    /// Carry the maps over to this mesh of the same place (OBJ or PLY with texture coordinates), by rays along its normals.
+    /// Carry the maps over to this mesh of the same place (OBJ, PLY, glTF or GLB with texture coordinates), by rays along its normals.
     #[arg(long, value_name = "MESH")]
     pub onto: Option<PathBuf>,
     /// Write the cameras of the run's scene too, as cameras.json in the convention of OpenCV.

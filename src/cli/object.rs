@@ -23,10 +23,10 @@ use std::sync::atomic::AtomicBool;
 #[derive(Debug, Args)]
 #[command(group(clap::ArgGroup::new("shape").required(true).args(["mesh", "sphere", "normals"])))]
 pub struct ObjectOptions {
-    /// One photo or several of the same object under the same environment: EXR, HDR, PFM, PNG or JPEG.
+    /// One photo or several of the same object under the same environment: EXR, HDR, PFM, PNG, TIFF or JPEG.
     #[arg(required = true)]
     pub photos: Vec<PathBuf>,
-    /// The mesh of the object: OBJ or PLY.
+    /// The mesh of the object: OBJ, PLY, glTF, GLB or STL.
     #[arg(long, requires = "camera")]
     pub mesh: Option<PathBuf>,
     /// The object is a sphere, seen from infinitely far along -z: the circle of its mask, or without one the circle that

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Method {
-    /// What suits the scene: the solver, unless there are no photos or a setting is given that applies to Adam only.
-    /// Resolved once, before a fit begins, by [`Suited`](super::Suited); no run records it.
+    // Resolved once, before a fit begins, by `Suited`; no run records it.
+    /// Chosen for the scene: the solver, unless there are no photos or a setting is given that applies to Adam only.
     #[default]
     #[serde(rename = "auto")]
     #[cfg_attr(feature = "cli", value(name = "auto"))]

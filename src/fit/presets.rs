@@ -7,14 +7,14 @@ use super::settings::FitSettings;
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[non_exhaustive]
 pub enum Preset {
-    /// A first look: small maps, few steps, direct light only.
+    /// A first look: maps of 512 x 512 at most, direct light only; with Adam, fewer steps.
     #[cfg_attr(feature = "cli", value(name = "draft", alias = "quick"))]
     Quick,
     /// The defaults.
     #[default]
     #[cfg_attr(feature = "cli", value(name = "standard", alias = "balanced"))]
     Balanced,
-    /// For the final run: more steps and samples, three bounces, exposure compensation.
+    /// For the final run: three bounces and exposure compensation; with Adam, more steps and samples.
     #[cfg_attr(feature = "cli", value(name = "high-quality", alias = "careful"))]
     Careful,
 }

@@ -83,8 +83,7 @@ pub struct FitSettings {
     /// Seed of all random numbers.
     #[cfg_attr(feature = "cli", arg(long, default_value_t = FitSettings::default().seed))]
     pub seed: u64,
-    /// How maps and environment are estimated. With `auto` a scene is given to the solver, to Adam where a setting is given
-    /// that applies to Adam only.
+    /// How maps and environment are estimated [default: auto, which is the solver unless a setting applies to Adam only].
     #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
     pub method: Method,
     /// Width and height of the maps in texels: a power of two, 16 to 8192 [default: what the photos resolve, 256 to 2048].

@@ -7,7 +7,7 @@
 use super::fitter::{Fitter, StepOutcome};
 use super::schedule::{Stage, StageKind};
 use super::settings::Method;
-use super::solver::refine::log_gains;
+use super::solver::photo_gains::log_gains;
 use super::solver::way::OnTheWay;
 use super::solver::{
     Choices, Estimate, SolverScene, SolverSettings, SolverStep, StepReport, TexelVariance, TransportError,
@@ -65,10 +65,10 @@ impl Fitter {
         // What made the level ready before is no part of the way.
         let way_began = Instant::now();
         let report = solver.step_watched(step, &mut estimate, stop, &mut |way: OnTheWay| {
-            let OnTheWay { texels, light, gains, share, is_reached } = way;
+            let OnTheWay { look, gains, share, is_reached } = way;
             let seconds_left = way_began.elapsed().as_secs_f64() * (1.0 / share - 1.0);
             let log_gains = views.iter().copied().zip(log_gains(gains)).collect();
-            watch(&Underway { texels, map_size, light, light_size, seconds_left, log_gains, is_reached });
+            watch(&Underway { look, map_size, light_size, seconds_left, log_gains, is_reached });
         });
         if report.is_some() && whole.fixed_maps && self.steps_total() == self.state.step + 1 {
             // Else before maps are made under the light.

@@ -1,6 +1,7 @@
 //! Maps and light within a step of the solver, for who watches: a descent over all texels takes longer than one likes to
 //! wait.
 
+use super::solver::way::Look;
 use super::state::FitState;
 use crate::image::Image;
 use crate::light::Environment;
@@ -10,12 +11,10 @@ use glam::Vec3;
 
 /// Where a step is. The state has nothing of it until the step is done.
 pub(crate) struct Underway<'a> {
-    /// Texels of square maps.
-    pub(super) texels: &'a [Material<f32>],
-    /// Texels along their side.
+    /// Makes texels of square maps, and the light.
+    pub(super) look: &'a dyn Fn() -> Look<'a>,
+    /// Texels along the maps' side.
     pub(super) map_size: usize,
-    /// Radiance of the light's texels.
-    pub(super) light: &'a [[f32; 3]],
     /// Width and height of the light in texels.
     pub(super) light_size: (usize, usize),
     /// Seconds until the step is done, by what it took to this place.
@@ -37,20 +36,18 @@ pub(crate) struct Reached {
 }
 
 impl Underway<'_> {
-    /// The maps by now.
-    pub fn maps(&self) -> MaterialMaps {
-        maps_from_texels(self.texels, self.map_size, self.map_size)
-    }
-
-    /// The light by now.
-    pub fn environment(&self) -> Environment {
-        let pixels = self.light.iter().map(|&radiance| Vec3::from_array(radiance)).collect();
-        Environment { radiance: Image::from_pixels(self.light_size.0, self.light_size.1, pixels) }
+    /// The maps by now, and the light.
+    pub fn shown(&self) -> (MaterialMaps, Environment) {
+        let Look { texels, light } = (self.look)();
+        let pixels = light.iter().map(|&radiance| Vec3::from_array(radiance)).collect();
+        let radiance = Image::from_pixels(self.light_size.0, self.light_size.1, pixels);
+        (maps_from_texels(&texels, self.map_size, self.map_size), Environment { radiance })
     }
 
     /// A copy of it.
     pub fn reached(&self) -> Reached {
-        Reached { texels: self.texels.to_vec(), light: self.light.to_vec(), log_gains: self.log_gains.clone() }
+        let Look { texels, light } = (self.look)();
+        Reached { texels: texels.into_owned(), light: light.into_owned(), log_gains: self.log_gains.clone() }
     }
 }
 

@@ -72,7 +72,7 @@ impl Advance {
 
     /// A step has come to a place.
     pub fn within_step(&mut self, time: &StepTime) {
-        self.take((time.seconds, time.seconds_left, time.finishing_seconds), time.seconds_left);
+        self.take((time.seconds, time.seconds_left, time.finishing_seconds), time.step_seconds_left);
     }
 
     fn take(&mut self, (done, left, finishing): (f64, f64, f64), step: f64) {
@@ -187,12 +187,22 @@ mod tests {
         advance.stepped(&progress(10.0, 30.0));
         let left = advance.seconds_left().unwrap();
         assert!((39.0..=40.0).contains(&left), "{left}");
-        advance.within_step(&StepTime { seconds: 12.0, seconds_left: 12.0, finishing_seconds: 20.0 });
+        advance.within_step(&StepTime {
+            seconds: 12.0,
+            step_seconds_left: 12.0,
+            seconds_left: 12.0,
+            finishing_seconds: 20.0,
+        });
         let left = advance.seconds_left().unwrap();
         assert!((21.0..=22.0).contains(&left) && advance.percent() == 35, "{left}");
         // A fit that is taken up within its last step tells nothing else before.
         let mut taken_up = Advance::default();
-        taken_up.within_step(&StepTime { seconds: 30.0, seconds_left: 10.0, finishing_seconds: 40.0 });
+        taken_up.within_step(&StepTime {
+            seconds: 30.0,
+            step_seconds_left: 10.0,
+            seconds_left: 10.0,
+            finishing_seconds: 40.0,
+        });
         assert!((49.0..=50.0).contains(&taken_up.seconds_left().unwrap()) && taken_up.percent() == 37);
         advance.stepped(&progress(f64::NAN, f64::NAN));
         assert!(advance.seconds_left().is_some(), "what is not a number changes nothing");

@@ -8,8 +8,8 @@
 //! [`open`] opens scenes and runs, begins fits and takes them up; [`prepare`] turns a scene into a surface with an atlas,
 //! [`kept`] keeps on disk what opening takes long to make,
 //! [`run_with_maps`] reads the run whose maps and atlas are kept, [`known_maps`] settles what they decide,
-//! [`worker`] is the thread and [`handle`] what a watcher holds of it, `save` keeps the run folder whole while it runs,
-//! [`budget`] limits how long that is,
+//! [`begin`] starts a job, `worker` is what its thread does and [`handle`] what a watcher holds of it, `save` keeps the run
+//! folder whole while it runs, [`budget`] limits how long that is,
 //! [`outcome`] renders, scores and writes the run folder, [`demo`] makes the built-in scene,
 //! [`capture_folder`] finds the parts of a scene in a folder and names them. [`preview`] draws for a window
 //! beside a fit, [`relit`] does so from cached transport, at once. After a fit, [`gallery`] makes what a user shows, [`gauge`] moves its scale, [`entanglement`] tells how
@@ -25,6 +25,7 @@ pub mod advance;
 pub mod against_truth;
 pub mod ask;
 pub mod background;
+pub mod begin;
 pub mod benchmark;
 pub mod budget;
 pub mod capture_folder;
@@ -60,15 +61,15 @@ mod stages;
 mod teller;
 pub mod time_left;
 mod view;
-pub mod worker;
+mod worker;
 
+pub use begin::{start, start_with};
 pub use budget::Budget;
 pub use facts::rows_of;
 pub use handle::{JobHandle, JobOptions, Wake};
 pub use prepare::RunSettings;
 pub use slot::Slot;
 pub use solver_told::SolverTold;
-pub use worker::{start, start_with};
 
 use crate::error::{Error, Finding};
 use crate::fit::{FitSettings, LossRow};
@@ -198,6 +199,8 @@ pub struct Progress {
 pub struct StepTime {
     /// Seconds of all steps so far, this one's included.
     pub seconds: f64,
+    /// Seconds until this one is done.
+    pub step_seconds_left: f64,
     /// Seconds until the last step is done.
     pub seconds_left: f64,
     /// Seconds that what comes after it is expected to take.

@@ -44,13 +44,15 @@ pub fn transport_of(
 /// How fine that cache is where fits with these settings are begun and looked at: the one that a fit by the solver begins
 /// with, where it is about as fine, so that it is traced once.
 pub fn settings_beside(fit: &FitSettings, max_bounces: usize) -> CachedSettings {
-    let (first, light_size) = SolverSettings::first_cache(fit);
-    let serves = fit.method == Method::Solver
-        && fit.has_lobe()
-        && light_size == LIGHT_SIZE
-        && (GRID..=LARGEST_GRID).contains(&first.grid)
-        && first.max_bounces == max_bounces;
+    let (first, _) = SolverSettings::first_cache(fit);
+    let is_about_as_fine = (GRID..=LARGEST_GRID).contains(&first.grid) && first.max_bounces == max_bounces;
+    let serves = fit.has_lobe() && is_about_as_fine && is_first_cache(&first, fit);
     if serves { first } else { settings_of(max_bounces, fit.has_lobe().then_some(fit.lobe)) }
+}
+
+/// Whether a fit with these settings begins with such a cache of a window.
+pub fn is_first_cache(settings: &CachedSettings, fit: &FitSettings) -> bool {
+    fit.method == Method::Solver && SolverSettings::first_cache(fit) == (*settings, LIGHT_SIZE)
 }
 
 /// How fine that cache is, for surface with a lobe of these microfacets or without one.

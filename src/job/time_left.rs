@@ -67,7 +67,7 @@ pub fn pace(plan: &[Stage], losses: &[LossRow], first_of_session: usize, surface
 }
 
 /// Seconds of all that comes after the last step, most of them for scores: so many, and for each million pixels of surface.
-const FINISHING_SECONDS: (f64, f64) = (9.5, 5.5);
+const FINISHING_SECONDS: (f64, f64) = (13.0, 7.5);
 /// The same of making a level ready, at its pixels.
 const LEVEL_SECONDS: (f64, f64) = (2.0, 4.0);
 /// The same of a round on the light.

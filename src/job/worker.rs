@@ -1,18 +1,16 @@
 //! The thread of a job.
 
-use super::handle::{JobHandle, JobOptions};
 use super::outcome;
 use super::prepare::{Prepared, RunSettings};
 use super::save::Saver;
 use super::teller::Teller;
 use super::time_left::{self, Pace};
 use super::{Budget, Command, Event, Progress, Slot, Snapshot, SolverTold, StepTime};
-use crate::error::{Error, ErrorKind, Finding, Result, Severity, text_of_panic};
-use crate::export::RunFolder;
+use crate::error::{ErrorKind, Finding, Result, Severity};
 use crate::fit::underway::{Reached, Underway};
 use crate::fit::{FitSettings, Fitter, LossRow, StepOutcome};
 use crate::insight::report::data::StageTime;
-use crossbeam_channel::{Receiver, unbounded};
+use crossbeam_channel::Receiver;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -22,90 +20,25 @@ const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(500);
 /// How long a job that holds waits for a command before it looks at its stop flag.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// Starts a job over a prepared scene. `fitter` may be new or resumed; results go to `folder`.
-///
-/// # Errors
-/// `Internal` when no thread can be started, `Unwritable` when another fit holds the folder. What goes wrong later is told as [`Event::Failed`].
-pub fn start(prepared: Prepared, fitter: Fitter, settings: RunSettings, folder: RunFolder) -> Result<JobHandle> {
-    start_with(prepared, fitter, settings, folder, JobOptions::default())
-}
-
-/// [`start`] with options.
-///
-/// # Errors
-/// As of [`start`].
-pub fn start_with(
-    prepared: Prepared,
-    fitter: Fitter,
-    settings: RunSettings,
-    folder: RunFolder,
-    options: JobOptions,
-) -> Result<JobHandle> {
-    let folder = folder.held()?;
-    // Neither channel makes its sender wait; what is sent is little, since progress is dropped when nobody reads it.
-    let (commands, command_receiver) = unbounded();
-    let (event_sender, events) = unbounded();
-    let snapshot = Arc::new(Slot::default());
-    let stop = Arc::new(AtomicBool::new(false));
-    let teller = Teller { events: event_sender, wake: options.wake };
-    let first_of_session = fitter.state().step;
-    let worker = Worker {
-        fitter,
-        settings,
-        saver: Saver::new(folder),
-        commands: command_receiver,
-        teller: teller.clone(),
-        before_step: options.before_step,
-        budget: options.budget,
-        snapshot: Arc::clone(&snapshot),
-        stop: Arc::clone(&stop),
-        began: Instant::now(),
-        paused: false,
-        steps_asked: 0,
-        reached: None,
-        first_of_session,
-    };
-    let thread = std::thread::Builder::new()
-        .name("patina-fit".into())
-        .spawn(move || {
-            let work = move || match options.pool {
-                Some(pool) => pool.install(move || worker.run(prepared)),
-                None => worker.run(prepared),
-            };
-            let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));
-            let error = match outcome {
-                Ok(Ok(())) => return,
-                Ok(Err(error)) => error,
-                Err(panic) => {
-                    let message = text_of_panic(&*panic);
-                    Error::new(ErrorKind::Internal, format!("the worker of the fit ended unexpectedly: {message}"))
-                        .remedy("internal error (please report); the last checkpoint is valid: `patina resume`")
-                }
-            };
-            teller.send(Event::Failed(error));
-        })
-        .map_err(|source| Error::new(ErrorKind::Internal, format!("cannot start a thread: {source}")))?;
-    Ok(JobHandle { commands, events, snapshot, stop, thread: Some(thread) })
-}
-
-struct Worker {
-    fitter: Fitter,
-    settings: RunSettings,
-    saver: Saver,
-    commands: Receiver<Command>,
-    teller: Teller,
-    before_step: Option<Box<dyn FnMut(usize) + Send>>,
-    budget: Option<Budget>,
-    snapshot: Arc<Slot<Snapshot>>,
-    stop: Arc<AtomicBool>,
-    began: Instant,
-    paused: bool,
+/// A job at work.
+pub(super) struct Worker {
+    pub(super) fitter: Fitter,
+    pub(super) settings: RunSettings,
+    pub(super) saver: Saver,
+    pub(super) commands: Receiver<Command>,
+    pub(super) teller: Teller,
+    pub(super) before_step: Option<Box<dyn FnMut(usize) + Send>>,
+    pub(super) budget: Option<Budget>,
+    pub(super) snapshot: Arc<Slot<Snapshot>>,
+    pub(super) stop: Arc<AtomicBool>,
+    pub(super) began: Instant,
+    pub(super) paused: bool,
     /// Single steps that were asked for and not done yet.
-    steps_asked: usize,
+    pub(super) steps_asked: usize,
     /// Where the last step was when its time was up.
-    reached: Option<Reached>,
+    pub(super) reached: Option<Reached>,
     /// Steps that were done before this job.
-    first_of_session: usize,
+    pub(super) first_of_session: usize,
 }
 
 fn pace_of(fitter: &Fitter, first_of_session: usize) -> Pace {
@@ -114,7 +47,7 @@ fn pace_of(fitter: &Fitter, first_of_session: usize) -> Pace {
 }
 
 impl Worker {
-    fn run(mut self, mut prepared: Prepared) -> Result<()> {
+    pub(super) fn run(mut self, mut prepared: Prepared) -> Result<()> {
         // Nothing is lost yet: a folder that cannot be written is an error here, and a warning from now on.
         let steps_done = self.fitter.state().step;
         if steps_done == 0 {
@@ -232,13 +165,16 @@ impl Worker {
             // Nothing is known of what comes after where no step was done before.
             let seconds_left =
                 underway.seconds_left + if seconds_after_next.is_finite() { seconds_after_next } else { 0.0 };
-            teller.send(Event::WithinStep(StepTime { seconds, seconds_left, finishing_seconds }));
+            let step_seconds_left = underway.seconds_left;
+            let time = StepTime { seconds, step_seconds_left, seconds_left, finishing_seconds };
+            teller.send(Event::WithinStep(time));
             if is_limited && underway.is_reached {
                 *reached = Some(underway.reached());
             }
             let Some(before) = snapshot.last().filter(|_| snapshot.is_seen()) else { return };
             if last_snapshot.elapsed() > SNAPSHOT_INTERVAL {
-                let (maps, environment) = (Arc::new(underway.maps()), Arc::new(underway.environment()));
+                let (maps, environment) = underway.shown();
+                let (maps, environment) = (Arc::new(maps), Arc::new(environment));
                 snapshot.put(Snapshot { maps, environment, ..(*before).clone() });
                 teller.wake();
                 (last_snapshot, was_shown) = (Instant::now(), true);

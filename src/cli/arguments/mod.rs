@@ -37,7 +37,7 @@ pub enum Task {
     /// Fit diffuse, specular and roughness maps and the environment to a scene's photos.
     #[command(after_help = "Expert settings are shown by --help; what is minimised, by `patina guide objective`.")]
     Fit(Box<FitOptions>),
-    /// Resume an interrupted run; the result equals that of an uninterrupted run bit for bit.
+    /// Resume an interrupted run; on the same kind of processor the result is bit-identical to an uninterrupted run.
     Resume(ResumeOptions),
     /// Render a run under other environments.
     Relight(RelightOptions),

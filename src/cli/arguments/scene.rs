@@ -123,8 +123,7 @@ impl ReadOptions {
 /// Options of `patina check`.
 #[derive(Debug, Args)]
 pub struct CheckOptions {
-    /// The scene: a folder with photos, cameras and a mesh (COLMAP, transforms.json, Metashape, BlendedMVS, exchange) or a
-    /// `scene.toml`.
+    /// The scene: a folder with photos, cameras and a mesh in any format of `patina guide file-formats`, or a `scene.toml`.
     pub scene: PathBuf,
     /// Folder for the photos with mesh outlines; none are drawn without it.
     #[arg(short, long)]
@@ -137,8 +136,7 @@ pub struct CheckOptions {
 /// Options of `patina fit`.
 #[derive(Debug, Args)]
 pub struct FitOptions {
-    /// The scene: a folder with photos, cameras and a mesh (COLMAP, transforms.json, Metashape, BlendedMVS, exchange) or a
-    /// `scene.toml`.
+    /// The scene: a folder with photos, cameras and a mesh in any format of `patina guide file-formats`, or a `scene.toml`.
     pub scene: PathBuf,
     /// How the scene is read.
     #[command(flatten)]

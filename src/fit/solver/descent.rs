@@ -14,9 +14,9 @@ use super::light_evidence::EvidenceShares;
 use super::light_scale::LightScale;
 use super::neighbours::Neighbours;
 use super::objective::{Learned, Objective};
+use super::photo_gains::log_gains;
 use super::pixel_system::{Lanes, PixelSystem, Rows};
 use super::pixels::Pixels;
-use super::refine::log_gains;
 use super::report::ErrorSums;
 use super::scene::SolverScene;
 use super::sight::{Lit, Sight, Slopes, lanes_of};
@@ -193,7 +193,7 @@ impl Descent<'_> {
         let gains = place.learned.as_ref().map_or(&[][..], |learned| &learned.gains);
         let mut seen = |share: f64, light: &[[f32; 3]]| {
             let showing = Showing { light, ..self.showing(shown, gains) };
-            trace.within_step(share, &showing, || place.texels.clone());
+            trace.within_step(share, &showing, &|| place.texels.clone());
         };
         let found = self.scene.light_again(here, self.stop, &mut seen)?;
         (self.light, self.light_shares) = found;
@@ -261,7 +261,7 @@ impl Descent<'_> {
             let weight_of_iterations = if moves_widths { 0.5 } else { 0.8 } * step.weight();
             let mut ahead = |done: usize, way: &[Lanes]| {
                 let weight = weight_of_iterations * done as f64 / step.iterations as f64;
-                trace.within_step(weight, &showing, || stepped(&texels, way, 1.0, most));
+                trace.within_step(weight, &showing, &|| stepped(&texels, way, 1.0, most));
             };
             let way = conjugate_gradients(&mut self.system, equations, &parabola, *step, self.stop, &mut ahead)?;
             let after_it = steps.get(number + 1).map_or(Slopes::OfReflectances, |next| next.slopes);

@@ -64,7 +64,9 @@ impl SolverScene {
             let (light, known) = self.solve_light(&equations, &surface, &shape, held, &estimate, stop)?;
             estimate.light = light;
             estimate.light_known.shares = known.shares;
-            seen((number + 1 - rounds) as f64 / ROUNDS as f64, &estimate.light);
+            let mut light = estimate.light.clone();
+            self.fill_holes(&mut light);
+            seen((number + 1 - rounds) as f64 / ROUNDS as f64, &light);
         }
         self.fill_holes(&mut estimate.light);
         Some((estimate.light, estimate.light_known.shares))

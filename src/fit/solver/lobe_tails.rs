@@ -18,12 +18,12 @@ const STEP: f64 = 0.1;
 /// Determinants smaller than this, relative, do not tell diffuse reflectance from F0.
 const LEAST_DETERMINANT: f64 = 1e-6;
 /// From this share on lobes have tails. This and the next two were chosen so that no scene of the model's own lobes is told of,
-/// however small its photos, and about half of those with GGX are; large photos tell the two apart by far.
-const LEAST_SHARE: f64 = 0.2;
+/// however small its photos, and about half of the small ones with GGX are.
+const LEAST_SHARE: f64 = 0.14;
 /// And from so many standard errors on,
-const LEAST_ERRORS: f64 = 2.3;
+const LEAST_ERRORS: f64 = 1.45;
 /// where the error is at most this: what is less sure has hardly seen a lobe that may have a tail.
-const MOST_ERROR: f64 = 0.25;
+const MOST_ERROR: f64 = 0.15;
 /// Fewer views do not tell how they differ.
 const LEAST_VIEWS: usize = 4;
 
@@ -37,7 +37,7 @@ pub struct LobeTails {
 }
 
 impl LobeTails {
-    /// Whether lobes have tails, beyond doubt and enough to matter.
+    /// Whether lobes have tails, as far as scenes of the model's own lobes tell, and enough to matter.
     pub fn are_there(&self) -> bool {
         self.share >= LEAST_SHARE && self.share >= LEAST_ERRORS * self.error && self.error <= MOST_ERROR
     }

@@ -12,17 +12,19 @@ use super::report::{ErrorSums, StepReport};
 use super::round::{BlockWork, Round, open_prior};
 use super::scene::SolverScene;
 use super::tile::{TILE, Tile};
-use super::way::{OnTheWay, Watch};
+use super::way::{Look, OnTheWay, Watch};
 use crate::material::Material;
 use crate::math::parallel;
 use crate::math::statistics::median;
+use std::borrow::Cow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// Most observations of a block.
 const MOST_OBSERVATIONS: usize = 256;
-/// Tiles that are solved before what they leave is put together, so that few wait.
-const TILES_AT_ONCE: usize = 32;
+/// Tiles that are solved before what they leave is put together, so that who watches sees them come; of each processor at
+/// least so many, so that few wait.
+const TILES_AT_ONCE: (usize, usize) = (32, 8);
 
 /// What a tile leaves.
 struct TileResult {
@@ -50,8 +52,12 @@ impl SolverScene {
         let mut made: Vec<Tile> = Vec::new();
         let mut tails = TailSums::new(self.views.len());
         let tiles = self.tiles();
-        let mut seen = estimate.texels.clone();
-        for group in tiles.chunks(TILES_AT_ONCE) {
+        let work =
+            |blocks: &[&Block]| -> usize { blocks.iter().map(|block| block.observations.min(MOST_OBSERVATIONS)).sum() };
+        let whole = tiles.iter().map(|(_, blocks)| work(blocks)).sum::<usize>().max(1) as f64;
+        let mut done = 0;
+        let (least, of_processor) = TILES_AT_ONCE;
+        for group in tiles.chunks(least.max(of_processor * rayon::current_num_threads())) {
             let results = parallel::map_items(group, |(first, blocks)| {
                 self.solve_tile(&round, *first, blocks, &prior, check.as_ref(), stop)
             });
@@ -65,12 +71,17 @@ impl SolverScene {
                 if let (Some(check), Some(alternatives)) = (&mut check, result.alternatives) {
                     check.add(&alternatives, result.block_seconds, result.tile.seconds);
                 }
-                result.tile.materials().for_each(|(texel, own)| seen[texel] = own);
                 made.push(result.tile);
             }
+            done += group.iter().map(|(_, blocks)| work(blocks)).sum::<usize>();
+            let look = || {
+                let mut texels = estimate.texels.clone();
+                made.iter().flat_map(materials).for_each(|(texel, own)| texels[texel] = own);
+                Look { texels: Cow::Owned(texels), light: Cow::Borrowed(&estimate.light) }
+            };
             // What judges choices and fills the gaps comes after.
-            let share = 0.95 * made.len() as f64 / tiles.len() as f64;
-            watch(OnTheWay { texels: &seen, light: &estimate.light, gains: &[], share, is_reached: false });
+            let share = 0.95 * (done as f64 / whole).max(1e-3);
+            watch(OnTheWay { look: &look, gains: &[], share, is_reached: false });
         }
         let choices = match check {
             Some(check) => Some(check.end(self, estimate, (&planes, &at_points), stop)?),
@@ -78,7 +89,7 @@ impl SolverScene {
         };
         estimate.variances.fill(TexelVariance::default());
         for tile in &made {
-            for (index, (texel, own)) in tile.materials().enumerate() {
+            for (index, (texel, own)) in materials(tile).enumerate() {
                 let lobe = &tile.lobes[index];
                 let [r, g, b, log_width] = lobe.square.map(|value| value as f32);
                 let variance = Material { diffuse: tile.variance[index], specular: [r, g, b], log_width };
@@ -150,4 +161,12 @@ impl SolverScene {
     pub(super) fn fill_from_neighbours(&self, estimate: &mut Estimate) {
         fill_from_solved(&mut estimate.texels, &estimate.variances, self.settings.map_size);
     }
+}
+
+/// The texels of a tile on the maps, with what was found of each.
+fn materials(tile: &Tile) -> impl Iterator<Item = (usize, Material<f32>)> + '_ {
+    tile.texels.iter().zip(tile.rho.iter().zip(&tile.lobes)).map(|(&texel, (&diffuse, lobe))| {
+        let specular = [0, 1, 2].map(|c| (lobe.mean[c] as f32).clamp(0.0, 1.0));
+        (texel as usize, Material { diffuse, specular, log_width: lobe.mean[3].min(0.0) as f32 })
+    })
 }

@@ -6,7 +6,7 @@
 //!    blocks of texels. [`estimate`]: what does change.
 //! 2. [`block`] (with `cell_sums`): under a known light, the reflectances of a block in closed form and its lobe's width by
 //!    looking at all.
-//! 3. [`round`]: a block's rows over the light; [`eliminate`] takes the block's own unknowns out of them, so that what is
+//! 3. [`round`] solves a block, `light_rows` are its rows over the light; [`eliminate`] takes the block's own unknowns out of them, so that what is
 //!    left is the Schur complement of the joint Gauss-Newton system; [`coupling`] takes out the reflectances of all blocks
 //!    together, with what neighbours are believed to have in common. `light_reach` is what light sends to a pixel,
 //!    `given_maps` does all of this for reflectances that are given.
@@ -18,7 +18,7 @@
 //! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`) with the footprints of pixels, where the evidence,
 //!    as far as it is independent (`tile_independence`), decides which texels share a lobe ([`lobe_tree`],
 //!    [`lobe_evidence`], [`lobe_prior`], [`lobe_sums`], [`lobe_widths`], [`lobe_families`]).
-//!    Then `refine`: [`descent`], step by step ([`way`]), of the one [`objective`] over all texels (`conjugate_gradients`), by what whole [`pixels`] see
+//!    Then `refine`: [`descent`], step by step ([`way`]), of the one [`objective`] over all texels (`conjugate_gradients`), by what whole [`pixels`], [`edges`] among them, see
 //!    (`sight`, `pixel_system`), with what `neighbours` have in common and the `texture_scale` that predicts photos that took
 //!    no part best; from the lobes that were found, or those of one dielectric where that explains pixels as well (`second_start`, `agreement`), under
 //!    the light that these maps say (`light_again`).
@@ -38,6 +38,7 @@ pub mod choice;
 mod conjugate_gradients;
 pub mod coupling;
 pub mod descent;
+pub mod edges;
 pub mod eliminate;
 pub mod estimate;
 mod first_maps;
@@ -49,6 +50,7 @@ pub mod light_evidence;
 mod light_holes;
 mod light_reach;
 pub mod light_round;
+mod light_rows;
 mod light_scale;
 pub mod light_shape;
 pub mod light_step;

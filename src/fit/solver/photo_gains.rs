@@ -59,6 +59,11 @@ pub fn gains(views: &[GainSums]) -> Vec<[f32; 3]> {
     gains
 }
 
+/// Logarithms of views' gains, which have one for each channel.
+pub(in crate::fit) fn log_gains(gains: &[[f32; 3]]) -> Vec<f32> {
+    gains.iter().map(|gain| gain.iter().map(|gain| gain.ln()).sum::<f32>() / 3.0).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

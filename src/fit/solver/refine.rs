@@ -5,6 +5,7 @@
 
 use super::descent::Descended;
 use super::estimate::{Estimate, START_TEXEL, TexelVariance};
+use super::photo_gains::log_gains;
 use super::report::StepReport;
 use super::scene::SolverScene;
 use super::sight::Lit;
@@ -75,11 +76,6 @@ impl SolverScene {
             ..StepReport::default()
         })
     }
-}
-
-/// Logarithms of views' gains, which have one for each channel.
-pub(in crate::fit) fn log_gains(gains: &[[f32; 3]]) -> Vec<f32> {
-    gains.iter().map(|gain| gain.iter().map(|gain| gain.ln()).sum::<f32>() / 3.0).collect()
 }
 
 #[cfg(all(test, feature = "cli"))]
@@ -207,7 +203,8 @@ pub(super) mod tests {
             let report = scene.refine(estimate, &never, &mut |way| {
                 shares.push(way.share);
                 if way.is_reached {
-                    seen.push((way.texels.to_vec(), way.light.to_vec()));
+                    let look = (way.look)();
+                    seen.push((look.texels.to_vec(), look.light.to_vec()));
                 }
             });
             assert!(shares.is_sorted() && shares[0] > 0.0 && shares.last() == Some(&1.0), "{shares:?}");

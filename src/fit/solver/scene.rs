@@ -1,7 +1,7 @@
 //! A scene made ready for the solver: all that follows from photos, geometry and settings and never changes in a fit.
 
+use super::edges::EdgeView;
 use super::observations::{Observation, Observations, of_view};
-use super::pixels::EdgeView;
 use super::plan::{self, Block};
 use super::settings::SolverSettings;
 use super::sieve::Sieve;

@@ -10,7 +10,6 @@ use super::lobe_prior::LobePrior;
 use super::lobe_tree::LobeSharing;
 use super::pixel_terms::PixelTerms;
 use super::round::{BlockWork, Round};
-use crate::material::Material;
 use std::ops::Range;
 
 /// Texels along a tile's side.
@@ -192,14 +191,6 @@ impl Tile {
     pub(super) fn end(&mut self) {
         self.set_lobes();
         self.solve_diffuse();
-    }
-
-    /// Its texels of the maps, with what was found of each.
-    pub(super) fn materials(&self) -> impl Iterator<Item = (usize, Material<f32>)> + '_ {
-        self.texels.iter().zip(self.rho.iter().zip(&self.lobes)).map(|(&texel, (&diffuse, lobe))| {
-            let specular = [0, 1, 2].map(|c| (lobe.mean[c] as f32).clamp(0.0, 1.0));
-            (texel as usize, Material { diffuse, specular, log_width: lobe.mean[3].min(0.0) as f32 })
-        })
     }
 
     /// Squared residuals of the pixels that count, mean over channels, with their views.

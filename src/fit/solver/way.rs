@@ -1,4 +1,5 @@
-//! The steps of a [descent](super::descent), what they leave behind, and how far a descent is by its seconds.
+//! Where a step of the solver is that takes long, for who watches; the steps of a [descent](super::descent), what they leave
+//! behind, and how far a descent is by its seconds.
 
 use super::light_scale::LightScale;
 use super::objective::Objective;
@@ -6,6 +7,7 @@ use super::scene::SolverScene;
 use super::sight::Slopes;
 use crate::material::Material;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
 /// Something is shown as often as this, at most, of what is between two steps.
@@ -38,10 +40,8 @@ pub(super) fn weight_of(steps: &[Step]) -> f64 {
 
 /// Where a step of the solver is that takes long: a descent, or maps that are made tile by tile.
 pub struct OnTheWay<'a> {
-    /// The texels, diffuse reflectances at most 1.
-    pub texels: &'a [Material<f32>],
-    /// Radiance of the light's texels.
-    pub light: &'a [[f32; 3]],
+    /// Makes what there is to see, which takes a while: only who looks at it asks for it.
+    pub look: &'a dyn Fn() -> Look<'a>,
     /// Gain of each view and channel; empty where they do not move.
     pub gains: &'a [[f32; 3]],
     /// Share of the whole way by its seconds, in (0, 1]; what comes after it is short.
@@ -50,7 +50,15 @@ pub struct OnTheWay<'a> {
     pub is_reached: bool,
 }
 
-/// Hears of each step of a descent that is gone on from, and now and then of what is between.
+/// Maps and light on the way.
+pub struct Look<'a> {
+    /// The texels, diffuse reflectances at most 1.
+    pub texels: Cow<'a, [Material<f32>]>,
+    /// Radiance of the light's texels.
+    pub light: Cow<'a, [[f32; 3]]>,
+}
+
+/// Hears of each step of a descent that is gone on from, now and then of what is between, and of tiles as maps are made.
 pub type Watch<'a> = dyn FnMut(OnTheWay) + 'a;
 
 /// A part of a way.
@@ -124,29 +132,37 @@ impl<'a> Trace<'a> {
         if !self.is_trial {
             self.steps.push(objective);
         }
-        self.show(showing, texels, self.part.share(0.0), !self.is_trial);
+        self.show(showing, &|| Cow::Borrowed(texels), self.part.share(0.0), !self.is_trial);
     }
 
     /// Within a step, of whose weight so much is done: shows what `texels` makes, unless something was shown just before.
-    pub(super) fn within_step(&mut self, weight: f64, showing: &Showing, texels: impl FnOnce() -> Vec<Material<f32>>) {
-        if self.watch.is_some() && self.shown.elapsed() > SHOWN_EVERY {
-            self.show(showing, &texels(), self.part.share(weight), false);
+    pub(super) fn within_step(&mut self, weight: f64, showing: &Showing, texels: &dyn Fn() -> Vec<Material<f32>>) {
+        if self.shown.elapsed() > SHOWN_EVERY {
+            self.show(showing, &|| Cow::Owned(texels()), self.part.share(weight), false);
         }
     }
 
     /// While reflectances may go beyond 1, who watches sees them as they would be if the way ended here: under a light that
     /// is raised.
-    fn show(&mut self, showing: &Showing, texels: &[Material<f32>], share: f64, is_reached: bool) {
+    fn show<'b>(
+        &mut self,
+        showing: &'b Showing,
+        texels: &'b dyn Fn() -> Cow<'b, [Material<f32>]>,
+        share: f64,
+        is_reached: bool,
+    ) {
         let Some(watch) = &mut self.watch else { return };
-        let &Showing { scene, light, gains, .. } = showing;
         self.shown = Instant::now();
-        if showing.most_diffuse <= 1.0 {
-            return watch(OnTheWay { texels, light, gains, share, is_reached });
-        }
-        let scale = LightScale::told_by(texels, showing.shown);
-        let light = scale.of_light(light, &scene.told_by_background());
-        let texels: Vec<Material<f32>> = texels.par_iter().map(|texel| scale.under(texel)).collect();
-        watch(OnTheWay { texels: &texels, light: &light, gains, share, is_reached });
+        let look = || {
+            let (texels, light) = (texels(), showing.light);
+            if showing.most_diffuse <= 1.0 {
+                return Look { texels, light: Cow::Borrowed(light) };
+            }
+            let scale = LightScale::told_by(&texels, showing.shown);
+            let light = scale.of_light(light, &showing.scene.told_by_background());
+            Look { texels: texels.par_iter().map(|texel| scale.under(texel)).collect(), light: Cow::Owned(light) }
+        };
+        watch(OnTheWay { look: &look, gains: showing.gains, share, is_reached });
     }
 }
 

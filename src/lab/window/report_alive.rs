@@ -38,20 +38,22 @@ impl BenchReport {
         if self.starting.is_empty() {
             return;
         }
-        text.push_str("## From Start to the report\n\n| scene | fitted | first maps [s] | longest wait [s] | maps | report [s] | time left off, median [%] | most [%] | bar went back |\n");
-        text.push_str("| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n");
+        text.push_str("## From Start to the report\n\n| scene | fitted | first maps [s] | longest wait [s] | from [s] | maps | report [s] | time left off, median [%] | most [%] | at [%] | bar went back |\n");
+        text.push_str("| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n");
         for row in &self.starting {
             let _ = writeln!(
                 text,
-                "| {} | {} | {:.2} | {:.2} | {} | {:.1} | {:.0} | {:.0} | {} |",
+                "| {} | {} | {:.2} | {:.2} | {:.1} | {} | {:.1} | {:.0} | {:.0} | {:.0} | {} |",
                 row.scene,
                 times(row.is_again),
                 row.first_maps,
                 row.longest_wait,
+                row.longest_wait_from,
                 row.maps,
                 row.whole,
                 100.0 * row.left_error,
                 100.0 * row.left_error_most,
+                100.0 * row.left_error_most_at,
                 row.backwards
             );
         }

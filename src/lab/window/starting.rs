@@ -42,6 +42,10 @@ pub struct StartingRow {
     pub left_error: f64,
     /// The same, the largest.
     pub left_error_most: f64,
+    /// The share of the whole time at which it was that.
+    pub left_error_most_at: f64,
+    /// Seconds from Start at which the longest wait began.
+    pub longest_wait_from: f64,
     /// How often the bar went back.
     pub backwards: usize,
 }
@@ -119,36 +123,44 @@ fn watched(path: Option<&Path>, folder: &Path) -> Result<(StartingRow, PathBuf)>
     // What was learned is there for the next fit.
     model.write_preferences();
     let run = model.fit.folder.as_ref().map(|folder| folder.path().to_path_buf()).unwrap_or_default();
-    let (left_error, left_error_most) = left_errors(&notes, whole);
+    let (left_error, (left_error_most, left_error_most_at)) = left_errors(&notes, whole);
+    let (longest_wait, longest_wait_from) = longest_wait(&pictures, steps_end.unwrap_or(whole));
     let row = StartingRow {
         first_maps: pictures.first().copied().unwrap_or(f64::NAN),
-        longest_wait: longest_wait(&pictures, steps_end.unwrap_or(whole)),
+        longest_wait,
+        longest_wait_from,
         maps: pictures.len(),
         whole,
         left_error,
         left_error_most,
+        left_error_most_at,
         backwards: notes.windows(2).filter(|pair| pair[1].share < pair[0].share).count(),
         ..StartingRow::default()
     };
     Ok((row, run))
 }
 
-/// The longest time without a picture, from 0 to `end`.
-fn longest_wait(pictures: &[f64], end: f64) -> f64 {
+/// The longest time without a picture, from 0 to `end`, and when it began.
+fn longest_wait(pictures: &[f64], end: f64) -> (f64, f64) {
     let times: Vec<f64> = [0.0].into_iter().chain(pictures.iter().map(|&at| at.min(end))).chain([end]).collect();
-    times.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max)
+    let longer =
+        |most: (f64, f64), pair: &[f64]| if pair[1] - pair[0] > most.0 { (pair[1] - pair[0], pair[0]) } else { most };
+    times.windows(2).fold((0.0, 0.0), longer)
 }
 
-/// Median and largest error of the time left, relative to it. A time that is not told counts as wholly wrong.
-fn left_errors(notes: &[Note], whole: f64) -> (f64, f64) {
+/// Median and largest error of the time left, relative to it, the latter with the share of the whole time at which it was. A time
+/// that is not told counts as wholly wrong.
+fn left_errors(notes: &[Note], whole: f64) -> (f64, (f64, f64)) {
     let judged = notes.iter().filter(|note| (JUDGED.0 * whole..=JUDGED.1 * whole).contains(&note.seconds));
-    let errors: Vec<f64> = judged
+    let (errors, at): (Vec<f64>, Vec<f64>) = judged
         .map(|note| {
             let left = whole - note.seconds;
-            note.left.map_or(1.0, |told| (told - left).abs() / left)
+            (note.left.map_or(1.0, |told| (told - left).abs() / left), note.seconds / whole)
         })
-        .collect();
-    (quantile(&errors, 0.5), errors.iter().copied().fold(f64::NAN, f64::max))
+        .unzip();
+    let most =
+        errors.iter().copied().zip(at).fold((f64::NAN, f64::NAN), |most, own| if own.0 <= most.0 { most } else { own });
+    (quantile(&errors, 0.5), most)
 }
 
 #[cfg(test)]
@@ -157,18 +169,18 @@ mod tests {
 
     #[test]
     fn waits_reach_from_start_to_the_last_step() {
-        assert_eq!(longest_wait(&[3.0, 4.0, 9.0], 10.0), 5.0);
-        assert_eq!(longest_wait(&[7.0, 8.0], 9.0), 7.0);
-        assert_eq!(longest_wait(&[1.0], 9.0), 8.0);
-        assert_eq!(longest_wait(&[1.0, 12.0], 2.0), 1.0, "after the last step nothing is waited for");
+        assert_eq!(longest_wait(&[3.0, 4.0, 9.0], 10.0), (5.0, 4.0));
+        assert_eq!(longest_wait(&[7.0, 8.0], 9.0), (7.0, 0.0));
+        assert_eq!(longest_wait(&[1.0], 9.0), (8.0, 1.0));
+        assert_eq!(longest_wait(&[1.0, 12.0], 2.0), (1.0, 0.0), "after the last step nothing is waited for");
     }
 
     #[test]
     fn the_time_left_is_judged_from_a_quarter_on() {
         let note = |seconds, left| Note { seconds, share: 0.0, left };
         let notes = [note(10.0, Some(900.0)), note(30.0, Some(77.0)), note(50.0, Some(60.0)), note(95.0, Some(50.0))];
-        let (median, most) = left_errors(&notes, 100.0);
+        let (median, (most, _)) = left_errors(&notes, 100.0);
         assert!((median - 0.15).abs() < 1e-9 && (most - 0.2).abs() < 1e-9, "{median} {most}");
-        assert_eq!(left_errors(&[note(50.0, None)], 100.0).1, 1.0);
+        assert_eq!(left_errors(&[note(50.0, None)], 100.0).1, (1.0, 0.5));
     }
 }

@@ -19,8 +19,8 @@ pub enum LightPriorKind {
     /// An untrained net (Chen, Nobuhara and Nishino 2020).
     #[default]
     Deep,
-    /// Steps between neighbours are few and sparse (Lombardi and Nishino 2016). Results that were held by few radiances
-    /// beside, which bought nothing, are read as of this one.
+    // Results of the entropy prior, which is gone, are read as of this one.
+    /// Sparse gradients (Lombardi and Nishino 2016).
     #[serde(alias = "entropy")]
     #[cfg_attr(feature = "cli", value(alias = "entropy"))]
     Gradient,

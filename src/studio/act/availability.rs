@@ -86,7 +86,7 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
         Act::PauseOrGoOn => {
             need(matches!(status, FitStatus::Running | FitStatus::Pausing | FitStatus::Paused), "no fit is running")
         }
-        Act::Stop if model.start_is_queued => Ok(()),
+        Act::Stop if model.start_is_queued || model.tasks.is_running(&TaskKind::Starting) => Ok(()),
         Act::Stop => need(status.is_live() && *status != FitStatus::Stopping, "no fit is running"),
         Act::StepOnce => need(*status == FitStatus::Paused, "pause the fit first"),
         Act::Checkpoint => need(matches!(status, FitStatus::Running | FitStatus::Paused), "no fit is running"),

@@ -119,7 +119,7 @@ pub const LIST: &[ActInfo] = &[
     info(Act::LayerLit, Group::View, "Shaded", "Show the surface under the chosen environment.", key(Key::Num1)),
     info(Act::LayerDiffuse, Group::View, "Diffuse", "Show the diffuse reflectance.", key(Key::Num2)),
     info(Act::LayerSpecular, Group::View, "Specular", "Show the specular reflectance F0.", key(Key::Num3)),
-    info(Act::LayerRoughness, Group::View, "Roughness", "Show the roughness r, the square of the microfacet width.", key(Key::Num4)),
+    info(Act::LayerRoughness, Group::View, "Roughness", "Show the perceptual roughness, the square root of the microfacet width.", key(Key::Num4)),
     info(Act::LayerNormal, Group::View, "Surface normal", "Show the surface normal.", key(Key::Num5)),
     info(Act::LayerPhotoError, Group::View, "Residual", "Show the root mean square residual over the photos that see each texel.", key(Key::Num6)),
     info(Act::LayerTimesSeen, Group::View, "View count", "Show how many photos see each texel.", key(Key::Num7)),

@@ -4,14 +4,21 @@
 use super::tasks::TaskKind;
 use super::{Done, Model};
 use crate::error::{Error, ErrorKind};
+use crate::fit::FitSettings;
 use crate::insight::projected_photos::{ProjectedPhotos, WeightedColour};
 use crate::job::relit;
 use crate::material::MaterialMaps;
 use crate::render::Surface;
-use crate::render::cached::CachedTransport;
+use crate::render::cached::{CachedSettings, CachedTransport};
 use crate::scene::Mesh;
 use crate::studio::stage::{CoveredTexels, Layer};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::Duration;
+
+/// How often who waits for a cache looks whether to give up.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(20);
 
 /// The photos on the surface.
 #[derive(Clone)]
@@ -36,6 +43,32 @@ impl CachedOf {
     /// The cache.
     pub fn transport(&self) -> Arc<CachedTransport> {
         Arc::clone(&self.transport)
+    }
+}
+
+/// A cache that is being traced, for a fit that begins meanwhile: it would trace the same.
+pub struct BeingCached {
+    surface: Arc<Surface>,
+    settings: CachedSettings,
+    made: Receiver<Arc<CachedTransport>>,
+}
+
+impl BeingCached {
+    /// Whether a fit of this surface with such settings begins with it.
+    pub(super) fn is_first_of(&self, surface: &Arc<Surface>, fit: &FitSettings) -> bool {
+        Arc::ptr_eq(&self.surface, surface) && relit::is_first_cache(&self.settings, fit)
+    }
+
+    /// Waits for it. `None` when `stop` was raised, or who traces it gave up.
+    pub(super) fn wait(self, stop: &AtomicBool) -> Option<Arc<CachedTransport>> {
+        while !stop.load(Ordering::Relaxed) {
+            match self.made.recv_timeout(BETWEEN_LOOKS) {
+                Ok(made) => return Some(made),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return None,
+            }
+        }
+        None
     }
 }
 
@@ -90,15 +123,20 @@ impl Model {
             return;
         }
         let kept = self.kept.clone();
+        let (made, for_a_fit) = channel();
+        self.being_cached = Some(BeingCached { surface: Arc::clone(&surface), settings: wanted, made: for_a_fit });
         self.tasks.spawn(TaskKind::CachingTransport, move |context| {
             let transport = relit::transport_of(&surface, wanted, &kept, &context.stop);
             let stopped = || Error::new(ErrorKind::Stopped, "stopped while light transport was cached");
             let transport = Arc::new(transport.ok_or_else(stopped)?);
+            // Mostly no fit waits for it.
+            let _ = made.send(Arc::clone(&transport));
             Ok(Done::TransportCached(Box::new(CachedOf { surface, transport })))
         });
     }
 
     pub(super) fn transport_was_cached(&mut self, cached: CachedOf) {
+        self.being_cached = None;
         let Some(project) = &mut self.project else { return };
         if project.surface.as_ref().is_some_and(|own| Arc::ptr_eq(own, &cached.surface)) {
             project.transport = Some(Arc::new(cached));
@@ -112,5 +150,44 @@ impl Model {
     pub fn shown_layer(&self) -> Layer {
         let is_blank = self.project.as_ref().is_some_and(|own| own.maps.is_none() && own.laid.is_some());
         if self.edits.layer == Layer::Lit && is_blank { Layer::Photos } else { self.edits.layer }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::fit::Method;
+    use glam::{Vec2, Vec3};
+
+    #[test]
+    fn a_wait_for_a_cache_ends_with_who_traces_it_and_with_who_waits() {
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+        let (normals, uvs) = (vec![Vec3::Z; 3], vec![Vec2::ZERO, Vec2::X, Vec2::Y]);
+        let mesh = Mesh { positions, normals, uvs, triangles: vec![[0, 1, 2]] };
+        let of_mesh = |mesh: &Mesh| Arc::new(Surface::new(mesh.clone()).unwrap());
+        let surface = of_mesh(&mesh);
+        let fit = FitSettings { method: Method::Solver, ..FitSettings::default() };
+        let being = |settings: CachedSettings| {
+            let (made, for_a_fit) = channel();
+            (made, BeingCached { surface: Arc::clone(&surface), settings, made: for_a_fit })
+        };
+        let first = relit::settings_beside(&fit, fit.bounces);
+        let (made, own) = being(first);
+        let other = of_mesh(&mesh);
+        assert!(own.is_first_of(&surface, &fit) && !own.is_first_of(&other, &fit));
+        assert!(!own.is_first_of(&surface, &FitSettings { bounces: fit.bounces + 1, ..fit.clone() }));
+        let adam = FitSettings { method: Method::Adam, ..fit.clone() };
+        assert!(!own.is_first_of(&surface, &adam), "Adam needs none");
+        drop(made);
+        assert!(own.wait(&AtomicBool::new(false)).is_none(), "who traces it gave up");
+        let (_made, own) = being(first);
+        assert!(own.wait(&AtomicBool::new(true)).is_none(), "who waits was stopped");
+        let (made, own) = being(first);
+        let small = CachedSettings { grid: 8, bounce_rays: 16, ..first };
+        let transport = Arc::new(CachedTransport::build(&surface, small, (16, 8), &AtomicBool::new(false)).unwrap());
+        made.send(Arc::clone(&transport)).unwrap();
+        drop(made);
+        assert!(Arc::ptr_eq(&own.wait(&AtomicBool::new(false)).unwrap(), &transport));
     }
 }

@@ -139,6 +139,8 @@ pub struct Model {
     pub card: bool,
     /// Whether the fit starts by itself once the scene is prepared.
     pub start_is_queued: bool,
+    /// The cache that is being traced, until a fit waits for it or it is there.
+    being_cached: Option<laid::BeingCached>,
     /// What is remembered.
     pub preferences: Preferences,
     /// Where it is remembered.
@@ -219,6 +221,7 @@ impl Model {
             exported: None,
             card: false,
             start_is_queued: false,
+            being_cached: None,
             preferences,
             kept: store.kept(),
             store,

@@ -103,7 +103,7 @@ impl Model {
     /// Goes back to the first page. A fit in progress is stopped; its checkpoint keeps what was done.
     pub fn close(&mut self) {
         self.tasks.stop_those_of_scene();
-        self.start_is_queued = false;
+        (self.start_is_queued, self.being_cached) = (false, None);
         (self.card, self.exported, self.other_run) = (false, None, None);
         self.log.scene_was_closed();
         self.fit.forget();

@@ -1,5 +1,6 @@
 //! From a project to a fit, and settings that change on the way.
 
+use super::laid::BeingCached;
 use super::tasks::TaskKind;
 use super::{Done, FitStatus, Model, store};
 use crate::error::Result;
@@ -71,7 +72,11 @@ impl Model {
         // The atlas keeps its charts apart at the size it was made for; other map sizes need another atlas.
         let same_atlas = project.settings.fit.map_size == settings.fit.map_size || project.is_run;
         let (options, kept) = (self.job_options(), self.kept.clone());
-        let cached = project.transport.clone();
+        let cached = project.transport.clone().filter(|own| Arc::ptr_eq(&own.surface, &surface));
+        let cached = cached.map(|own| own.transport());
+        // Two that trace the same beside each other are twice as slow.
+        let is_first = |own: &BeingCached| same_atlas && own.is_first_of(&surface, &settings.fit);
+        let being_cached = self.being_cached.take_if(|own| cached.is_none() && is_first(own));
         self.tasks.spawn(TaskKind::Starting, move |context| {
             let folder = RunFolder::create(&path)?;
             let tell = |stage: OpenStage, share: f32| context.tell(stage.label(), share);
@@ -80,9 +85,14 @@ impl Model {
                 false => prepare_with(scene, findings, &settings, timings, &kept, &context.stop, &tell)?,
             };
             let (prepared, mut fitter, settings) = open::begin(prepared, settings, &context.stop, &tell)?;
-            if let Some(cached) = cached.filter(|own| Arc::ptr_eq(&own.surface, &prepared.surface)) {
-                fitter.take_transport(cached.transport());
+            let wait = || {
+                context.tell("Caching light transport", 0.9);
+                being_cached.and_then(|own| own.wait(&context.stop))
+            };
+            if let Some(transport) = cached.filter(|_| same_atlas).or_else(wait) {
+                fitter.take_transport(transport);
             }
+            context.check()?;
             let started = Started::new(prepared, fitter, settings, folder, options)?;
             Ok(Done::FitStarted(Box::new(started)))
         });
@@ -92,6 +102,10 @@ impl Model {
     pub fn stop_fit(&mut self) {
         if std::mem::take(&mut self.start_is_queued) {
             return self.log.note("The fit is no longer queued");
+        }
+        if self.tasks.is_running(&TaskKind::Starting) {
+            self.tasks.stop(&TaskKind::Starting);
+            return self.log.note("The fit does not start");
         }
         self.fit.stop();
     }

@@ -143,8 +143,11 @@ fn a_descent_that_is_stopped_leaves_what_it_had_reached_to_the_result_alone() {
     let before = fitter.state().clone();
     let (stop, mut seen) = (AtomicBool::new(false), Vec::new());
     let outcome = fitter.step_watched(&stop, &mut |underway| {
-        seen.push((underway.maps(), underway.reached()));
-        stop.store(true, Ordering::Relaxed);
+        // What is between two steps is only to be seen.
+        if underway.is_reached {
+            seen.push((underway.shown().0, underway.reached()));
+            stop.store(true, Ordering::Relaxed);
+        }
     });
     assert_eq!(outcome.unwrap(), StepOutcome::Interrupted);
     assert!(fitter.state().texels != before.texels, "maps of full size are what it begins with");

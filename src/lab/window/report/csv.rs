@@ -26,10 +26,12 @@ impl BenchReport {
             let mut own = |measure, unit, value| line("starting", &row.scene, case, measure, unit, value);
             own("first maps", "s", row.first_maps);
             own("longest wait", "s", row.longest_wait);
+            own("longest wait from", "s", row.longest_wait_from);
             own("maps", "", row.maps as f64);
             own("whole", "s", row.whole);
             own("time left off median", "", row.left_error);
             own("time left off most", "", row.left_error_most);
+            own("time left off most at", "", row.left_error_most_at);
             own("bar went back", "", row.backwards as f64);
         }
         for row in &self.stalls {
