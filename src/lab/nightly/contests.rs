@@ -64,8 +64,12 @@ pub fn without_mitsuba(folder: &Path, stop: &AtomicBool) -> Result<Outcome> {
             short.push(format!("{score}: truth {}, start {}", field(truth, score), field(start, score)));
         }
     }
-    if !(number(end, "image") > number(truth, "image")) || number(truth, "diffuse") != 0.0 {
-        short.push(format!("the fit ends at {}, the truth at {}", field(end, "image"), field(truth, "image")));
+    // On an idle machine enough steps are done to fit the noise of so small photos: those that took no part judge.
+    let is_between =
+        number(end, "image") < number(start, "image") && number(end, "held_out") > number(truth, "held_out");
+    if !is_between || number(truth, "diffuse") != 0.0 {
+        let of = |line| format!("{}, held out {}", field(line, "image"), field(line, "held_out"));
+        short.push(format!("the fit ends at {}; truth {}, start {}", of(end), of(truth), of(start)));
     }
     for file in ["contest-demo.svg", "contest-demo.csv", "demo/adam-1/snapshots.jsonl", "demo/start/env.exr"] {
         if !folder.join(file).is_file() {
