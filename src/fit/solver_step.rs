@@ -7,12 +7,14 @@
 use super::fitter::{Fitter, StepOutcome};
 use super::schedule::{Stage, StageKind};
 use super::settings::Method;
+use super::solver::first_look::FirstLook;
+use super::solver::observations::Observation;
 use super::solver::photo_gains::log_gains;
-use super::solver::way::OnTheWay;
+use super::solver::way::{Look, OnTheWay};
 use super::solver::{
     Choices, Estimate, SolverScene, SolverSettings, SolverStep, StepReport, TexelVariance, TransportError,
 };
-use super::stage_work::halved;
+use super::stage_work::{doubled, halved};
 use super::state::LossRow;
 use super::targets::targets;
 use super::underway::{Underway, WatchUnderway};
@@ -20,6 +22,7 @@ use crate::error::Result;
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::material::MaterialMaps;
 use glam::Vec3;
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -47,8 +50,11 @@ impl Fitter {
             // Photos and maps are other ones; what points of the surface see of each other and of the light is the same.
             let traced = self.solver.take().map(|solver| solver.transport).or_else(|| self.transport.take());
             let (scene, surface) = (&self.scene, &self.surface);
-            let targets = targets(scene, &self.training, stage.photo_level);
-            self.solver = SolverScene::build(scene, surface, targets, &self.held_out, settings, traced, stop)?;
+            let photos = (targets(scene, &self.training, stage.photo_level), &self.held_out[..]);
+            let mut seen = self.first_look(map_size, settings.light_size, watch);
+            let made = SolverScene::build(scene, surface, photos, settings, traced, stop, &mut seen)?;
+            drop(seen);
+            self.solver = made;
             self.solver_photo_level = stage.photo_level;
         }
         let Some(mut solver) = self.solver.take() else { return Ok(StepOutcome::Interrupted) };
@@ -66,7 +72,7 @@ impl Fitter {
         let way_began = Instant::now();
         let report = solver.step_watched(step, &mut estimate, stop, &mut |way: OnTheWay| {
             let OnTheWay { look, gains, share, is_reached } = way;
-            let seconds_left = way_began.elapsed().as_secs_f64() * (1.0 / share - 1.0);
+            let seconds_left = Some(way_began.elapsed().as_secs_f64() * (1.0 / share - 1.0));
             let log_gains = views.iter().copied().zip(log_gains(gains)).collect();
             watch(&Underway { look, map_size, light_size, seconds_left, log_gains, is_reached });
         });
@@ -93,6 +99,31 @@ impl Fitter {
         self.figures.keep_errors(&of_views);
         self.state.seconds += began.elapsed().as_secs_f64();
         Ok(StepOutcome::Stepped(self.note(stage, &report, held_out_rmse)))
+    }
+
+    /// What shows the photos of a level as they are being traced, on the maps that an earlier one has made.
+    fn first_look(
+        &self,
+        map_size: usize,
+        light_size: (usize, usize),
+        watch: &mut WatchUnderway,
+    ) -> impl FnMut(&[Observation]) {
+        let state = &self.state;
+        let has_maps = state.step > 0 && !self.settings.fixed_maps;
+        let mut shown = has_maps.then(|| {
+            let (mut texels, mut size) = (state.texels.clone(), state.map_size);
+            while size < map_size {
+                (texels, size) = (doubled(&texels, size), 2 * size);
+            }
+            FirstLook::at(texels, size)
+        });
+        move |pixels| {
+            let (Some(shown), Some(first)) = (&mut shown, pixels.first()) else { return };
+            shown.add(pixels, state.log_gains[self.training[first.view as usize]].exp());
+            let look = || Look { texels: Cow::Owned(shown.texels()), light: Cow::Borrowed(&state.light) };
+            let (look, log_gains) = (&look, Vec::new());
+            watch(&Underway { look, map_size, light_size, seconds_left: None, log_gains, is_reached: false });
+        }
     }
 
     /// Millions of pixels of the photos fitted to that show surface, at full size; before the solver has looked, half of all.

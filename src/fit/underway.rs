@@ -17,8 +17,8 @@ pub(crate) struct Underway<'a> {
     pub(super) map_size: usize,
     /// Width and height of the light in texels.
     pub(super) light_size: (usize, usize),
-    /// Seconds until the step is done, by what it took to this place.
-    pub seconds_left: f64,
+    /// Seconds until the step is done, by what it took to this place; `None` while its level is made ready.
+    pub seconds_left: Option<f64>,
     /// Views of the scene with the logarithms of their gains; empty where gains are not fitted.
     pub(super) log_gains: Vec<(usize, f32)>,
     /// Whether a fit may end here; else it is only to be seen.

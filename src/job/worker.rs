@@ -162,12 +162,17 @@ impl Worker {
         let Pace { seconds_after_next, finishing_seconds, .. } = pace_of(fitter, *first_of_session);
         let mut watch = |underway: &Underway| {
             let seconds = before + began.elapsed().as_secs_f64();
-            // Nothing is known of what comes after where no step was done before.
-            let seconds_left =
-                underway.seconds_left + if seconds_after_next.is_finite() { seconds_after_next } else { 0.0 };
-            let step_seconds_left = underway.seconds_left;
-            let time = StepTime { seconds, step_seconds_left, seconds_left, finishing_seconds };
-            teller.send(Event::WithinStep(time));
+            if let Some(step_seconds_left) = underway.seconds_left {
+                // Nothing is known of what comes after where no step was done before.
+                let after_it = if seconds_after_next.is_finite() { seconds_after_next } else { 0.0 };
+                let seconds_left = step_seconds_left + after_it;
+                teller.send(Event::WithinStep(StepTime {
+                    seconds,
+                    step_seconds_left,
+                    seconds_left,
+                    finishing_seconds,
+                }));
+            }
             if is_limited && underway.is_reached {
                 *reached = Some(underway.reached());
             }

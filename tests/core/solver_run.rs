@@ -6,6 +6,7 @@ use super::common::*;
 use patina::export::RunFolder;
 use patina::fit::settings::{BackgroundEvidence, Start};
 use patina::fit::solver::SolverSettings;
+use patina::fit::underway::Underway;
 use patina::fit::{FitSettings, Fitter, Method, StepOutcome, checkpoint};
 use patina::job::{Event, JobOptions, RunSettings, relit};
 use patina::render::Surface;
@@ -132,8 +133,17 @@ fn a_fit_that_is_taken_up_goes_on_bit_for_bit_whatever_the_threads() {
 fn levels_bring_maps_at_half_size_first_and_go_on_bit_for_bit() {
     let settings = FitSettings { map_size: 256, solver_levels: 3, solver_rounds: 2, ..base() };
     let mut whole = new_fitter(&settings);
-    let mut sizes = Vec::new();
-    while let StepOutcome::Stepped(row) = whole.step(&GO).unwrap() {
+    let (mut sizes, mut looks) = (Vec::new(), Vec::new());
+    loop {
+        let mut seen = 0;
+        let outcome = whole.step_watched(&GO, &mut |underway: &Underway| {
+            if underway.seconds_left.is_none() {
+                assert!(!underway.is_reached && underway.shown().0.diffuse.width() == 256);
+                seen += 1;
+            }
+        });
+        let StepOutcome::Stepped(row) = outcome.unwrap() else { break };
+        looks.push(seen);
         sizes.push((row.stage, whole.state().map_size, whole.deviations().is_some()));
     }
     let expected = [
@@ -143,6 +153,8 @@ fn levels_bring_maps_at_half_size_first_and_go_on_bit_for_bit() {
         ("refine", 256, true),
     ];
     assert_eq!(sizes, expected.map(|(name, size, known)| (name.to_string(), size, known)));
+    // Each of the six photos is seen on the maps as the finer level is made ready, which is no part of the fit.
+    assert_eq!(looks, [0, 0, 0, 6]);
     assert_taken_up_alike(&settings, &[2, 3], &whole);
 }
 

@@ -129,8 +129,9 @@ impl SolverScene {
         let mut place =
             descent.down(descent.place(&start, sight, (&shown, texture_scale)), &FIRST_STEPS, &mut trace)?;
         if lit == Lit::Yes {
-            // What is gone from the dielectric is not seen, and comes first.
-            trace.begin((ENDS_OF_PARTS[0].midpoint(ENDS_OF_PARTS[1]), ENDS_OF_PARTS[1]), 1.0);
+            // Lobes of the dielectric are integrated first; two steps from it, and one from what was chosen.
+            let [from, to, ..] = ENDS_OF_PARTS;
+            trace.begin((from + 0.4 * (to - from), to), 1.5 * weight_of(&FIRST_STEPS));
             place = descent.or_plain(place, (&start, &shown, texture_scale), &mut trace)?;
         }
         if lit == Lit::Yes && self.is_scale_open() {

@@ -14,7 +14,7 @@
 //!    wide and narrow hats ([`light_shape`]), with a weak wish for smoothness but for suns ([`light_suns`]).
 //!    [`light_round`] is the round as a whole, [`light_evidence`] says what each texel of the light is known by,
 //!    `light_holes` fills what lies between texels that photos show; `gains` of photos whose exposures differ; `first_maps`
-//!    of texels that no block was solved for.
+//!    of texels that no block was solved for, [`first_look`] at photos while a finer level is made ready.
 //! 5. [`maps`]: block by block, then in tiles ([`tile`], `tile_lobes`) with the footprints of pixels, where the evidence,
 //!    as far as it is independent (`tile_independence`), decides which texels share a lobe ([`lobe_tree`],
 //!    [`lobe_evidence`], [`lobe_prior`], [`lobe_sums`], [`lobe_widths`], [`lobe_families`]).
@@ -41,6 +41,7 @@ pub mod descent;
 pub mod edges;
 pub mod eliminate;
 pub mod estimate;
+pub mod first_look;
 mod first_maps;
 mod gains;
 mod given_maps;

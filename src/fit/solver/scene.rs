@@ -82,18 +82,19 @@ pub struct SolverScene {
 
 impl SolverScene {
     /// Traces the cache and gathers the evidence of these photographs; `held_out` judge. `None` when `stop` was raised.
-    /// `traced` is a cache of the same surface that serves if it is the one that would be traced.
+    /// `traced` is a cache of the same surface that serves if it is the one that would be traced; `watch` sees the pixels of
+    /// each photo as they come.
     ///
     /// # Errors
     /// `InvalidScene` when no pixel of any view is evidence.
     pub fn build(
         scene: &Scene,
         surface: &Surface,
-        targets: Vec<Target>,
-        held_out: &[Target],
+        (targets, held_out): (Vec<Target>, &[Target]),
         settings: SolverSettings,
         traced: Option<Arc<CachedTransport>>,
         stop: &AtomicBool,
+        watch: &mut dyn FnMut(&[Observation]),
     ) -> Result<Option<Self>> {
         let cached = settings.cached();
         let build = || CachedTransport::build(surface, cached, settings.light_size, stop).map(Arc::new);
@@ -116,6 +117,7 @@ impl SolverScene {
             escaped.push(wholly_escaped(&footprints));
             edges.push(EdgeView::of(scene, target, index as u32, targets.len(), &footprints));
             let pixels = of_view(scene, target, index as u32, &footprints);
+            watch(&pixels);
             sieve.add(footprints, pixels);
         }
         let (footprints, pixels) = sieve.finish();

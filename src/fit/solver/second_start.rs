@@ -27,8 +27,8 @@ impl Descent<'_> {
         trace: &mut Trace,
     ) -> Option<Place> {
         let (plain_start, sight) = self.plain(&found, start, shown)?;
-        let plain =
-            self.down(self.place(&plain_start, sight, (shown, texture_scale)), &FIRST_STEPS, &mut Trace::unseen())?;
+        let begun = self.place(&plain_start, sight, (shown, texture_scale));
+        let plain = trace.trial(|trace| self.down(begun, &FIRST_STEPS, trace))?;
         let by = Learned::of(self.pixels, &found.sight, found.learned.as_ref());
         let is_plain = self.plain_texels(&found, &plain, &by);
         let choose = |one: &[Material<f32>], other: &[Material<f32>]| -> Vec<Material<f32>> {

@@ -87,11 +87,11 @@ impl Solver {
         let made = SolverScene::build(
             scene,
             surface,
-            targets(scene, &views, 0),
-            &judging,
+            (targets(scene, &views, 0), &judging),
             settings,
             None,
             &AtomicBool::new(false),
+            &mut |_| {},
         )?;
         let Some(scene) = made else { return Err(Error::new(ErrorKind::Stopped, "stopped")) };
         let (width, height) = settings.light_size;

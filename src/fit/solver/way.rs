@@ -103,11 +103,6 @@ impl<'a> Trace<'a> {
         Trace { steps: Vec::new(), watch, part, shown: Instant::now(), is_trial: false }
     }
 
-    /// Of a way that may not be gone on from: nobody hears of it.
-    pub(super) fn unseen() -> Self {
-        Trace::of(None)
-    }
-
     /// Goes a way that may not be gone on from, whose steps are seen and not kept.
     pub(super) fn trial<T>(&mut self, go: impl FnOnce(&mut Self) -> T) -> T {
         self.is_trial = true;
