@@ -60,6 +60,20 @@ pub fn as_stored(path: PathBuf) -> PathBuf {
     stored
 }
 
+/// A path without `.` and `..`, as it is written: links are not followed.
+pub fn without_dots(path: &Path) -> PathBuf {
+    let mut plain = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir if plain.file_name().is_some() => drop(plain.pop()),
+            Component::ParentDir if plain.has_root() => {}
+            _ => plain.push(part),
+        }
+    }
+    plain
+}
+
 /// The name of a folder, also of one that its path does not name: `.`, `..`, an empty path. Empty for a root.
 pub fn name_of_folder(folder: &Path) -> String {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };

@@ -90,7 +90,10 @@ fn print_page(scene: &Scene, understood: &Understood, report: &Report, ask: &Ask
                 "light       one for all photos: another for each would explain {share:.0} % of what differs in shading"
             ),
             LightKind::WithCamera => println!("light       turns with the camera: see light-turns-with-camera below"),
-            LightKind::InGroups => println!("light       differs between groups of photos: see light-in-groups below"),
+            LightKind::InGroups | LightKind::InAnyGroups => {
+                println!("light       differs between groups of photos: see light-in-groups below")
+            }
+            LightKind::OfEach => println!("light       differs from photo to photo: see light-differs below"),
         }
     }
     let minutes = (ask.processor_seconds as f64 / 60.0).ceil();

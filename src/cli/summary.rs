@@ -5,9 +5,10 @@ use crate::insight::report::data::ReportData;
 use crate::job::budget::ENDED_BY_BUDGET;
 
 /// Findings that are repeated when a fit has ended.
-const SPOILS_ALL: [&str; 11] = [
+const SPOILS_ALL: [&str; 12] = [
     ENDED_BY_BUDGET,
     "intrinsics-scaled",
+    "light-differs",
     "light-in-groups",
     "light-turns-with-camera",
     "photo-misplaced",

@@ -97,26 +97,39 @@ pub fn is_raw(bytes: &[u8]) -> bool {
 /// before they read one.
 pub fn claims_more_than_it_holds(bytes: &[u8]) -> bool {
     let Some((tiff, directory)) = Tiff::open(bytes) else { return false };
-    tiff.entries(directory).filter_map(|entry| tiff.u32(entry + 4)).any(|count| count as usize > bytes.len())
+    tiff.entries(directory).filter_map(|entry| tiff.word(entry.checked_add(4)?)).any(|count| count > bytes.len())
 }
 
-/// The bytes of a TIFF with offsets of four bytes.
+/// The bytes of a TIFF with offsets of four bytes, or of a BigTIFF with eight.
 struct Tiff<'a> {
     bytes: &'a [u8],
     little_endian: bool,
+    is_big: bool,
 }
 
 impl<'a> Tiff<'a> {
     /// The file and the place of its first directory.
     fn open(bytes: &'a [u8]) -> Option<(Self, usize)> {
-        let little_endian = match bytes.get(..4)? {
-            b"II*\0" => true,
-            b"MM\0*" => false,
+        let (little_endian, is_big) = match bytes.get(..4)? {
+            b"II*\0" => (true, false),
+            b"MM\0*" => (false, false),
+            b"II+\0" => (true, true),
+            b"MM\0+" => (false, true),
             _ => return None,
         };
-        let tiff = Tiff { bytes, little_endian };
-        let first = tiff.u32(4)? as usize;
+        let tiff = Tiff { bytes, little_endian, is_big };
+        let first = tiff.word(if is_big { 8 } else { 4 })?;
         Some((tiff, first))
+    }
+
+    /// A count or an offset.
+    fn word(&self, place: usize) -> Option<usize> {
+        if !self.is_big {
+            return self.u32(place).map(|value| value as usize);
+        }
+        let bytes: [u8; 8] = self.bytes.get(place..place.checked_add(8)?)?.try_into().ok()?;
+        let value = if self.little_endian { u64::from_le_bytes(bytes) } else { u64::from_be_bytes(bytes) };
+        usize::try_from(value).ok()
     }
 
     fn u16(&self, place: usize) -> Option<u16> {
@@ -131,7 +144,11 @@ impl<'a> Tiff<'a> {
 
     /// Where the entries of a directory begin.
     fn entries(&self, directory: usize) -> impl Iterator<Item = usize> {
-        (0..usize::from(self.u16(directory).unwrap_or(0))).map_while(move |entry| directory.checked_add(2 + 12 * entry))
+        let (head, size) = if self.is_big { (8, 20) } else { (2, 12) };
+        let count = if self.is_big { self.word(directory) } else { self.u16(directory).map(usize::from) };
+        // A directory has no more entries than a number of two bytes can say; what claims more is damaged.
+        let count = count.filter(|count| *count <= usize::from(u16::MAX)).unwrap_or(0);
+        (0..count).map_while(move |entry| directory.checked_add(head + size * entry))
     }
 
     /// The number `index` of a tag in a directory.
@@ -142,20 +159,23 @@ impl<'a> Tiff<'a> {
             1 | 2 | 7 => 1,
             3 => 2,
             4 | 13 => 4,
-            5 | 10 => 8,
+            5 | 10 | 16 | 18 => 8,
             _ => return None,
         };
-        let count = self.u32(entry + 4)? as usize;
+        let word = if self.is_big { 8 } else { 4 };
+        let count = self.word(entry.checked_add(4)?)?;
         if index >= count {
             return None;
         }
-        let inside = count.checked_mul(size)? <= 4;
-        let place = if inside { entry + 8 } else { self.u32(entry + 8)? as usize };
+        let value = entry.checked_add(4 + word)?;
+        let inside = count.checked_mul(size)? <= word;
+        let place = if inside { value } else { self.word(value)? };
         let place = place.checked_add(index.checked_mul(size)?)?;
         match kind {
             1 | 2 | 7 => self.bytes.get(place).map(|&byte| f64::from(byte)),
             3 => self.u16(place).map(f64::from),
             4 | 13 => self.u32(place).map(f64::from),
+            16 | 18 => self.word(place).map(|value| value as f64),
             5 => Some(f64::from(self.u32(place)?) / f64::from(self.u32(place.checked_add(4)?)?)),
             _ => Some(f64::from(self.u32(place)? as i32) / f64::from(self.u32(place.checked_add(4)?)? as i32)),
         }
@@ -197,6 +217,28 @@ mod tests {
         assert_eq!(bytes.len(), 80);
         bytes.extend([four(1), four(8), four(28), four(10)].concat());
         bytes
+    }
+
+    #[test]
+    fn a_big_tiff_is_read_and_one_that_claims_too_much_is_nothing() {
+        let entry = |tag: u16, kind: u16, count: u64, value: u64| {
+            [&tag.to_be_bytes()[..], &kind.to_be_bytes(), &count.to_be_bytes(), &value.to_be_bytes()].concat()
+        };
+        let head = [&b"MM\0+\0\x08\0\0"[..], &16u64.to_be_bytes()].concat();
+        let directory =
+            [2u64.to_be_bytes().to_vec(), entry(ORIENTATION, 3, 1, 6 << 48), entry(EXIF_DIRECTORY, 18, 1, 64)];
+        let exposure = [1u64.to_be_bytes().to_vec(), entry(EXPOSURE_TIME, 5, 1, (1 << 32) | 8)];
+        let bytes = [head, directory.concat(), exposure.concat()].concat();
+        let exif = read(&bytes);
+        assert_eq!((exif.orientation, exif.exposure_seconds), (Some(6), Some(0.125)));
+        assert!(!is_raw(&bytes) && !claims_more_than_it_holds(&bytes));
+        assert!(claims_more_than_it_holds(&[&bytes[..28], &u64::MAX.to_be_bytes(), &bytes[36..]].concat()));
+        for length in 0..bytes.len() {
+            read(&bytes[..length]);
+        }
+        let mut damaged = bytes.clone();
+        damaged[16..24].fill(0xff);
+        assert_eq!(read(&damaged), Exif::default());
     }
 
     #[test]

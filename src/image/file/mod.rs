@@ -137,6 +137,18 @@ pub fn read_size(path: &Path) -> Result<(usize, usize)> {
     read_header(path).map(|header| (header.width, header.height))
 }
 
+/// The EXIF orientation of a photo, 1 where it has none, without decoding its pixels. Errors as [`read_size`].
+pub fn read_orientation(path: &Path) -> Result<u8> {
+    let source = Source::open(path)?;
+    let exif = match source.header.format {
+        Format::Png => png::exif(&source.bytes),
+        Format::Jpeg => raster::exif_of_jpeg(&source)?,
+        Format::Tiff => Some(source.bytes),
+        _ => None,
+    };
+    Ok(exif.and_then(|bytes| exif::read(&bytes).orientation).unwrap_or(1))
+}
+
 /// Writes OpenEXR with float channels `R G B`: one part, scanlines, ZIP.
 pub fn write_exr_rgb(path: &Path, image: &RgbImage) -> Result<()> {
     write_atomically(path, |writer| openexr::write_rgb(writer, image))

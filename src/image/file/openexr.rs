@@ -168,8 +168,8 @@ impl File {
         primaries.rec709_from_rgb().filter(|matrix| !is_identity(matrix))
     }
 
-    /// A lone channel or a luminance, or nothing when the file has none.
-    fn grey(&self, source: &Source) -> Result<Option<GreyImage>> {
+    /// A lone channel or a luminance, with its opacity, or nothing when the file has none.
+    fn grey(&self, source: &Source) -> Result<Option<(GreyImage, Option<GreyImage>)>> {
         let names = |part: usize| self.parts[part].channels.iter();
         let lone = || (0..self.parts.len()).find(|&part| names(part).count() == 1);
         let luminance = (0..self.parts.len()).find(|&part| names(part).any(|name| name == "Y"));
@@ -179,8 +179,14 @@ impl File {
         if names(part).any(|name| name == "RY" || name == "BY") {
             return Err(unsupported(&source.path, "luminance with chroma is not read".into()));
         }
+        if ["X", "Z"].iter().all(|wanted| names(part).any(|name| name == wanted)) {
+            return Err(unsupported(&source.path, "CIE XYZ colours are not read".into()));
+        }
         let placed = self.placed(source, part)?;
-        Ok(Some(spread(&placed, 0.0, |index| value_at(samples, index))))
+        let image = |samples| spread(&placed, 0.0, |index| value_at(samples, index));
+        let opacity = names(part).position(|name| name == "A").filter(|&own| own != channel);
+        let opacity = opacity.map(|own| self.channel(source, part, own)).transpose()?;
+        Ok(Some((image(samples), opacity.map(image))))
     }
 
     fn nothing_fits(&self, source: &Source, wanted: &str) -> Error {
@@ -221,9 +227,9 @@ pub fn read_photo(source: &Source, layer: Option<&str>) -> Result<PhotoFile> {
         return Ok(photo);
     }
     match file.grey(source)? {
-        Some(image) => {
+        Some((image, alpha)) => {
             let pixels = PhotoPixels::Linear(image.map(|&value| Vec3::splat(value)));
-            Ok(PhotoFile { pixels, ..PhotoFile::default() })
+            Ok(PhotoFile { pixels, alpha, ..PhotoFile::default() })
         }
         None => Err(file.nothing_fits(source, "colour (R G B)")),
     }
@@ -232,7 +238,7 @@ pub fn read_photo(source: &Source, layer: Option<&str>) -> Result<PhotoFile> {
 /// A lone channel as stored, else the luminance of the colour.
 pub fn read_grey(source: &Source) -> Result<GreyImage> {
     let file = read_file(source)?;
-    if let Some(image) = file.grey(source)? {
+    if let Some((image, _)) = file.grey(source)? {
         return Ok(image);
     }
     let layers = exr_layers::layers_of(&file.parts);

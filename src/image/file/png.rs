@@ -4,7 +4,9 @@
 
 use super::colour::{ColourSpace, Curve, Primaries};
 use super::stored::Declared;
+use flate2::read::ZlibDecoder;
 use glam::DVec2;
+use std::io::Read;
 
 /// What the chunks before the pixels declare; an ICC profile is not looked at here.
 pub fn declared(bytes: &[u8]) -> Declared {
@@ -23,15 +25,46 @@ pub fn has_code_points(bytes: &[u8]) -> bool {
     chunks(bytes).any(|(name, body)| name == b"cICP" && body.len() == 4)
 }
 
+/// The EXIF block: of its own chunk, which may stand behind the pixels, or hexadecimal in a text, as ImageMagick wrote it
+/// before there was that chunk.
+pub fn exif(bytes: &[u8]) -> Option<Vec<u8>> {
+    let own = || all_chunks(bytes).find(|(name, _)| *name == b"eXIf").map(|(_, body)| body.to_vec());
+    own().or_else(|| all_chunks(bytes).find_map(|(name, body)| exif_of_text(name, body)))
+}
+
+/// The EXIF block of a text chunk whose keyword says that it holds one.
+fn exif_of_text(name: &[u8], body: &[u8]) -> Option<Vec<u8>> {
+    /// More than a camera writes, thumbnail included.
+    const LARGEST: u64 = 1 << 20;
+    let body =
+        [&b"Raw profile type exif\0"[..], b"Raw profile type APP1\0"].iter().find_map(|key| body.strip_prefix(*key))?;
+    let mut text = Vec::new();
+    match name {
+        b"tEXt" => text.extend_from_slice(body),
+        b"zTXt" => drop(ZlibDecoder::new(body.get(1..)?).take(LARGEST).read_to_end(&mut text).ok()?),
+        _ => return None,
+    }
+    // A line of its name and one of its length stand before it.
+    let lines = text.split(|byte| *byte == b'\n').skip_while(|line| line.is_empty()).skip(2);
+    let digits: Vec<u8> = lines.flatten().filter(|byte| byte.is_ascii_hexdigit()).copied().collect();
+    let digit = |byte: u8| char::from(byte).to_digit(16).unwrap_or(0) as u8;
+    Some(digits.chunks_exact(2).map(|pair| 16 * digit(pair[0]) + digit(pair[1])).collect())
+}
+
 /// The chunks before the pixels: name and content.
 fn chunks(bytes: &[u8]) -> impl Iterator<Item = (&[u8], &[u8])> {
+    all_chunks(bytes).take_while(|(name, _)| *name != b"IDAT")
+}
+
+/// All chunks before the end.
+fn all_chunks(bytes: &[u8]) -> impl Iterator<Item = (&[u8], &[u8])> {
     let mut position = 8;
     std::iter::from_fn(move || {
         let head = bytes.get(position..position + 8)?;
         let length = u32::from_be_bytes([head[0], head[1], head[2], head[3]]) as usize;
         let body = bytes.get(position + 8..(position + 8).saturating_add(length))?;
         position = (position + 12).saturating_add(length);
-        (!matches!(&head[4..8], b"IDAT" | b"IEND")).then_some((&head[4..8], body))
+        (&head[4..8] != b"IEND").then_some((&head[4..8], body))
     })
 }
 
@@ -130,6 +163,34 @@ mod tests {
     use crate::image::file::{self, Encoding, PhotoOptions};
     use glam::Vec3;
     use std::path::Path;
+
+    #[test]
+    fn exif_is_found_behind_the_pixels_and_in_a_text() {
+        let block = b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0";
+        let plain = file::encode_png_srgb8(&Image::filled(4, 3, [9; 3])).unwrap();
+        let (before_end, end) = plain.split_at(plain.len() - 12);
+        let hexadecimal: String = block.iter().map(|byte| format!("{byte:02x}")).collect();
+        let text = format!("\nexif\n      {}\n{}\n{}\n", block.len(), &hexadecimal[..40], &hexadecimal[40..]);
+        let mut packed = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::default());
+        std::io::Write::write_all(&mut packed, text.as_bytes()).unwrap();
+        let packed = [&b"Raw profile type exif\0\0"[..], &packed.finish().unwrap()].concat();
+        let text = [&b"Raw profile type exif\0"[..], text.as_bytes()].concat();
+        for (name, body) in [(b"eXIf", &block[..]), (b"tEXt", &text[..]), (b"zTXt", &packed[..])] {
+            let mut chunk = [&(body.len() as u32).to_be_bytes()[..], name, body].concat();
+            chunk.extend(crc32(&chunk[4..]).to_be_bytes());
+            let bytes = [before_end, &chunk, end].concat();
+            let photo = file::read_photo_from(Path::new("a.png"), bytes, &PhotoOptions::default()).unwrap();
+            assert_eq!(photo.orientation, 6, "{}", String::from_utf8_lossy(name));
+        }
+        assert_eq!(exif(&plain), None);
+        assert_eq!(exif(b"short"), None);
+    }
+
+    fn crc32(bytes: &[u8]) -> u32 {
+        let mut sum = flate2::Crc::new();
+        sum.update(bytes);
+        sum.sum()
+    }
 
     fn with_chunk(name: &[u8], body: &[u8]) -> Vec<u8> {
         let mut bytes = b"\x89PNG\r\n\x1a\n".to_vec();

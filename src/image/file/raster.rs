@@ -62,10 +62,19 @@ pub fn read(source: &Source) -> Result<(Stored, exif::Exif)> {
     };
     let stored =
         Stored { width, height, channels, samples, has_alpha, is_premultiplied: false, icc, declared, findings };
+    let exif = if is_jpeg { exif } else { exif.or_else(|| png::exif(&source.bytes)) };
     let exif = exif.map(|bytes| exif::read(&bytes)).unwrap_or_default();
     // A PNG says by its own chunks what its colours are.
     let stored = if is_jpeg { stored.with_exif(&exif) } else { stored };
     Ok((stored.checked(source)?, exif))
+}
+
+/// The EXIF block of a JPEG, whose pixels are not decoded.
+pub fn exif_of_jpeg(source: &Source) -> Result<Option<Vec<u8>>> {
+    guarded(&source.path, || {
+        let decoder = JpegDecoder::new(Cursor::new(&source.bytes[..]));
+        Ok(decoder.and_then(|mut decoder| decoder.exif_metadata()).ok().flatten())
+    })
 }
 
 /// What a decoder gives.

@@ -22,6 +22,7 @@ const CODES: &[&str] = &[
     "exposure-jump",
     "exposure-varies",
     "few-views",
+    "light-differs",
     "light-in-groups",
     "light-turns-with-camera",
     "map-size",

@@ -3,15 +3,16 @@
 //! Two cameras that see the same points of the surface should find the same bright and dark places there. How far they do
 //! is the correlation of the logarithms of radiance over the shared points; exposures, gains and a common reflectance drop
 //! out of it. A photo that was given the camera of another one correlates with nobody. What explains it is looked for by
-//! trying: the photos of all cameras moved on by one or two, all of them turned or mirrored; of single ones
+//! trying: photos moved on by one or two ([`shift`]), all of them turned or mirrored; of single ones
 //! [`outlying`] speaks.
 //!
 //! It refuses to judge surfaces that look everywhere alike, and mirrors, whose pictures move with the camera.
 
 use super::probe::Probe;
+use super::shift::{self, Shift};
 use super::trial::{Given, JUDGED_ABOVE, Lie, Trial, is_clearly_better};
 use super::{Report, outlying};
-use crate::error::{Finding, Severity};
+use crate::error::{Finding, Place, Severity};
 use crate::math::statistics::quantile;
 use crate::scene::Scene;
 use crate::trace::Bvh;
@@ -23,8 +24,8 @@ const FEWEST_VIEWS: usize = 3;
 const HARDLY: f64 = 0.2;
 /// What captures have whose cameras and mesh fit.
 const USUAL: f64 = 0.7;
-/// A shift of all photos is no explanation where they correlate by less than this after it.
-const LEAST_SHIFTED: f64 = 0.35;
+/// Photos that are turned or mirrored agree by more than this after that: facades are alike upside down.
+const LEAST_TURNED: f64 = 0.6;
 
 /// How the photos of a scene agree, the median over the views, in [-1, 1]; `None` where they share too little.
 pub(crate) fn measure(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>]) -> Option<f64> {
@@ -48,20 +49,24 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
     }
     let middle = quantile(&known, 0.5);
     report.agreement = Some(middle);
-    if let Some((shift, shifted)) = best_shift(&trial, scene.views.len(), middle) {
+    if let Some(Shift { by, from, own, shifted, .. }) = shift::best(&trial, scene.views.len(), &found) {
+        let first = &scene.views[from].name;
+        let which = if from == 0 { String::new() } else { format!(" from {first} on") };
         let message = format!(
-            "photos and cameras are out of step: where photos show the same surface their correlation is {middle:.2}, and \
+            "photos and cameras are out of step{which}: where photos show the same surface their correlation is {own:.2}, and \
              {shifted:.2} when each camera is given the photo {} in the order of names",
-            match shift {
+            match by {
                 1 => "after its own".into(),
                 -1 => "before its own".into(),
-                shift if shift > 0 => format!("{shift} places after its own"),
-                shift => format!("{} places before its own", -shift),
+                by if by > 0 => format!("{by} places after its own"),
+                by => format!("{} places before its own", -by),
             }
         );
-        report.findings.push(Finding::new(Severity::Warning, "photos-shifted", message).remedy(
+        let told = Finding::new(Severity::Warning, "photos-shifted", message).remedy(
             "rename photos and cameras to match: one was added or removed on one side, or numbering starts at 1 there",
-        ));
+        );
+        report.findings.push(if from == 0 { told } else { told.at(Place::View(first.clone())) });
+        report.views[from..].iter_mut().for_each(|line| line.is_misplaced = true);
         return;
     }
     if middle >= JUDGED_ABOVE {
@@ -76,7 +81,7 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
             Finding::new(Severity::Warning, "photo-turned", message)
                 .remedy("rotate or flip the photo files, to lie as they did when the cameras were calibrated"),
         );
-    } else if middle < HARDLY || !masks_tell(report) {
+    } else if scene.mesh.triangles.len() > 1 && (middle < HARDLY || !masks_tell(report)) {
         let hardly = if middle < HARDLY { "barely" } else { "poorly" };
         let message = format!(
             "photos correlate {hardly} where the cameras say they show the same surface ({middle:.2}; 1 is a perfect match, \
@@ -97,20 +102,6 @@ fn masks_tell(report: &Report) -> bool {
     !overlaps.is_empty() && quantile(&overlaps, 0.5) < ANOTHER
 }
 
-/// By how many places the photos are to be moved on to agree clearly better than by `own`, and how they agree then.
-fn best_shift(trial: &Trial, count: usize, own: f64) -> Option<(isize, f64)> {
-    let signed = count as isize;
-    let trials = [1, -1, 2, -2].into_iter().filter(|shift: &isize| shift.abs() < signed - 1);
-    let (shift, agreement) = trials
-        .filter_map(|shift| {
-            let mut given = Given::own(count);
-            given.rotate_left(shift.rem_euclid(signed) as usize);
-            Some((shift, trial.of_all(&given, FEWEST_VIEWS)?))
-        })
-        .max_by(|a, b| a.1.total_cmp(&b.1))?;
-    (is_clearly_better(agreement, own) && agreement > LEAST_SHIFTED).then_some((shift, agreement))
-}
-
 /// How all photos are to be turned or mirrored to agree well, and how they agree then.
 fn best_lie(trial: &Trial, scene: &Scene, own: f64) -> Option<(Lie, f64)> {
     let is_square = scene.views.iter().all(|view| view.states.width() == view.states.height());
@@ -121,5 +112,5 @@ fn best_lie(trial: &Trial, scene: &Scene, own: f64) -> Option<(Lie, f64)> {
             Some((lie, trial.of_all(&given, FEWEST_VIEWS)?))
         })
         .max_by(|a, b| a.1.total_cmp(&b.1))?;
-    (is_clearly_better(agreement, own) && agreement > JUDGED_ABOVE).then_some((lie, agreement))
+    (is_clearly_better(agreement, own) && agreement > LEAST_TURNED).then_some((lie, agreement))
 }

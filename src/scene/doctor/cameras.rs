@@ -54,16 +54,21 @@ pub fn check(scene: &Scene, report: &mut Report) -> Vec<bool> {
     usable
 }
 
+/// Of fewer training views that is told, and of still fewer it is a warning.
+const FEW_VIEWS: usize = 6;
+const VERY_FEW_VIEWS: usize = 4;
+
 fn check_count(scene: &Scene, report: &mut Report) {
     let training = scene.views.iter().filter(|view| !view.held_out).count();
     if training == 0 {
         report
             .findings
             .push(Finding::new(Severity::Fatal, "no-views", "there is no view to fit").remedy("hold out fewer views"));
-    } else if training < 6 {
+    } else if training < FEW_VIEWS {
+        let severity = if training < VERY_FEW_VIEWS { Severity::Warning } else { Severity::Note };
         report.findings.push(
             Finding::new(
-                Severity::Warning,
+                severity,
                 "few-views",
                 format!("only {training} training views: highlights are seen from few directions"),
             )

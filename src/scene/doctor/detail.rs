@@ -44,7 +44,7 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
             100.0 * share
         );
         report.findings.push(
-            Finding::new(Severity::Warning, "detail-too-fine", message)
+            Finding::new(Severity::Note, "detail-too-fine", message)
                 .at(Place::View(scene.views[view].name.clone()))
                 .remedy(
                     "take photos from closer up, or use larger ones: maps hold the mean of what a pixel shows, and the \

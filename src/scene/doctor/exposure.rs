@@ -18,6 +18,8 @@ const NEIGHBOURS: usize = 8;
 const FEWEST_SHARED: usize = 20;
 /// A view that is off by more than this, in stops, is named.
 const JUMP_STOPS: f64 = 0.5;
+/// One that is off by more is a warning: less is what cameras on automatic do, and a fit finds it.
+const WARNED_STOPS: f64 = 0.75;
 /// Where no view is, views that differ by more than this, in stops, are told of: root of the mean square.
 const SPREAD_STOPS: f64 = 0.1;
 /// More than gloss makes of photos that all have one exposure, less than a camera makes that chooses its own.
@@ -40,10 +42,16 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
     for (line, exposure) in report.views.iter_mut().zip(&exposures) {
         line.exposure_stops = exposure.map(|log| log / std::f64::consts::LN_2);
     }
-    let mut jumps: Vec<(f64, &str)> =
-        report.views.iter().filter_map(|line| Some((jump_stops(line)?, line.name.as_str()))).collect();
+    let mut unknown = exposures;
+    leave_out_known(&mut unknown, scene.views.iter().map(|view| view.exposure_prior_stops));
+    let unknown = unknown.iter().map(|log| log.map(|log| log / std::f64::consts::LN_2));
+    let mut jumps: Vec<(f64, &str)> = unknown
+        .zip(&report.views)
+        .filter_map(|(stops, line)| Some((stops.filter(is_jump)?, line.name.as_str())))
+        .collect();
     jumps.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()).then(a.1.cmp(b.1)));
-    let found = jumps.first().map(|&(_, first)| {
+    let found = jumps.first().map(|&(most, first)| {
+        let severity = if most.abs() > WARNED_STOPS { Severity::Warning } else { Severity::Note };
         let listed: Vec<String> = jumps.iter().map(|(stops, name)| format!("{name} by {stops:+.1}")).collect();
         let listed: Vec<&str> = listed.iter().map(String::as_str).collect();
         let message = format!(
@@ -52,7 +60,7 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
             scene.views.len(),
             names_of(&listed)
         );
-        Finding::new(Severity::Warning, "exposure-jump", message).at(Place::View(first.into())).remedy(
+        Finding::new(severity, "exposure-jump", message).at(Place::View(first.into())).remedy(
             "fit an exposure per view, as is done with photos of 8 bits, or develop all photos with one exposure and \
              white balance; of things that shine all over it may be their gloss",
         )
@@ -71,16 +79,35 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
     }
 }
 
+/// Takes off what the photos' EXIF says of their exposures, which a fit begins with. Not where that leaves
+/// more than there was: then the files say something else than the pixels.
+fn leave_out_known(exposures: &mut [Option<f64>], stops: impl Iterator<Item = Option<f32>>) {
+    let stops: Vec<Option<f32>> = stops.collect();
+    if stops.iter().all(Option::is_none) {
+        return;
+    }
+    let known = stops.iter().map(|stops| f64::from(stops.unwrap_or(0.0)) * std::f64::consts::LN_2);
+    let left: Vec<f64> =
+        exposures.iter().zip(known).map(|(own, known)| own.map_or(f64::NAN, |own| own - known)).collect();
+    let finite: Vec<f64> = left.iter().copied().filter(|left| left.is_finite()).collect();
+    let middle = if finite.is_empty() { 0.0 } else { quantile(&finite, 0.5) };
+    let squares = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>();
+    let before = squares(&mut exposures.iter().flatten().copied());
+    if squares(&mut finite.iter().map(|left| left - middle)) < before {
+        exposures.iter_mut().zip(&left).for_each(|(own, left)| *own = own.map(|_| left - middle));
+    }
+}
+
 /// Whether views see the surface they share so differently that their exposures must differ: one of them by more than half
 /// a stop, or all of them by more than a quarter in the root of the mean square.
 pub fn differ(views: &[ViewCheck]) -> bool {
-    views.iter().any(|view| jump_stops(view).is_some())
+    views.iter().filter_map(|view| view.exposure_stops).any(|stops| is_jump(&stops))
         || spread_stops(views).is_some_and(|spread| spread > SPREAD_BEYOND_GLOSS_STOPS)
 }
 
-/// By how much a view is off, where that is a jump.
-fn jump_stops(view: &ViewCheck) -> Option<f64> {
-    view.exposure_stops.filter(|stops| stops.abs() > JUMP_STOPS)
+/// Whether a view is off by so much that it is named.
+fn is_jump(stops: &f64) -> bool {
+    stops.abs() > JUMP_STOPS
 }
 
 /// Root of the mean square over the views; `None` where fewer than three are known, which differ by what they see.
@@ -173,6 +200,20 @@ mod tests {
             assert!((solved[view].unwrap() - truth[view]).abs() < 1e-6, "{solved:?}");
         }
         assert_eq!(solved[5], None);
+    }
+
+    #[test]
+    fn what_exif_says_is_no_jump_unless_the_pixels_say_otherwise() {
+        let exposures = || vec![Some(0.0), Some(1.0), None, Some(-0.5), Some(0.1)];
+        let stops = [0.2, 1.0 / std::f32::consts::LN_2, 3.0, -0.5 / std::f32::consts::LN_2, 0.0].map(Some);
+        let mut left = exposures();
+        leave_out_known(&mut left, stops.into_iter());
+        assert!(left[2].is_none() && left.iter().flatten().all(|left| left.abs() < 0.2), "{left:?}");
+        let mut kept = exposures();
+        leave_out_known(&mut kept, stops.map(|stops| stops.map(|stops| -stops)).into_iter());
+        assert_eq!(kept, exposures());
+        leave_out_known(&mut kept, [None; 5].into_iter());
+        assert_eq!(kept, exposures());
     }
 
     #[test]

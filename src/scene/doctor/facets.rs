@@ -20,6 +20,8 @@ const COARSE_DEGREES: f32 = 12.0;
 const COARSE_PIXELS: f32 = 2.0;
 /// Share of what is seen beyond which coarse triangles are told.
 const TOLD_SHARE: f64 = 0.1;
+/// Where there is so much of it, that is a warning.
+const WARNED_SHARE: f64 = 0.5;
 
 /// Mean angle in degrees between each triangle and its neighbours across edges, those left out that go on flat or end at
 /// a crease; 0 where none remains. Vertices at one place are one.
@@ -90,7 +92,8 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
             pixels / coarse as f64,
             degrees / coarse as f64
         );
-        report.findings.push(Finding::new(Severity::Warning, "mesh-coarse", message).remedy(
+        let severity = if share > WARNED_SHARE { Severity::Warning } else { Severity::Note };
+        report.findings.push(Finding::new(severity, "mesh-coarse", message).remedy(
             "give the mesh before it was decimated; normals, outlines and shadows are off, and maps take up the \
              difference",
         ));

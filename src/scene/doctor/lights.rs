@@ -4,7 +4,7 @@
 //! still beside the light; and of photos taken in the morning and at noon each has its own. What tells is shading: over
 //! points that several photos show, the logarithm of radiance is taken as reflectance of the point, gain of the view, and
 //! a shading: a vector times the normal that stands still in the cameras, or that is another for each run of photos in the
-//! order of their names; for what shines, a function of where normal and mirrored direction point in the camera (a light
+//! order of their names, or for each of a few groups in any order; for what shines, a function of where normal and mirrored direction point in the camera (a light
 //! that turns with it) against one of where the mirrored direction points in the world (a light that stands still: what its
 //! normals say drops out with the reflectance). The share of the squared residuals that each of these takes away decides;
 //! `shading` has the least squares.
@@ -13,9 +13,9 @@
 //! larger than what highlights leave, and of what shines, half of what differs and clearly more than highlights of a light
 //! that stands still.
 
-use super::Report;
 use super::probe::{Probe, surface_at};
 use super::shading::{Shares, Sight, Sighted, explain};
+use super::{Report, names_of};
 use crate::error::{Finding, Place, Severity};
 use crate::math::{luminance, parallel};
 use crate::scene::{PixelState, Scene, View};
@@ -47,6 +47,14 @@ const LEAST_SIZE_IF_SURE: f64 = 0.05;
 /// still: of captures under one light the first comes to 0.5 at most, the second to 0.28 where there is little to explain.
 const LEAST_SHINE: f64 = 0.5;
 const LEAST_LEAD: f64 = 0.2;
+/// Share that groups in any order must take away, and that of what a light for each photo does. Vectors that go around evenly
+/// leave three groups two thirds of it.
+const LEAST_SHARE_OF_ANY: f64 = 0.6;
+const LEAST_PART_OF_ANY: f64 = 0.85;
+/// What it leaves is at most this part of what the next best leaves.
+const CLEAR_PART: f64 = 0.6;
+/// Share that a light for each photo must take away where nothing simpler does: gloss under one light comes to 0.76.
+const LEAST_SHARE_OF_EACH: f64 = 0.85;
 
 /// How the shading of the photos goes with the cameras.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -66,6 +74,9 @@ pub struct LightCheck {
     pub of_each: f64,
     /// Name of the first view of the second group.
     pub second_group_begins: String,
+    /// The same for two or three groups of photos in any order with a light each.
+    #[serde(default)]
+    pub in_any_groups: f64,
 }
 
 /// What the light of the photos is.
@@ -77,6 +88,10 @@ pub enum LightKind {
     WithCamera,
     /// One for each of two groups of photos.
     InGroups,
+    /// One for each of two or three groups of photos, in whatever order of names.
+    InAnyGroups,
+    /// Another from photo to photo, in no order that is known.
+    OfEach,
 }
 
 impl LightCheck {
@@ -91,14 +106,24 @@ impl LightCheck {
         let turning = self.with_camera.max(self.shine_with_camera);
         let is_sure = |share: f64, other: f64| {
             share > SURE_SHARE
-                && 1.0 - share < SURE_PART * (1.0 - other.max(self.shine_in_world))
+                && 1.0 - share < CLEAR_PART * (1.0 - other.max(self.shine_in_world))
                 && self.size_of(share) > LEAST_SIZE_IF_SURE
         };
         let turns = explained(self.with_camera) && self.with_camera >= self.in_groups;
+        // Gloss of a camera that goes around falls into groups as well, but not so neatly, and it does not leave so little.
+        let is_clear = |share: f64, least: f64| {
+            share > least.max(LEAST_SHARE_OF_ANY)
+                && 1.0 - share < SURE_PART * (1.0 - self.in_groups.max(turning).max(self.shine_in_world))
+                && is_large(share)
+        };
         if shines || turns || is_sure(turning, self.in_groups) {
             LightKind::WithCamera
         } else if explained(self.in_groups) || is_sure(self.in_groups, turning) {
             LightKind::InGroups
+        } else if is_clear(self.in_any_groups, LEAST_PART_OF_ANY * self.of_each) {
+            LightKind::InAnyGroups
+        } else if is_clear(self.of_each, LEAST_SHARE_OF_EACH) {
+            LightKind::OfEach
         } else {
             LightKind::One
         }
@@ -132,6 +157,7 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
     let (cut, first) = (shares.cut, name(shares.cut));
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let Shares { residual, with_camera, shine_with_camera, shine_in_world, in_groups, of_each, .. } = shares;
+    let in_any_groups = shares.in_any_groups;
     let found = LightCheck {
         one_light_residual: residual,
         with_camera,
@@ -140,6 +166,7 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
         in_groups,
         of_each,
         second_group_begins: first.into(),
+        in_any_groups,
     };
     let remedy =
         "a fit takes one light for all photos, and bakes what differs into the maps: fit photos of one light alone";
@@ -165,6 +192,33 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
             Finding::new(Severity::Warning, "light-in-groups", message).at(Place::View(first.into())).remedy(remedy),
         );
     }
+    let told = match found.kind() {
+        LightKind::InAnyGroups => {
+            let members = |group: usize| {
+                let names: Vec<&str> =
+                    (0..views.len()).filter(|&view| shares.groups[view] == group).map(name).collect();
+                names_of(&names)
+            };
+            let count = shares.groups.iter().max().map_or(0, |last| last + 1);
+            let message = format!(
+                "the photos fall into {count} groups with a light each: {}: that explains {} of how the shading of the same \
+                 surface differs between photos",
+                (0..count).map(members).collect::<Vec<_>>().join("; "),
+                percent(in_any_groups)
+            );
+            Some(Finding::new(Severity::Warning, "light-in-groups", message))
+        }
+        LightKind::OfEach => {
+            let message = format!(
+                "the light differs from photo to photo: another for each explains {} of how the shading of the same surface \
+                 differs between them",
+                percent(of_each)
+            );
+            Some(Finding::new(Severity::Warning, "light-differs", message))
+        }
+        _ => None,
+    };
+    report.findings.extend(told.map(|told| told.remedy(remedy)));
     report.light = Some(found);
 }
 
@@ -230,6 +284,7 @@ mod tests {
                 in_groups,
                 of_each,
                 second_group_begins,
+                in_any_groups: 0.0,
             }
             .kind()
         };
@@ -241,5 +296,9 @@ mod tests {
         assert_eq!(of(0.09, [0.69, 0.73, 0.58, 0.46, 0.76]), LightKind::One);
         assert_eq!(of(0.03, [0.1, 0.1, 0.0, 0.95, 0.97]), LightKind::One);
         assert_eq!(of(0.1, [0.9, 0.92, 0.1, 0.93, 0.97]), LightKind::One);
+        // Another light for each photo, and gloss of few views.
+        assert_eq!(of(0.3, [0.12, 0.13, 0.02, 0.14, 0.93]), LightKind::OfEach);
+        assert_eq!(of(0.09, [0.69, 0.73, 0.58, 0.46, 0.93]), LightKind::One);
+        assert_eq!(of(0.3, [0.12, 0.13, 0.02, 0.14, 0.76]), LightKind::One);
     }
 }

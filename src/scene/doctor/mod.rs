@@ -42,6 +42,7 @@ pub mod pixel_centre;
 pub mod probe;
 pub mod resolution;
 mod shading;
+mod shift;
 pub mod silhouette;
 mod trial;
 pub(crate) mod ways;

@@ -8,6 +8,8 @@ use crate::scene::{PixelState, Scene, View};
 
 /// A view with more clipped pixels than this loses highlights that tell roughness.
 const HIGH_CLIPPED_SHARE: f64 = 0.05;
+/// Where more of some photo is clipped, that is a warning.
+const WARNED_CLIPPED_SHARE: f64 = 0.25;
 /// A photo of which more than this is clipped is white.
 const WHITE_SHARE: f64 = 0.995;
 /// A photo whose brightest percent stays below this luminance is black.
@@ -44,6 +46,7 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
     }
     let views = scene.views.len();
     if let Some((most, clipped)) = worst_first(clipped) {
+        let severity = if most > WARNED_CLIPPED_SHARE { Severity::Warning } else { Severity::Note };
         let message = format!(
             "more than {:.0} % of the pixels are clipped in {} views, {:.0} % in the first: {}",
             100.0 * HIGH_CLIPPED_SHARE,
@@ -52,7 +55,7 @@ pub fn check(scene: &Scene, probes: &[Vec<Probe>], report: &mut Report) {
             names_of(&clipped)
         );
         report.findings.push(
-            Finding::new(Severity::Warning, "photo-clipped", message)
+            Finding::new(severity, "photo-clipped", message)
                 .at(Place::View(clipped[0].into()))
                 .remedy("clipped pixels count as a lower bound only; develop the photos darker or from raw"),
         );

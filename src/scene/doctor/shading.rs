@@ -9,6 +9,7 @@
 //! It refuses to say what a share means: [`lights`](super::lights) does.
 
 mod equations;
+mod groups;
 
 use equations::Equations;
 use glam::{DMat3, DVec3};
@@ -60,7 +61,7 @@ impl Sight {
 }
 
 /// Of the squared residuals under one light without gloss, the share in [0, 1] that each explanation takes away.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Shares {
     /// Root mean square of the residuals under one light, in natural logarithms.
     pub residual: f64,
@@ -76,6 +77,10 @@ pub(super) struct Shares {
     pub of_each: f64,
     /// The first view of the second group.
     pub cut: usize,
+    /// Groups of views in any order with a vector each, two or three of them.
+    pub in_any_groups: f64,
+    /// The group of each view; empty where there are none.
+    pub groups: Vec<usize>,
 }
 
 /// Measures the shares; `None` where the equations have no solution.
@@ -97,16 +102,17 @@ pub(super) fn explain(points: &[Sighted], views: usize) -> Option<Shares> {
                 (Some(feature), _) => list(views, named(Unknown::Feature(feature))),
             })
             .collect();
-        equations.least_squares(views + more, &of).map(|found| found.0)
+        equations.least_squares(views + more, &of)
     };
     let only = |range: std::ops::Range<usize>| {
-        residual(range.len(), &|unknown| match unknown {
+        let found = residual(range.len(), &|unknown| match unknown {
             Unknown::Feature(feature) if range.contains(&feature) => Some(feature - range.start),
             _ => None,
-        })
+        });
+        found.map(|found| found.0)
     };
-    let of_one = residual(0, &|_| None)?;
-    let of_each = residual(3 * views, &|unknown| match unknown {
+    let of_one = residual(0, &|_| None)?.0;
+    let (of_each, vectors) = residual(3 * views, &|unknown| match unknown {
         Unknown::Vector { view, axis } => Some(3 * view + axis),
         Unknown::Feature(_) => None,
     })?;
@@ -118,9 +124,23 @@ pub(super) fn explain(points: &[Sighted], views: usize) -> Option<Shares> {
                 Unknown::Vector { view, axis } if view >= cut => Some(axis),
                 _ => None,
             })?;
-            Some((cut, of_cut))
+            Some((cut, of_cut.0))
         })
         .min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let vectors: Vec<DVec3> =
+        vectors.chunks_exact(OF_VIEW).take(views).map(|own| DVec3::new(own[1], own[2], own[3])).collect();
+    let mut of_any = (of_one, Vec::new());
+    for count in [2, 3] {
+        let Some(groups) = groups::of(&vectors, count) else { continue };
+        let found = residual(3 * (count - 1), &|unknown| match unknown {
+            Unknown::Vector { view, axis } => groups[view].checked_sub(1).map(|group| 3 * group + axis),
+            Unknown::Feature(_) => None,
+        });
+        // A third group must take away half of what two leave.
+        if let Some((left, _)) = found.filter(|(left, _)| of_any.1.is_empty() || *left < 0.5 * of_any.0) {
+            of_any = (left, groups);
+        }
+    }
     let share = |residual: f64| if of_one > 0.0 { (1.0 - residual / of_one).clamp(0.0, 1.0) } else { 0.0 };
     let total: f64 = weights.iter().flatten().sum();
     Some(Shares {
@@ -131,6 +151,8 @@ pub(super) fn explain(points: &[Sighted], views: usize) -> Option<Shares> {
         in_groups: share(of_groups),
         of_each: share(of_each),
         cut,
+        in_any_groups: share(of_any.0),
+        groups: of_any.1,
     })
 }
 
@@ -221,6 +243,13 @@ mod tests {
         let other = DVec3::new(-0.4, 0.5, 0.3);
         let two = ball(|view, _, normal, _| if view < 6 { light } else { other }.dot(normal));
         assert!(two.in_groups > 0.8 && two.cut == 6, "{two:?}");
+        // By turns, as of two cameras with a flash each, and of three hours.
+        let turns = ball(|view, _, normal, _| if view % 2 == 0 { light } else { other }.dot(normal));
+        assert!(turns.in_groups < 0.4 && turns.in_any_groups > 0.8, "{turns:?}");
+        assert!((0..16).all(|view| turns.groups[view] == view % 2), "{turns:?}");
+        let third = DVec3::new(-0.3, -0.6, 0.4);
+        let three = ball(|view, _, normal, _| [light, other, third][view / 6].dot(normal));
+        assert!(three.in_any_groups > 0.8 && (0..16).all(|view| three.groups[view] == view / 6), "{three:?}");
     }
 
     #[test]

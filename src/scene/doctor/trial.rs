@@ -102,6 +102,11 @@ impl<'a> Trial<'a> {
         self.pairs.len()
     }
 
+    /// The cameras of a pair.
+    pub fn cameras_of(&self, pair: usize) -> [usize; 2] {
+        self.pairs[pair].cameras
+    }
+
     /// The other cameras of a camera's pairs.
     pub fn neighbours(&self, camera: usize) -> impl Iterator<Item = usize> {
         self.of_camera[camera].iter().flat_map(move |&pair| self.pairs[pair].cameras).filter(move |&own| own != camera)

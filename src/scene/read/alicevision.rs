@@ -1,8 +1,9 @@
 //! AliceVision and Meshroom: `sfm.json`, `cameras.sfm` or any `.sfm` file.
 //!
 //! Numbers are stored as strings. The nine numbers of a rotation are the columns of camera from world, so row by row they are
-//! camera to world; `center` is where the camera stands. The principal point is an offset from the middle in pixels (files before
-//! 2021: absolute, told by its size). Views of a rig stand where its pose and their place in it put them. Of several files the
+//! camera to world; `center` is where the camera stands. The principal point is an offset from the middle in pixels, before
+//! version 1.2.1 absolute; a file without a version is told by the point's size. What is called the ratio of pixels was that of
+//! the focal lengths before version 1.2.5, and the other way up (aliceVision, `sfmDataIO/jsonIO.cpp`). Views of a rig stand where its pose and their place in it put them. Of several files the
 //! first that holds poses is read: `cameraInit.sfm` has none.
 
 use super::blended_mvs::files_of;
@@ -67,8 +68,15 @@ fn malformed(what: &str, place: &Place) -> Error {
     Error::new(ErrorKind::Malformed, what).at(place.clone()).remedy("export the file again (ConvertSfMFormat)")
 }
 
+/// The version of the format, as three numbers; `None` where none is written.
+fn version_of(json: &Value) -> Option<[u64; 3]> {
+    let parts: Vec<f64> = json.get("version").map(numbers)?;
+    let part = |index: usize| parts.get(index).map_or(0, |part| *part as u64);
+    (!parts.is_empty()).then(|| [part(0), part(1), part(2)])
+}
+
 /// Size, intrinsics and lens of an entry of `intrinsics`.
-fn intrinsics_of(entry: &Value, place: &Place) -> Result<((usize, usize), DMat3, Lens)> {
+fn intrinsics_of(entry: &Value, version: Option<[u64; 3]>, place: &Place) -> Result<((usize, usize), DMat3, Lens)> {
     let get = |key: &str| entry.get(key).and_then(number);
     let (Some(width), Some(height)) = (get("width"), get("height")) else {
         return Err(malformed("the intrinsics have no size", place));
@@ -77,19 +85,25 @@ fn intrinsics_of(entry: &Value, place: &Place) -> Result<((usize, usize), DMat3,
         [both] => [*both; 2],
         [x, y] => [*x, *y],
         _ => {
-            // In millimetres on a sensor of known width; pixelRatio is the height of a pixel over its width.
+            // In millimetres on a sensor of known width.
             let (Some(millimetres), Some(sensor)) = (get("focalLength"), get("sensorWidth")) else {
                 return Err(malformed("the intrinsics have no focal length", place));
             };
             let x = millimetres / sensor * width;
-            [x, x * get("pixelRatio").filter(|ratio| *ratio > 0.0).unwrap_or(1.0)]
+            let ratio = get("pixelRatio").filter(|ratio| *ratio > 0.0).unwrap_or(1.0);
+            let is_of_focal_lengths = version.is_some_and(|version| version < [1, 2, 5]);
+            [x, if is_of_focal_lengths { x / ratio } else { x * ratio }]
         }
     };
     let offset = entry.get("principalPoint").map(numbers).unwrap_or_default();
     let middle = [0.5 * width, 0.5 * height];
-    let centre = match offset.as_slice() {
-        [x, y] if x.abs() < 0.5 * middle[0] && y.abs() < 0.5 * middle[1] => [middle[0] + x, middle[1] + y],
-        [x, y] => [*x, *y],
+    let is_offset = |[x, y]: [f64; 2]| match version {
+        Some(version) => version >= [1, 2, 1],
+        None => x.abs() < 0.5 * middle[0] && y.abs() < 0.5 * middle[1],
+    };
+    let centre = match *offset {
+        [x, y] if is_offset([x, y]) => [middle[0] + x, middle[1] + y],
+        [x, y] => [x, y],
         _ => middle,
     };
     let camera = entry.get("type").and_then(Value::as_str).unwrap_or("pinhole");
@@ -193,6 +207,7 @@ pub fn read(path: &Path) -> Result<SourceScene> {
     let by_id = |entries: &'_ [Value], key: &str| -> BTreeMap<String, Value> {
         entries.iter().filter_map(|entry| Some((name(entry.get(key))?, entry.clone()))).collect()
     };
+    let version = version_of(&json);
     let poses = by_id(list("poses"), "poseId");
     let intrinsics = by_id(list("intrinsics"), "intrinsicId");
     let rigs = by_id(list("rigs"), "rigId");
@@ -223,7 +238,7 @@ pub fn read(path: &Path) -> Result<SourceScene> {
             centre += rotation.transpose() * own_centre;
             rotation = own_rotation * rotation;
         }
-        let (size, intrinsics, lens) = intrinsics_of(entry, &place)?;
+        let (size, intrinsics, lens) = intrinsics_of(entry, version, &place)?;
         let translation = -(rotation * centre);
         let (camera, mut noticed) = SourceCamera::new(intrinsics, rotation, translation, &place)?;
         findings.append(&mut noticed);
@@ -264,6 +279,17 @@ mod tests {
         let pinhole = read(&path).unwrap().views[0].camera.pinhole();
         assert_eq!(pinhole.focal_pixels.to_array(), [50.0, 50.0]);
         assert_eq!(pinhole.centre_pixels.to_array(), [21.0, 14.0], "an old file: absolute");
+        // What its version says comes before what numbers look like.
+        let of = |version: &str| {
+            let ratio = format!(r#""version":{version},"#);
+            let json = metric.replacen('{', &format!("{{{ratio}"), 1);
+            std::fs::write(&path, json.replace("\"sensorWidth\"", "\"pixelRatio\":\"2\",\"sensorWidth\"")).unwrap();
+            let pinhole = read(&path).unwrap().views[0].camera.pinhole();
+            (pinhole.focal_pixels.to_array(), pinhole.centre_pixels.to_array())
+        };
+        assert_eq!(of(r#"["1","2","0"]"#), ([50.0, 25.0], [0.5, -0.25]));
+        assert_eq!(of(r#"["1","2","4"]"#), ([50.0, 25.0], [20.5, 14.75]));
+        assert_eq!(of(r#"["1","2","5"]"#), ([50.0, 100.0], [20.5, 14.75]));
     }
 
     const RIG: &str = r#"{"views":[{"poseId":"1","intrinsicId":"5","path":"/far/a.png","rigId":"7","subPoseId":"0"},

@@ -74,6 +74,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
         has_truth: false,
         flip_winding: false,
         is_of_a_tool: false,
+        sizes_are_of_files: false,
         mesh_frames: Vec::new(),
         findings,
     })

@@ -124,7 +124,8 @@ pub fn read(bundle: &Path, folder: &Path) -> Result<SourceScene> {
         let message = format!("{unregistered} of {count} cameras were not registered and are skipped");
         findings.push(Finding::new(Severity::Note, "camera-not-aligned", message).at(Place::File(bundle.into())));
     }
-    scene_of(folder, posed, &photos, &[folder.into()], findings)
+    let scene = scene_of(folder, posed, &photos, &[folder.into()], findings)?;
+    Ok(SourceScene { sizes_are_of_files: true, ..scene })
 }
 
 #[cfg(test)]

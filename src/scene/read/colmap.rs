@@ -2,48 +2,31 @@
 //!
 //! ```text
 //! sparse/0/ or sparse/ or the folder itself:   cameras, images (.bin preferred to .txt); rigs and frames are not needed;
-//!                                              of sparse/0/, sparse/1/, ... the one with the most images
+//!                                              of sparse/0/, sparse/1/, ... the one with the most images;
+//!                                              of an undistorted workspace and what it was made from, the one whose photos are here
 //! images/                                      photos, in subfolders too; masks/ by the names of photos
 //! meshed-poisson.ply, textured/mesh.ply, ...   or any other mesh; dense/0/ is looked into
 //! ```
 //! World to camera, OpenCV axes, quaternions as w x y z, the first pixel's centre at (0.5, 0.5) (COLMAP, `doc/format.rst` and
 //! `sensor/models.h`).
 
-use super::bytes::Bytes;
-use super::camera_file::read_text;
-use super::colmap_lens::{lens_of, model_of_id, model_of_name};
+use super::colmap_files::{ColmapImage, read_cameras_bin, read_cameras_txt, read_images_bin, read_images_txt};
+use super::colmap_lens::lens_of;
 use super::mesh_choice;
 use super::photo_index::PhotoIndex;
 use super::posed::{Posed, views_of};
 use super::source::{SourceCamera, SourceScene};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::files::folder_of;
 use glam::{DMat3, DQuat, DVec3};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Folders the model may lie in, or models in folders that are numbers.
 const MODEL_FOLDERS: [&str; 6] =
     ["sparse", "", "colmap/sparse", "dense/sparse", "dense/0/sparse", "undistorted/sparse"];
 
-/// Words of an image's line: its number, seven of its pose, its camera's number, a name.
-const WORDS_OF_IMAGE: usize = 10;
-
-/// A camera of `cameras`.
-struct ColmapCamera {
-    model: &'static str,
-    size: (usize, usize),
-    parameters: Vec<f64>,
-    place: Place,
-}
-
-/// An image of `images`.
-struct ColmapImage {
-    rotation: [f64; 4],
-    translation: DVec3,
-    camera: u32,
-    name: String,
-    place: Place,
-}
+/// Folders of undistorted photos, with cameras of their own.
+const WORKSPACES: [&str; 3] = ["dense", "undistorted", "stereo"];
 
 /// The folder of the model under a scene's folder; of several the one with the most images.
 pub fn model_folder(folder: &Path) -> Option<PathBuf> {
@@ -57,41 +40,68 @@ fn holds_model(folder: &Path) -> bool {
 }
 
 /// The models that lie side by side under a scene's folder, with how many images each has; the largest first. What cannot
-/// be connected becomes a model of its own, `sparse/0`, `sparse/1` and so on.
+/// be connected becomes a model of its own, `sparse/0`, `sparse/1` and so on. An undistorted workspace has cameras of its own:
+/// the first place counts whose photos are here.
 fn models_of(folder: &Path) -> Vec<(PathBuf, usize)> {
-    for base in MODEL_FOLDERS.iter().map(|inner| folder.join(inner)) {
-        // In a folder of cameras and images nothing else is looked for.
-        if base == folder.join("") && holds_model(&base) {
-            return vec![(base, 0)];
-        }
-        let is_number = |path: &PathBuf| {
-            path.file_name().is_some_and(|name| name.to_string_lossy().bytes().all(|byte| byte.is_ascii_digit()))
-        };
-        let entries = std::fs::read_dir(&base).into_iter().flatten();
-        let mut numbered: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
-        numbered.retain(|path| is_number(path) && holds_model(path));
-        numbered.sort();
-        if numbered.len() > 1 {
-            let mut counted: Vec<(PathBuf, usize)> =
-                numbered.into_iter().map(|model| (model.clone(), images_of(&model))).collect();
-            counted.sort_by_key(|(_, images)| std::cmp::Reverse(*images));
-            return counted;
-        }
-        if let Some(only) = numbered.pop().or_else(|| holds_model(&base).then_some(base)) {
-            return vec![(only, 0)];
-        }
-    }
-    Vec::new()
+    // In a folder of cameras and images nothing else is looked for.
+    let places = MODEL_FOLDERS.iter().map(|inner| models_at(&folder.join(inner), inner.is_empty()));
+    let mut places: Vec<Vec<(PathBuf, usize)>> = places.filter(|models| !models.is_empty()).collect();
+    let own = if places.len() > 1 { places.iter().position(|models| has_photos(&models[0].0, folder)) } else { None };
+    if places.is_empty() { Vec::new() } else { places.swap_remove(own.unwrap_or(0)) }
 }
 
-/// How many images a model has; 0 for one that cannot be read.
-fn images_of(model: &Path) -> usize {
+/// The models of one place.
+fn models_at(base: &Path, is_itself: bool) -> Vec<(PathBuf, usize)> {
+    if is_itself && holds_model(base) {
+        return vec![(base.into(), 0)];
+    }
+    let entries = std::fs::read_dir(base).into_iter().flatten();
+    let mut numbered: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    numbered.retain(|path| is_numbered(path) && holds_model(path));
+    numbered.sort();
+    if numbered.len() > 1 {
+        let mut counted: Vec<(PathBuf, usize)> =
+            numbered.into_iter().map(|model| (model.clone(), images_of(&model).len())).collect();
+        counted.sort_by_key(|(_, images)| std::cmp::Reverse(*images));
+        return counted;
+    }
+    let only = numbered.pop().or_else(|| holds_model(base).then(|| base.to_path_buf()));
+    only.map(|model| (model, 0)).into_iter().collect()
+}
+
+fn is_numbered(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().bytes().all(|byte| byte.is_ascii_digit()))
+}
+
+/// Whether something below the scene's folder is of undistorted photos.
+fn is_of_workspace(path: &Path, folder: &Path) -> bool {
+    let below = path.strip_prefix(folder).unwrap_or(path);
+    below.iter().any(|part| WORKSPACES.iter().any(|name| part.eq_ignore_ascii_case(name)))
+}
+
+/// Whether photos of a model are where it looks for them: those of an undistorted workspace beside it, others in a folder of the
+/// scene that is none of a workspace.
+fn has_photos(model: &Path, folder: &Path) -> bool {
+    let base = if is_numbered(model) { folder_of(model) } else { model };
+    let home = if base.ends_with("sparse") { folder_of(base) } else { base };
+    let homes = if is_of_workspace(home, folder) { vec![home] } else { vec![home, folder] };
+    let folders_in = |home: &&Path| {
+        let entries = std::fs::read_dir(home).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
+        let inner =
+            entries.filter(|path| path.is_dir() && (is_of_workspace(home, folder) || !is_of_workspace(path, folder)));
+        std::iter::once(home.to_path_buf()).chain(inner).collect::<Vec<_>>()
+    };
+    let roots: Vec<PathBuf> = homes.iter().flat_map(folders_in).collect();
+    images_of(model).iter().any(|image| roots.iter().any(|root| root.join(&image.name).is_file()))
+}
+
+/// The images of a model; none of one that cannot be read.
+fn images_of(model: &Path) -> Vec<ColmapImage> {
     let binary = model.join("images.bin");
     if model.join("cameras.bin").is_file() && binary.is_file() {
-        let count = Bytes::open(&binary).and_then(|mut bytes| bytes.count("the number of images", 73));
-        return count.unwrap_or(0);
+        return read_images_bin(&binary).unwrap_or_default();
     }
-    read_images_txt(&model.join("images.txt")).map_or(0, |(images, _)| images.len())
+    read_images_txt(&model.join("images.txt")).map(|(images, _)| images).unwrap_or_default()
 }
 
 /// That one of several models is read.
@@ -160,183 +170,22 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
         bases.iter().flat_map(|base| names.iter().map(move |name| base.join(name))).collect()
     };
     let mut roots = named(&["images", "image", "photos", "input"]);
+    if !is_of_workspace(&model, folder) {
+        // What is undistorted is of other cameras, so that it comes after all other folders.
+        let entries = std::fs::read_dir(folder).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
+        let mut others: Vec<PathBuf> = entries.filter(|path| path.is_dir()).collect();
+        if others.iter().any(|path| is_of_workspace(path, folder)) {
+            others.retain(|path| !is_of_workspace(path, folder));
+            others.sort();
+            roots.append(&mut others);
+        }
+    }
     roots.retain(|root| root.is_dir());
     roots.push(folder.into());
     roots.dedup();
     let views = views_of(posed, &PhotoIndex::of_folders(&roots)?, &bases, &mut findings)?;
     let mesh = mesh_choice::find(&[bases, vec![model.clone()]].concat(), &mut findings);
     Ok(SourceScene { findings, ..SourceScene::of_photographs(folder, mesh, views) })
-}
-
-/// Cameras by their number. One that cannot be read is an error only for the images that name it.
-type ColmapCameras = BTreeMap<u32, Result<ColmapCamera>>;
-
-fn read_cameras_bin(path: &Path) -> Result<ColmapCameras> {
-    let mut bytes = Bytes::open(path)?;
-    let count = bytes.count("the number of cameras", 24)?;
-    let mut cameras = BTreeMap::new();
-    for _ in 0..count {
-        let place = bytes.place();
-        let id = bytes.u32("the number of a camera")?;
-        let (model, parameter_count) = model_of_id(bytes.u32("the model of a camera")? as i32, &place)?;
-        let size = (bytes.u64("the width")? as usize, bytes.u64("the height")? as usize);
-        let parameters = (0..parameter_count).map(|_| bytes.f64("a parameter")).collect::<Result<_>>()?;
-        cameras.insert(id, Ok(ColmapCamera { model, size, parameters, place }));
-    }
-    Ok(cameras)
-}
-
-fn read_images_bin(path: &Path) -> Result<Vec<ColmapImage>> {
-    let mut bytes = Bytes::open(path)?;
-    let count = bytes.count("the number of images", 73)?;
-    let mut images = Vec::new();
-    for _ in 0..count {
-        let place = bytes.place();
-        bytes.u32("the number of an image")?;
-        let mut pose = [0.0; 7];
-        for value in &mut pose {
-            *value = bytes.f64("a pose")?;
-        }
-        let camera = bytes.u32("the camera of an image")?;
-        let name = bytes.text_to_zero("the name of an image")?;
-        let points = bytes.count("the number of points", 24)?;
-        bytes.skip(points * 24, "the points of an image")?;
-        let rotation = [pose[0], pose[1], pose[2], pose[3]];
-        images.push(ColmapImage { rotation, translation: DVec3::new(pose[4], pose[5], pose[6]), camera, name, place });
-    }
-    Ok(images)
-}
-
-/// A word as a number, with its line where it is none.
-fn parsed<T: std::str::FromStr>(word: Option<&str>, what: &str, path: &Path, line: usize) -> Result<T> {
-    word.and_then(|word| word.parse().ok()).ok_or_else(|| {
-        Error::new(ErrorKind::Malformed, format!("'{}' is not {what}", word.unwrap_or_default()))
-            .at(Place::Line(path.into(), line))
-            .remedy("the file is cut short or damaged: export it again")
-    })
-}
-
-fn read_cameras_txt(path: &Path) -> Result<ColmapCameras> {
-    let text = read_text(path)?;
-    let mut cameras = BTreeMap::new();
-    for (index, line) in text.lines().enumerate() {
-        if line.trim().is_empty() || line.trim_start().starts_with('#') {
-            continue;
-        }
-        let (id, rest) = line.trim_start().split_once(char::is_whitespace).unwrap_or((line, ""));
-        let id = parsed(Some(id), "the number of a camera", path, index + 1)?;
-        cameras.insert(id, camera_of_line(rest, path, index + 1));
-    }
-    Ok(cameras)
-}
-
-/// A camera of what stands behind its number.
-fn camera_of_line(text: &str, path: &Path, line: usize) -> Result<ColmapCamera> {
-    let place = Place::Line(path.into(), line);
-    let mut words = text.split_whitespace();
-    let (model, count) = model_of_name(words.next().unwrap_or_default(), &place)?;
-    let width = parsed(words.next(), "a width", path, line)?;
-    let height = parsed(words.next(), "a height", path, line)?;
-    let parameters: Vec<f64> =
-        words.map(|word| parsed(Some(word), "a parameter", path, line)).collect::<Result<_>>()?;
-    if parameters.len() != count {
-        return Err(Error::new(
-            ErrorKind::Malformed,
-            format!("the model {model} has {count} parameters, not {}", parameters.len()),
-        )
-        .at(place)
-        .remedy("export the model again"));
-    }
-    Ok(ColmapCamera { model, size: (width, height), parameters, place })
-}
-
-/// What a line of `images.txt` looks like.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum ImagesLine {
-    Blank,
-    Points,
-    Image,
-    Neither,
-}
-
-/// The images of a text, and what of it was passed over: damage where the points of an image stand, which nobody needs.
-fn read_images_txt(path: &Path) -> Result<(Vec<ColmapImage>, Vec<Finding>)> {
-    use ImagesLine::{Blank, Image, Neither, Points};
-    let text = read_text(path)?;
-    let lines = text.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with('#'));
-    let lines: Vec<(usize, &str, ImagesLine)> =
-        lines.map(|(index, line)| (index + 1, line, kind_of(line, path, index + 1))).collect();
-    // The points of an image stand on a line of their own, which may be empty. Some programs leave it out: then a line that
-    // is no image is a damaged one.
-    let points = lines.iter().filter(|(_, _, kind)| *kind == Points).count();
-    let left_out = lines.windows(2).filter(|pair| (pair[0].2, pair[1].2) == (Image, Image)).count() > points;
-    let (mut images, mut findings) = (Vec::new(), Vec::new());
-    let mut lines = lines.into_iter().peekable();
-    while let Some((number, line, kind)) = lines.next() {
-        if kind == Blank {
-            continue;
-        }
-        images.push(image_of_line(line, path, number)?);
-        let is_of_image = |line: &str, kind| match kind {
-            Blank => true,
-            Image => false,
-            Points => !left_out || line.split_whitespace().count() >= WORDS_OF_IMAGE,
-            Neither => !left_out && points > 0,
-        };
-        if let Some((number, _, Neither)) = lines.next_if(|(_, line, kind)| is_of_image(line, *kind)) {
-            let message = "the points of an image are damaged: they are passed over";
-            let remedy = "nothing depends on them here; if the line was meant for an image, export the model again";
-            findings.push(
-                Finding::new(Severity::Warning, "image-points-damaged", message)
-                    .at(Place::Line(path.into(), number))
-                    .remedy(remedy),
-            );
-        }
-    }
-    Ok((images, findings))
-}
-
-fn kind_of(line: &str, path: &Path, number: usize) -> ImagesLine {
-    match () {
-        () if line.trim().is_empty() => ImagesLine::Blank,
-        () if is_of_points(line) => ImagesLine::Points,
-        () if image_of_line(line, path, number).is_ok() => ImagesLine::Image,
-        () => ImagesLine::Neither,
-    }
-}
-
-/// Whether a line has nothing but points: x, y and the number of a point in space, as often as there are points.
-fn is_of_points(line: &str) -> bool {
-    let mut count = 0;
-    line.split_whitespace().all(|word| {
-        count += 1;
-        word.parse::<f64>().is_ok()
-    }) && count % 3 == 0
-}
-
-fn image_of_line(line: &str, path: &Path, number: usize) -> Result<ColmapImage> {
-    let mut pose = [0.0; 7];
-    let mut rest = line.trim_start();
-    let mut next = || {
-        let (word, after) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
-        rest = after.trim_start();
-        word
-    };
-    parsed::<u32>(Some(next()), "the number of an image", path, number)?;
-    for value in &mut pose {
-        *value = parsed(Some(next()), "a number of a pose", path, number)?;
-    }
-    let camera = parsed(Some(next()), "the number of a camera", path, number)?;
-    let place = Place::Line(path.into(), number);
-    let rotation = [pose[0], pose[1], pose[2], pose[3]];
-    let translation = DVec3::new(pose[4], pose[5], pose[6]);
-    // What is left is the name, spaces and all.
-    if rest.trim_end().is_empty() {
-        return Err(Error::new(ErrorKind::Malformed, "the image has no name")
-            .at(place)
-            .remedy("the file is cut short or damaged: export it again"));
-    }
-    Ok(ColmapImage { rotation, translation, camera, name: rest.trim_end().to_owned(), place })
 }
 
 #[cfg(test)]

@@ -226,3 +226,36 @@ fn a_damaged_image_is_an_error_with_its_line_and_damaged_points_are_told() {
     assert_eq!(read(&format!("{}\n\n2 1 0 0 0 0 0 4 2\n\n", image(1))).unwrap_err(), line(3), "no name");
     assert_eq!(read(&format!("{}\n{}\n{points}\n", image(1), image(2))).unwrap().0, 2, "left out where there are none");
 }
+
+#[test]
+fn undistorted_photos_go_with_the_cameras_of_their_workspace() {
+    // As a reconstruction leaves it whose original photos lie elsewhere.
+    for inner in ["dense", "dense/0", "undistorted"] {
+        let folder = tempfile::tempdir().unwrap();
+        let workspace = folder.path().join(inner);
+        for model in [folder.path().join("sparse/0"), workspace.join("sparse")] {
+            std::fs::create_dir_all(&model).unwrap();
+            std::fs::write(model.join("images.txt"), IMAGES).unwrap();
+            std::fs::write(model.join("cameras.txt"), CAMERAS).unwrap();
+        }
+        let pinholes = "1 PINHOLE 40 30 50 50 20 15\n2 PINHOLE 40 30 50 50 20 15\n";
+        std::fs::write(workspace.join("sparse/cameras.txt"), pinholes).unwrap();
+        std::fs::write(workspace.join("meshed-poisson.ply"), TRIANGLE).unwrap();
+        let put_photos = |images: &Path| {
+            for photo in PHOTOS {
+                let path = images.join(photo);
+                std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+                file::write_png_srgb8(&path, &Image::filled(40, 30, [9; 3])).unwrap();
+            }
+        };
+        put_photos(&workspace.join("images"));
+        let scene = read(folder.path()).unwrap();
+        assert!(scene.views.iter().all(|view| view.lens.is_none() && view.photo.starts_with(&workspace)), "{inner}");
+        assert_eq!(model_folder(folder.path()).unwrap(), workspace.join("sparse"));
+        // With the original photos beside it, in whatever folder, the original cameras are read.
+        put_photos(&folder.path().join("walk"));
+        let scene = read(folder.path()).unwrap();
+        assert!(scene.views.iter().any(|view| view.lens.is_some()), "{inner}");
+        assert!(scene.views.iter().all(|view| view.photo.starts_with(folder.path().join("walk"))), "{inner}");
+    }
+}

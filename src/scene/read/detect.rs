@@ -74,7 +74,7 @@ impl Format {
             Format::Manifest => "scene.toml",
             Format::Exchange => "cameras.json",
             Format::BlendedMvs => "blended_images/, cams/ and textured_mesh/",
-            Format::MetashapeProject => "a project .psx with its .files/",
+            Format::MetashapeProject => "a project .psx with its .files/, or .psz",
             Format::Transforms => "transforms.json or transforms_train.json",
             Format::MetashapeCameras => "an XML file of exported cameras",
             Format::Colmap => "cameras and images, .bin or .txt, in sparse/0/, sparse/ or the folder itself",
@@ -230,7 +230,7 @@ pub fn locate(path: &Path) -> Result<Located> {
         let folder = folder_of(path).to_path_buf();
         let format = match extension.as_str() {
             "toml" => Format::Manifest,
-            "psx" => Format::MetashapeProject,
+            "psx" | "psz" => Format::MetashapeProject,
             "xml" => Format::MetashapeCameras,
             "sfm" => Format::AliceVision,
             "mvs" => Format::OpenMvs,
@@ -239,7 +239,7 @@ pub fn locate(path: &Path) -> Result<Located> {
             _ => {
                 return Err(Error::new(
                     ErrorKind::Unsupported,
-                    "a scene is a folder, or a file scene.toml, .psx, .xml, .sfm, .mvs, .csv or .out in it",
+                    "a scene is a folder, or a file scene.toml, .psx, .psz, .xml, .sfm, .mvs, .csv or .out in it",
                 )
                 .at(Place::File(path.into()))
                 .remedy("give the folder that holds the photos and the mesh"));

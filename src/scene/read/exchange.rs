@@ -131,6 +131,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
         has_truth: true,
         flip_winding: false,
         is_of_a_tool: false,
+        sizes_are_of_files: false,
         mesh_frames: Vec::new(),
         findings,
     })

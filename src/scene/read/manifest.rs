@@ -130,6 +130,7 @@ pub fn read(path: &Path) -> Result<SourceScene> {
         has_truth: false,
         flip_winding: manifest.flip_winding,
         is_of_a_tool: false,
+        sizes_are_of_files: false,
         mesh_frames: Vec::new(),
         findings,
     })

@@ -11,9 +11,11 @@ use std::path::{Path, PathBuf};
 
 /// Extensions of photos and masks that are read.
 pub const PHOTO_EXTENSIONS: [&str; 8] = ["jpg", "jpeg", "png", "tif", "tiff", "exr", "hdr", "pfm"];
-/// Extensions of raw files and of phones' photos, which are not read.
-pub const EXTENSIONS_NOT_READ: [&str; 14] =
-    ["dng", "nef", "cr2", "cr3", "arw", "raf", "orf", "rw2", "pef", "srw", "heic", "heif", "avif", "webp"];
+/// Extensions of raw files, of phones' photos and of others that are not read.
+pub const EXTENSIONS_NOT_READ: [&str; 22] = [
+    "dng", "nef", "cr2", "cr3", "arw", "raf", "orf", "rw2", "pef", "srw", "heic", "heif", "avif", "webp", "bmp", "gif",
+    "jp2", "j2k", "jxl", "pgm", "ppm", "tga",
+];
 /// Names of folders of masks, in any case, the likelier first.
 const FOLDER_NAMES: [&str; 4] = ["masks", "mask", "silhouettes", "silhouette"];
 /// Names of folders of photos, in which masks may have a folder of theirs.

@@ -10,12 +10,14 @@ const EXTENSIONS: [&str; 5] = ["obj", "ply", "glb", "gltf", "stl"];
 /// Extensions of meshes and scenes that are not read.
 const NOT_READ: [&str; 14] =
     ["fbx", "off", "dae", "3ds", "usd", "usda", "usdc", "usdz", "x3d", "wrl", "3mf", "blend", "abc", "ctm"];
+/// Folder of a mesh with a texture, as COLMAP writes it beside the mesh without one.
+const TEXTURED: &str = "textured";
 /// Folders a mesh may lie in, the better first.
 const FOLDERS: [&str; 13] = [
     "",
     "mesh",
     "meshes",
-    "textured",
+    TEXTURED,
     "textured_mesh",
     "model",
     "models",
@@ -46,7 +48,13 @@ pub fn find(folders: &[PathBuf], findings: &mut Vec<Finding>) -> Vec<PathBuf> {
                 let whole = NAMES.iter().position(|known| name == *known);
                 let begins = || BEGINNINGS.iter().position(|known| name.starts_with(known)).unwrap_or(BEGINNINGS.len());
                 let by_name = whole.unwrap_or_else(|| NAMES.len() + begins());
-                let rank = (depth * FOLDERS.len() + order, by_name, kind);
+                // What was textured is meant before what it was made from, unless that has a name of its own.
+                let order = match (*inner, whole) {
+                    ("", Some(_)) => 0,
+                    (TEXTURED, Some(_)) => 1,
+                    _ => order + 2,
+                };
+                let rank = (depth * (FOLDERS.len() + 2) + order, by_name, kind);
                 if !found.iter().any(|(_, other)| *other == path) {
                     found.push((rank, path));
                 }

@@ -3,14 +3,15 @@
 use super::source_mesh::{SourceMesh, vertex_index};
 use super::{obj, outliers, ply, stl};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::math::statistics::quantile;
 use crate::scene::Mesh;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::path::{Path, PathBuf};
 
-/// Reads one mesh file by its extension, in source coordinates.
+/// Reads one mesh file by its extension, in source coordinates; a PLY file may be an entry of an archive.
 pub fn read_one(path: &Path) -> Result<SourceMesh> {
-    if !path.is_file() {
+    if !path.is_file() && !path.parent().is_some_and(Path::is_file) {
         return Err(Error::new(ErrorKind::Missing, "there is no mesh file here")
             .at(Place::File(path.into()))
             .remedy("check the path"));
@@ -69,11 +70,43 @@ pub fn read_pieces(paths: &[PathBuf]) -> Result<SourceMesh> {
             .remedy("nothing is lost: the fit makes its own atlas"),
         );
     }
+    let rounded = told_of_rounding(&whole);
+    whole.findings.extend(rounded);
     join_equal_vertices(&mut whole);
     super::udim::lay_out(&mut whole);
     outliers::leave_out(&mut whole);
     leave_out_copies(&mut whole);
     Ok(whole)
+}
+
+/// That coordinates so far from the origin were rounded to single precision by more than a part of the edges: then places
+/// fall together, and triangles lose their area.
+fn told_of_rounding(mesh: &SourceMesh) -> Option<Finding> {
+    /// Edges that are looked at.
+    const LOOKED_AT: usize = 3000;
+    /// Part of the median edge that rounding may take.
+    const MOST_PART: f64 = 0.05;
+    let step = (mesh.triangles.len() / LOOKED_AT).max(1);
+    let corners =
+        mesh.triangles.iter().step_by(step).map(|triangle| triangle.map(|corner| mesh.positions[corner as usize]));
+    let corners: Vec<_> = corners.filter(|[a, b, _]| a.is_finite() && b.is_finite()).collect();
+    let is_single = |value: f64| f64::from(value as f32) == value;
+    if corners.is_empty() || !corners.iter().flatten().flat_map(|place| place.to_array()).all(is_single) {
+        return None;
+    }
+    let lengths: Vec<f64> = corners.iter().map(|[a, b, _]| a.distance(*b)).collect();
+    let distances: Vec<f64> = corners.iter().map(|[a, ..]| a.abs().max_element()).collect();
+    let (edge, distance) = (quantile(&lengths, 0.5), quantile(&distances, 0.5));
+    let rounding = distance * f64::from(f32::EPSILON);
+    let message = format!(
+        "coordinates are some {distance:.3e} from the origin and were rounded to {rounding:.2} by single precision, which is {:.0} % \
+         of a usual edge",
+        100.0 * rounding / edge.max(f64::MIN_POSITIVE)
+    );
+    (rounding > MOST_PART * edge).then(|| {
+        Finding::new(Severity::Warning, "mesh-rounded", message)
+            .remedy("export mesh and cameras in double precision, or both with the same shift towards the origin")
+    })
 }
 
 /// Leaves out triangles between the same three places as an earlier one, whichever way they are wound.
@@ -169,4 +202,26 @@ pub fn read_mesh(path: &Path) -> Result<(Mesh, Vec<Finding>)> {
     let (mesh, findings) = source.into_world(&world);
     mesh.validate()?;
     Ok((mesh, findings))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    #[test]
+    fn coordinates_that_were_rounded_are_told() {
+        let mesh = |far: f64, is_single: bool| {
+            let place = |index: u32| {
+                let own = DVec3::new(far + 0.37 * f64::from(index), 0.2 * f64::from(index % 7), 0.1);
+                if is_single { own.as_vec3().as_dvec3() } else { own }
+            };
+            let triangles = (0..30).map(|index| [index, index + 1, index + 2]).collect();
+            SourceMesh { positions: (0..40).map(place).collect(), triangles, ..Default::default() }
+        };
+        let told = told_of_rounding(&mesh(4.5e6, true)).unwrap();
+        assert!(told.code == "mesh-rounded" && told.message.contains("0.54"), "{told}");
+        assert!(told_of_rounding(&mesh(4.5e6, false)).is_none(), "doubles");
+        assert!(told_of_rounding(&mesh(3.0, true)).is_none() && told_of_rounding(&SourceMesh::default()).is_none());
+    }
 }

@@ -30,6 +30,8 @@ const LEAST_GAIN_SHARE_OF_SOUND: f64 = 0.5;
 const LEAST_GAIN_OF_SOUND: f64 = 0.05;
 /// What one measure may lose where the other gains.
 const MOST_LOSS: f64 = 0.1;
+/// A mesh that is seen from the outside as it is, is not moved to where so many more of its back faces are seen.
+const MOST_MORE_BACK_FACES: f64 = 0.2;
 
 /// Whether nothing that was measured speaks against the frame, and something for it, by these measures.
 fn is_sound(rating: &Rating, least_agreement: f64, least_overlap: f64) -> bool {
@@ -51,7 +53,7 @@ fn is_better_than_sound(other: &Rating, own: &Rating) -> bool {
 }
 
 /// Whether photos or masks say that one frame is clearly better than what there is.
-fn is_clearly_better(other: &Rating, own: &Rating) -> bool {
+pub(super) fn is_clearly_better(other: &Rating, own: &Rating) -> bool {
     // What was measured and is no more is lost.
     let loses =
         |other: Option<f64>, own: Option<f64>| own.is_some_and(|old| other.is_none_or(|new| new < old - MOST_LOSS));
@@ -62,6 +64,12 @@ fn is_clearly_better(other: &Rating, own: &Rating) -> bool {
     let by_agreement = gains(other.agreement, own.agreement, LEAST_AGREEMENT, LEAST_GAIN_SHARE);
     let by_overlap = gains(other.overlap, own.overlap, SOUND_OVERLAP, 0.0);
     by_agreement && !loses(other.overlap, own.overlap) || by_overlap && !loses(other.agreement, own.agreement)
+}
+
+/// Whether photos or masks say that lengths are of another unit: of a mesh that is small enough some place suits any photos.
+fn is_of_its_units(rating: &Rating) -> bool {
+    rating.agreement.is_some_and(|agreement| agreement >= SOUND_AGREEMENT)
+        || rating.overlap.is_some_and(|overlap| overlap >= SOUND_OVERLAP)
 }
 
 /// Whether a mesh that is out of sight as it is may stand in this frame: what was measured speaks for it, or nothing was and it
@@ -114,8 +122,9 @@ pub fn put_right(
     let is_lost = as_it_is.views < FAILING_SHARE;
     let is_wanted = |own: &&(Rating, Trial)| match is_lost {
         true => is_credible(own),
+        false if own.0.back_faces > as_it_is.back_faces + MOST_MORE_BACK_FACES => false,
         false if is_doubtless => is_better_than_sound(&own.0, &as_it_is),
-        false => is_clearly_better(&own.0, &as_it_is),
+        false => is_clearly_better(&own.0, &as_it_is) && (!own.1.changes_units || is_of_its_units(&own.0)),
     };
     let wanted: Vec<&(Rating, Trial)> = rated.iter().filter(is_wanted).collect();
     match wanted.first() {

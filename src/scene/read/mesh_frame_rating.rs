@@ -7,7 +7,7 @@ use super::source::{MeshFrame, SourceCamera};
 use super::source_mesh::SourceMesh;
 use crate::math::statistics::quantile;
 use crate::math::{evenly_spread, parallel};
-use crate::scene::doctor::probe::{Probe, probe_about};
+use crate::scene::doctor::probe::{Probe, probe_about, surface_at};
 use crate::scene::doctor::ways::{self, Way};
 use crate::scene::doctor::{agreement, silhouette};
 use crate::scene::{Background, Camera, Mesh, Scene, View, WorldFromSource};
@@ -32,6 +32,8 @@ pub struct Rating {
     pub agreement: Option<f64>,
     /// Intersection over union of masks and outline, the median over the masked views; `None` without masks.
     pub overlap: Option<f64>,
+    /// Share of what cameras see of it that is back faces.
+    pub back_faces: f64,
 }
 
 impl fmt::Display for Rating {
@@ -129,7 +131,21 @@ impl<'a> Rater<'a> {
         let overlaps: Vec<f64> =
             self.masked.iter().map(|&view| silhouette::overlap(&self.scene.views[view], &probes[view])).collect();
         let overlap = (!overlaps.is_empty()).then(|| quantile(&overlaps, 0.5));
-        Rating { agreement: agreement::measure(&self.scene, bvh, &probes), overlap, ..seen }
+        let back_faces = self.back_faces(&probes);
+        Rating { agreement: agreement::measure(&self.scene, bvh, &probes), overlap, back_faces, ..seen }
+    }
+
+    fn back_faces(&self, probes: &[Vec<Probe>]) -> f64 {
+        let (mut hits, mut back) = (0usize, 0usize);
+        for (view, probes) in self.scene.views.iter().zip(probes) {
+            let eye = view.camera.position_in_world();
+            for hit in probes.iter().filter_map(|probe| probe.hit.as_ref()) {
+                let Some((point, normal, _)) = surface_at(&self.scene.mesh, hit) else { continue };
+                hits += 1;
+                back += usize::from(normal.dot(eye - point) < 0.0);
+            }
+        }
+        back as f64 / hits.max(1) as f64
     }
 
     /// Which way the photos lie that may be turned by these `orientations`, by the mesh as it is.

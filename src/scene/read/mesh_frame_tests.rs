@@ -173,8 +173,13 @@ fn photos_tell_the_frame_of_a_mesh_that_all_cameras_look_at() {
 
 #[test]
 fn a_frame_that_does_well_gives_way_to_one_that_lacks_less_than_half_as_much() {
-    let rating =
-        |agreement: f64, overlap: Option<f64>| Rating { views: 1.0, points: 1.0, agreement: Some(agreement), overlap };
+    let rating = |agreement: f64, overlap: Option<f64>| Rating {
+        views: 1.0,
+        points: 1.0,
+        agreement: Some(agreement),
+        overlap,
+        back_faces: 0.0,
+    };
     let own = rating(0.75, None);
     assert!(is_sound(&own, SOUND_AGREEMENT, SOUND_OVERLAP) && !is_sound(&own, SURE_AGREEMENT, SURE_OVERLAP));
     assert!(is_better_than_sound(&rating(0.99, None), &own));

@@ -95,7 +95,16 @@ fn sensor(node: Node, place: &Place) -> Result<Option<Sensor>> {
 struct Camera<'a, 'b> {
     node: Node<'a, 'b>,
     label: &'a str,
+    /// Label of the group it is in, which may be the folder of its photo.
+    group: Option<&'a str>,
     transform: Option<&'a str>,
+}
+
+impl Camera<'_, '_> {
+    /// The path of its photo as far as labels tell: within its group.
+    fn listed(&self) -> String {
+        self.group.map_or_else(|| self.label.to_owned(), |group| format!("{group}/{}", self.label))
+    }
 }
 
 fn is_disabled(node: Node) -> bool {
@@ -109,6 +118,10 @@ fn cameras_of<'a, 'b>(chunk: Node<'a, 'b>) -> Vec<Camera<'a, 'b>> {
         .map(|node| Camera {
             node,
             label: node.attribute("label").unwrap_or_default(),
+            group: node
+                .parent()
+                .filter(|parent| parent.has_tag_name("group"))
+                .and_then(|group| group.attribute("label")),
             transform: text_of(node, "transform"),
         })
         .collect()
@@ -119,7 +132,7 @@ pub fn aligned_labels(chunk: Node) -> Vec<String> {
     let (cameras, sensors) = (cameras_of(chunk), sensors_of(chunk));
     let is_placed = |camera: &Camera| camera.transform.is_some() || on_rig(camera.node, &cameras, &sensors).is_some();
     let used = cameras.iter().filter(|camera| !is_disabled(camera.node) && is_placed(camera));
-    used.map(|camera| camera.label.to_owned()).collect()
+    used.map(Camera::listed).collect()
 }
 
 fn sensors_of<'a, 'b>(chunk: Node<'a, 'b>) -> BTreeMap<&'a str, Node<'a, 'b>> {
@@ -188,7 +201,8 @@ pub fn read(
     let mut posed = Vec::new();
     let (mut unaligned, mut of_rigs, mut excluded, mut uncalibrated) = (vec![], vec![], vec![], vec![]);
     let mut on_rigs = Vec::new();
-    for &Camera { node, label, transform } in &listed {
+    for camera in &listed {
+        let &Camera { node, label, transform, .. } = camera;
         if is_disabled(node) {
             excluded.push(label.to_owned());
             continue;
@@ -224,7 +238,7 @@ pub fn read(
         let source_from_camera = DMat4::from_cols_array(&rows).transpose() * offset;
         on_rigs.extend(is_on_rig.then(|| label.to_owned()));
         let id = node.attribute("id");
-        let listed = id.and_then(|id| paths.get(id)).cloned().unwrap_or_else(|| label.to_owned());
+        let listed = id.and_then(|id| paths.get(id)).cloned().unwrap_or_else(|| camera.listed());
         let mask = id.and_then(|id| masks.get(id)).cloned();
         posed.push((component, source_from_camera, sensor, listed, mask, place));
     }

@@ -18,6 +18,7 @@ mod bytes;
 mod calibrated_size;
 pub mod camera_file;
 pub mod colmap;
+mod colmap_files;
 pub mod colmap_lens;
 pub mod detect;
 pub mod exchange;
@@ -38,6 +39,7 @@ pub(crate) mod numpy;
 mod obj;
 mod obj_elements;
 pub mod objects_with_lighting;
+mod open_size;
 mod openmvs;
 mod opensfm;
 mod orientation;
@@ -128,6 +130,9 @@ fn assemble(source: SourceScene, settings: &ReadSettings) -> Result<Scene> {
 
     // The photos.
     let encoding = if settings.encoding == ColourEncoding::Auto { source.encoding } else { settings.encoding };
+    if source.sizes_are_of_files {
+        open_size::settle(&mut views, &source_mesh, encoding, settings, &mut findings)?;
+    }
     let mut loaded = photos::load_all(&views, &sizes, encoding, (None, &Turns::new()), settings)?;
     let way_of_masks = photos::way_of_masks(&loaded);
     findings.extend(photos::told_of_lenses(&loaded));

@@ -13,7 +13,7 @@ use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::scene::lens::{Base, Lens, Model, Polynomial};
 use glam::{DMat3, DQuat, DVec3};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Name of the file.
 pub const FILE_NAME: &str = "reconstruction.json";
@@ -82,14 +82,32 @@ impl Camera {
     }
 }
 
-/// Lists an OpenSfM scene and reads its cameras.
-pub fn read(folder: &Path) -> Result<SourceScene> {
-    let path = folder.join(FILE_NAME);
-    let reconstructions: Vec<Reconstruction> = serde_json::from_str(&read_text(&path)?).map_err(|error| {
+fn reconstructions_of(path: &Path) -> Result<Vec<Reconstruction>> {
+    serde_json::from_str(&read_text(path)?).map_err(|error| {
         Error::new(ErrorKind::Malformed, format!("not a list of reconstructions: {error}"))
-            .at(Place::Line(path.clone(), error.line().max(1)))
+            .at(Place::Line(path.into(), error.line().max(1)))
             .remedy("export the reconstruction again")
-    })?;
+    })
+}
+
+/// Whether photos of a file of reconstructions are in a folder.
+fn has_photos(reconstructions: &[Reconstruction], photos: &Path) -> bool {
+    reconstructions.iter().flat_map(|own| own.shots.keys()).any(|name| photos.join(name).is_file())
+}
+
+/// Lists an OpenSfM scene and reads its cameras. Where only the undistorted photos are here, their cameras are read.
+pub fn read(folder: &Path) -> Result<SourceScene> {
+    let (mut path, mut home) = (folder.join(FILE_NAME), folder.to_path_buf());
+    let mut reconstructions = reconstructions_of(&path)?;
+    let undistorted = folder.join("undistorted");
+    if undistorted.join(FILE_NAME).is_file()
+        && ![folder.join("images"), folder.into()].iter().any(|photos| has_photos(&reconstructions, photos))
+    {
+        let inner = reconstructions_of(&undistorted.join(FILE_NAME))?;
+        if has_photos(&inner, &undistorted.join("images")) {
+            (path, home, reconstructions) = (undistorted.join(FILE_NAME), undistorted, inner);
+        }
+    }
     let mut findings = Vec::new();
     let count = reconstructions.len();
     let largest = reconstructions.into_iter().max_by_key(|own| own.shots.len()).ok_or_else(|| {
@@ -118,7 +136,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
         findings.append(&mut noticed);
         posed.push(Posed { listed: name, camera, lens, size, mask: None, place });
     }
-    let photos = PhotoIndex::of_folders(&[folder.join("images"), folder.into()].map(|path: PathBuf| path))?;
+    let photos = PhotoIndex::of_folders(&[home.join("images"), home])?;
     scene_of(folder, posed, &photos, &[folder.into(), folder.join("undistorted/depthmaps")], findings)
 }
 
@@ -144,5 +162,28 @@ mod tests {
         assert_eq!(scene.findings[0].code, "reconstruction-chosen");
         std::fs::write(folder.path().join(FILE_NAME), json.replace("brown", "spherical")).unwrap();
         assert_eq!(read(folder.path()).unwrap_err().kind(), ErrorKind::Unsupported);
+    }
+
+    #[test]
+    fn undistorted_photos_go_with_their_own_cameras() {
+        let folder = tempfile::tempdir().unwrap();
+        let put = |inner: &str, k1: f64, photo: &str| {
+            let root = folder.path().join(inner);
+            std::fs::create_dir_all(root.join("images")).unwrap();
+            let json = format!(
+                r#"[{{"cameras":{{"c":{{"projection_type":"perspective","width":40,"height":30,"focal":0.9,"k1":{k1}}}}},
+                "shots":{{"{photo}":{{"rotation":[0,0,0],"translation":[1,2,3],"camera":"c"}}}}}}]"#
+            );
+            std::fs::write(root.join(FILE_NAME), json).unwrap();
+        };
+        let photo =
+            |path: &str| file::write_png_srgb8(&folder.path().join(path), &Image::filled(40, 30, [9; 3])).unwrap();
+        put("", 0.1, "a.png");
+        put("undistorted", 0.0, "a.png");
+        photo("undistorted/images/a.png");
+        assert!(read(folder.path()).unwrap().views[0].lens.is_none());
+        photo("images/a.png");
+        let scene = read(folder.path()).unwrap();
+        assert!(scene.views[0].lens.is_some() && scene.views[0].photo == folder.path().join("images/a.png"));
     }
 }

@@ -6,7 +6,7 @@
 
 use super::mask_names::{EXTENSIONS_NOT_READ, PHOTO_EXTENSIONS, PHOTO_FOLDERS, may_hold_masks, names_of_masks};
 use crate::error::{Error, Result};
-use crate::files::{composed, name_of, stem_of};
+use crate::files::{composed, name_of, stem_of, without_dots};
 use std::collections::{HashMap, HashSet};
 use std::path::{Component, Path, PathBuf};
 
@@ -103,7 +103,8 @@ impl PhotoIndex {
         let listed = listed.replace('\\', "/");
         let relative = Path::new(listed.trim_start_matches("./"));
         if relative.is_relative() {
-            let exact = self.roots.iter().map(|root| root.join(relative)).find(|path| path.is_file());
+            // What leads out of a root lies elsewhere, and is told to.
+            let exact = self.roots.iter().map(|root| without_dots(&root.join(relative))).find(|path| path.is_file());
             if let Some(exact) = exact {
                 return vec![exact];
             }

@@ -5,8 +5,10 @@
 
 use super::ply_faces::{Face, split_at_seams};
 use super::source_mesh::{SourceMesh, is_a_place, vertex_index};
+use super::zip::Archive;
 use super::{ply_header, polygon};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
+use crate::files::name_of;
 use glam::{DVec3, Vec2, Vec3};
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{
@@ -17,7 +19,11 @@ use std::path::Path;
 
 /// Reads a PLY mesh; polygons are cut into triangles.
 pub fn read(path: &Path) -> Result<SourceMesh> {
-    let bytes = std::fs::read(path).map_err(|source| Error::reading(path, source))?;
+    let archive = path.parent().filter(|parent| parent.is_file());
+    let bytes = match archive {
+        Some(archive) => Archive::open(archive)?.read(&name_of(path))?,
+        None => std::fs::read(path).map_err(|source| Error::reading(path, source))?,
+    };
     let readable = ply_header::readable(&bytes, path)?;
     let mut source = Source { path, reader: Reader::new(Cursor::new(&readable.bytes)), grown: readable.grown };
     let header = Parser::<Skipped>::new()

@@ -124,7 +124,7 @@ pub fn views_of(
     }
     if !missing.is_empty() {
         let remedy = if missing.iter().any(|listed| not_read(listed).is_some()) {
-            "raw files and HEIC are not read: convert them to TIFF, PNG or JPEG, all alike"
+            "raw files, HEIC and other kinds are not read: convert them to TIFF, PNG or JPEG, all alike"
         } else {
             "copy their photos as well to use them"
         };

@@ -68,6 +68,8 @@ fn collect(folder: &Path, depth: usize, looked_into: &mut usize, files: &mut Vec
 /// What a side file says.
 struct Side {
     in_texturing: bool,
+    /// What could not be connected is a component of its own, with a frame of its own.
+    component: Option<String>,
     focal_film: f64,
     centre: [f64; 2],
     rotation: [f64; 9],
@@ -110,6 +112,7 @@ fn side_of(path: &Path) -> Result<Option<Side>> {
     }
     Ok(Some(Side {
         in_texturing: !matches!(value("InTexturing"), Some("0" | "false")),
+        component: value("ComponentId").map(str::to_owned),
         focal_film,
         centre: [number("PrincipalPointU").unwrap_or(0.0), number("PrincipalPointV").unwrap_or(0.0)],
         rotation,
@@ -146,16 +149,26 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
     let (inner, files) = side_files(folder).unwrap_or_else(|| (folder.into(), Vec::new()));
     let photos = PhotoIndex::of_folders(&[inner.clone(), folder.into()])?;
     let mut findings = Vec::new();
-    let (mut posed, mut rejected, mut unaligned, mut tangential) = (Vec::new(), Vec::new(), Vec::new(), false);
+    let (mut posed, mut rejected, mut elsewhere) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut sides, mut unaligned, mut tangential) = (Vec::new(), Vec::new(), false);
     for path in files {
         // Photos of one name in several folders are told apart by these.
         let stem = path.strip_prefix(&inner).unwrap_or(&path).with_extension("").to_string_lossy().into_owned();
-        let Some(side) = side_of(&path)? else {
-            unaligned.push(stem);
-            continue;
-        };
-        if !side.in_texturing {
+        match side_of(&path)? {
+            Some(side) => sides.push((path, stem, side)),
+            None => unaligned.push(stem),
+        }
+    }
+    // Where none is to be textured, nothing was textured yet.
+    let is_any_textured = sides.iter().any(|(_, _, side)| side.in_texturing);
+    let largest = largest_component(&sides);
+    for (path, stem, side) in sides {
+        if is_any_textured && !side.in_texturing {
             rejected.push(stem);
+            continue;
+        }
+        if side.component != largest {
+            elsewhere.push(stem);
             continue;
         }
         let place = Place::File(path.clone());
@@ -181,6 +194,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
     for (names, code, what) in [
         (unaligned, "camera-not-aligned", "are not aligned and take no part"),
         (rejected, "photo-rejected", "were excluded from texturing in the project and take no part"),
+        (elsewhere, "component-chosen", "are of a smaller component with a frame of its own and take no part"),
     ] {
         if !names.is_empty() {
             findings.push(Finding::new(
@@ -192,7 +206,14 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
     }
     let views = views_of(posed, &photos, &[folder.into()], &mut findings)?;
     let mesh = mesh_choice::find(&[folder.into(), inner], &mut findings);
-    Ok(SourceScene { findings, ..SourceScene::of_photographs(folder, mesh, views) })
+    Ok(SourceScene { findings, sizes_are_of_files: true, ..SourceScene::of_photographs(folder, mesh, views) })
+}
+
+/// The component with the most cameras; the first of equals.
+fn largest_component(sides: &[(PathBuf, String, Side)]) -> Option<String> {
+    let count = |own: &Option<String>| sides.iter().filter(|(_, _, side)| side.component == *own).count();
+    // The last of equals is taken.
+    sides.iter().rev().map(|(_, _, side)| &side.component).max_by_key(|own| count(own)).cloned().flatten()
 }
 
 #[cfg(test)]
@@ -246,6 +267,20 @@ mod tests {
         assert!((camera.rotation * DVec3::Y - DVec3::X).length() < 1e-12, "row by row, world to camera");
         assert!((camera.rotation.transpose() * -camera.translation - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-12);
         assert!(scene.findings.iter().any(|finding| finding.code == "photo-rejected"));
+        // Where none is to be textured, all take part; of two components the larger does.
+        std::fs::write(folder.path().join("a.xmp"), side(0)).unwrap();
+        assert_eq!(read(folder.path()).unwrap().views.len(), 2);
+        let of_component =
+            |name: &str| side(1).replace("xcr:Version", &format!("xcr:ComponentId=\"{name}\" xcr:Version"));
+        for (name, component) in [("a", "{1}"), ("b", "{2}"), ("c", "{2}")] {
+            file::write_png_srgb8(&folder.path().join(format!("{name}.png")), &Image::filled(40, 30, [9; 3])).unwrap();
+            std::fs::write(folder.path().join(format!("{name}.xmp")), of_component(component)).unwrap();
+        }
+        let scene = read(folder.path()).unwrap();
+        assert_eq!(scene.views.iter().map(|view| view.name.as_str()).collect::<Vec<_>>(), ["b", "c"]);
+        assert!(scene.findings.iter().any(|own| own.code == "component-chosen" && own.message.ends_with(": a")));
+        std::fs::remove_file(folder.path().join("c.xmp")).unwrap();
+        std::fs::write(folder.path().join("b.xmp"), side(0)).unwrap();
         for (from, to, kind) in [
             ("brown4t2", "spiral", ErrorKind::Unsupported),
             ("xcr:Version", "xcr:AspectRatio=\"1.1\" xcr:Version", ErrorKind::Unsupported),

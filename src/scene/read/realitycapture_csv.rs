@@ -179,7 +179,7 @@ pub fn read(path: &Path) -> Result<SourceScene> {
     }
     let views = views_of(posed, &photos, &[folder.into()], &mut findings)?;
     let mesh = mesh_choice::find(&[roots, vec![folder.into()]].concat(), &mut findings);
-    Ok(SourceScene { findings, ..SourceScene::of_photographs(folder, mesh, views) })
+    Ok(SourceScene { findings, sizes_are_of_files: true, ..SourceScene::of_photographs(folder, mesh, views) })
 }
 
 #[cfg(test)]

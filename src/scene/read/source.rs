@@ -71,6 +71,8 @@ pub struct SourceScene {
     /// Whether photos may have another size than their cameras claim, and the mesh another frame: so it is with what tools
     /// export.
     pub is_of_a_tool: bool,
+    /// Whether the source states no size of its photos, so that those of its views are the sizes of the files.
+    pub sizes_are_of_files: bool,
     /// Frames the mesh may stand in, as the source knows them.
     pub mesh_frames: Vec<MeshFrame>,
     /// What the reader noticed.
@@ -104,6 +106,7 @@ impl SourceScene {
             has_truth: false,
             flip_winding: false,
             is_of_a_tool: true,
+            sizes_are_of_files: false,
             mesh_frames: Vec::new(),
             findings: Vec::new(),
         }

@@ -138,6 +138,18 @@ impl Transforms {
         Ok(Lens::new(Model::Polynomial(polynomial)))
     }
 
+    fn states_centre(&self, frame: &Value) -> bool {
+        ["cx", "cy"].iter().all(|key| self.number(frame, key).is_some())
+    }
+
+    /// Whether some frame says neither the size of its photo nor where its middle is.
+    fn leaves_sizes_open(&self) -> bool {
+        let is_open = |frame: &Value| {
+            !self.states_centre(frame) && ["w", "h"].iter().any(|key| self.number(frame, key).is_none())
+        };
+        self.frames().iter().any(is_open)
+    }
+
     fn posed(&self, index: usize, photos: &PhotoIndex, findings: &mut Vec<Finding>) -> Result<Posed> {
         let frame = &self.frames()[index];
         let listed = frame.get("file_path").and_then(Value::as_str);
@@ -146,11 +158,12 @@ impl Transforms {
         let pose = frame.get("transform_matrix").and_then(Self::matrix);
         let pose = pose.ok_or_else(|| malformed(&self.path, index, "transform_matrix is not 4 x 4 numbers"))?;
         let size = self.number(frame, "w").zip(self.number(frame, "h"));
-        let mut size = size.map(|(width, height)| (width as usize, height as usize));
-        if size.is_none() {
-            size = photos.find(&listed).map(|path| file::read_size(&path)).transpose()?;
-        }
-        let (width, height) = size.map_or((0.0, 0.0), |(width, height)| (width as f64, height as f64));
+        let stated = size.map(|(width, height)| (width as usize, height as usize));
+        let of_file = || photos.find(&listed).map(|path| file::read_size(&path)).transpose();
+        let known = if stated.is_some() { stated } else { of_file()? };
+        // A principal point tells what size it is for, where nothing else does.
+        let size = if self.states_centre(frame) { stated } else { known };
+        let (width, height) = known.map_or((0.0, 0.0), |(width, height)| (width as f64, height as f64));
         let of_angle = |key: &str, length: f64| {
             self.number(frame, key).filter(|_| length > 0.0).map(|angle| 0.5 * length / (0.5 * angle).tan())
         };
@@ -163,7 +176,7 @@ impl Transforms {
                 [self.number(frame, "cx").unwrap_or(0.5 * width), self.number(frame, "cy").unwrap_or(0.5 * height)],
             ),
             // Without a photo there is no size to take an angle of: the view is left out anyway.
-            None if size.is_none() => DMat3::IDENTITY,
+            None if known.is_none() => DMat3::IDENTITY,
             None => return Err(malformed(&self.path, index, "neither fl_x nor camera_angle_x gives a focal length")),
         };
         // Undone first, while axes are still those of the file; then OpenGL's camera axes become OpenCV's.
@@ -253,6 +266,7 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
         &mut findings,
     );
     let mut scene = SourceScene::of_photographs(folder, mesh, views);
+    scene.sizes_are_of_files = files.iter().any(Transforms::leaves_sizes_open);
     if !held_out.is_empty() && held_out.len() < scene.views.len() {
         scene.held_out = Some(held_out);
     }
