@@ -43,10 +43,11 @@ const LEAST_SIZE: f64 = 0.15;
 const SURE_SHARE: f64 = 0.9;
 const SURE_PART: f64 = 0.5;
 const LEAST_SIZE_IF_SURE: f64 = 0.05;
-/// Share that a light turning with the camera must take away where it shines, and by how much more than one that stands
-/// still: of captures under one light the first comes to 0.5 at most, the second to 0.28 where there is little to explain.
+/// Share that a light turning with the camera must take away where it shines, and the part that it may leave of what one
+/// leaves that stands still and shines. Both have as many unknowns, which explain half where views are few, turning or not;
+/// of captures under one light that leave much to explain the part is 0.9 and more.
 const LEAST_SHINE: f64 = 0.5;
-const LEAST_LEAD: f64 = 0.2;
+const MOST_LEFT_BY_SHINE: f64 = 0.85;
 /// Share that groups in any order must take away, and that of what a light for each photo does. Vectors that go around evenly
 /// leave three groups two thirds of it.
 const LEAST_SHARE_OF_ANY: f64 = 0.6;
@@ -100,7 +101,7 @@ impl LightCheck {
         let is_large = |share: f64| self.size_of(share) > LEAST_SIZE;
         let explained = |share: f64| share > LEAST_SHARE && share > LEAST_PART * self.of_each && is_large(share);
         let shines = self.shine_with_camera > LEAST_SHINE
-            && self.shine_with_camera - self.shine_in_world > LEAST_LEAD
+            && 1.0 - self.shine_with_camera < MOST_LEFT_BY_SHINE * (1.0 - self.shine_in_world)
             && self.shine_with_camera > self.in_groups
             && is_large(self.shine_with_camera);
         let turning = self.with_camera.max(self.shine_with_camera);
@@ -109,7 +110,8 @@ impl LightCheck {
                 && 1.0 - share < CLEAR_PART * (1.0 - other.max(self.shine_in_world))
                 && self.size_of(share) > LEAST_SIZE_IF_SURE
         };
-        let turns = explained(self.with_camera) && self.with_camera >= self.in_groups;
+        // Where gloss under one light explains as much, nothing says that it turns.
+        let turns = explained(self.with_camera) && self.with_camera >= self.in_groups.max(self.shine_in_world);
         // Gloss of a camera that goes around falls into groups as well, but not so neatly, and it does not leave so little.
         let is_clear = |share: f64, least: f64| {
             share > least.max(LEAST_SHARE_OF_ANY)

@@ -26,6 +26,8 @@ const NAMED_DISTANCE: f64 = 0.3;
 const LOW: f64 = 0.35;
 /// An explanation makes up for this part of what a photo falls behind.
 const LEAST_PART: f64 = 0.5;
+/// The share of what it lacks that a photo must gain with another camera, which has a photo already.
+const LEAST_GAIN_OF_MOVED: f64 = 0.5;
 /// Photos that fall behind whose cameras are tried for each other: a capture may have hundreds.
 const MOST_BEHIND: usize = 32;
 /// Cameras beside a camera, in the order of names, whose photos are tried on it.
@@ -196,7 +198,9 @@ impl Search<'_> {
             Some((self.with(&given, other, Some(view))?, other))
         });
         let (there, other) = moved.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        (there >= needed && is_clearly_better(there, own)).then_some(Fault::Of(other, there))
+        // Things that look alike from many sides agree better by chance with another camera's neighbours, but not by much.
+        let gained = there - own;
+        (there >= needed && gained > LEAST_GAIN_OF_MOVED * (1.0 - own)).then_some(Fault::Of(other, there))
     }
 
     /// Cameras that a photo may be of: those that fall behind most, its neighbours, and those beside it in the order of names.

@@ -104,10 +104,12 @@ pub fn statements(text: &str) -> impl Iterator<Item = Statement<'_>> {
     })
 }
 
-/// A line without what stands behind a word that begins with `#`; within a word, as in a name, it is a character.
+/// A line without what stands behind a word that begins with `#`; within a word, as in a name, it is a character, but not
+/// among the indices of a face.
 fn without_comment(line: &str) -> &str {
+    let is_face = line.trim_start().strip_prefix('f').is_some_and(|rest| rest.starts_with(char::is_whitespace));
     let begins_a_word = |place: &usize| line[..*place].chars().next_back().is_none_or(char::is_whitespace);
-    let place = line.match_indices('#').map(|(place, _)| place).find(begins_a_word);
+    let place = line.match_indices('#').map(|(place, _)| place).find(|place| is_face || begins_a_word(place));
     place.map_or(line, |place| &line[..place])
 }
 
@@ -245,8 +247,8 @@ mod tests {
 
     #[test]
     fn comments_go_and_lines_are_joined_with_the_number_of_the_first() {
-        let text = "a 1 # one\n\nb \\\n 2 \\\\\n3\n# c \\\nd\ne \\";
-        let expected = [(1, "a 1"), (3, "b   2  3"), (7, "d"), (8, "e")];
+        let text = "a 1 # one\n\nb \\\n 2 \\\\\n3\n# c \\\nd\ne \\\n\nf 1 2#3\ng 2#3";
+        let expected = [(1, "a 1"), (3, "b   2  3"), (7, "d"), (8, "e"), (10, "f 1 2"), (11, "g 2#3")];
         assert_eq!(all(text), expected.map(|(line, text)| (line, text.to_owned())));
     }
 
