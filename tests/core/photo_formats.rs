@@ -108,6 +108,18 @@ fn tiffs_of_bytes_floats_grey_and_opacity_are_read() {
 }
 
 #[test]
+fn a_thumbnail_before_the_picture_of_a_tiff_is_stepped_over() {
+    let mut file = Cursor::new(Vec::new());
+    let mut encoder = TiffEncoder::new(&mut file).unwrap();
+    let mut thumbnail = encoder.new_image::<colortype::RGB8>(1, 1).unwrap();
+    thumbnail.encoder().write_tag(Tag::NewSubfileType, 1u32).unwrap();
+    thumbnail.write_data(&[9, 9, 9]).unwrap();
+    encoder.write_image::<colortype::RGB8>(2, 1, &[10, 20, 30, 40, 50, 60]).unwrap();
+    let photo = read(file.into_inner());
+    assert_eq!(photo.pixels, PhotoPixels::Srgb8(Image::from_pixels(2, 1, vec![[10, 20, 30], [40, 50, 60]])));
+}
+
+#[test]
 fn inks_and_raw_files_are_refused_with_a_way_out() {
     let cmyk = tiff_of::<colortype::CMYK8>((1, 1), &[1, 2, 3, 4], &[], &[]);
     let error = read_with(cmyk, PhotoOptions::default()).unwrap_err();
@@ -274,6 +286,8 @@ fn parts_and_layers_are_chosen_told_and_named() {
     assert!(error.message().contains("'albedo', 'beauty'"), "{error}");
     let only = exr_of(((0, 0), (1, 1)), None, &[("", (0, 0), (1, 1), &[("N.R", 1.0), ("N.G", 1.0), ("N.B", 1.0)])]);
     assert!(read_with(only, PhotoOptions::default()).unwrap_err().remedy_text().contains("--layer"));
+    let depth = exr_of(((0, 0), (1, 1)), None, &[("", (0, 0), (1, 1), &[("Z", 3.0)])]);
+    assert!(read_with(depth, PhotoOptions::default()).is_err(), "distances are no picture");
 }
 
 #[test]

@@ -3,6 +3,8 @@
 //! ITU-T T.81, annex B. Cameras and cut downloads leave out the end marker, and some programs leave bytes between segments;
 //! both are read when all pixels are there. Whether they are is told by decoding (see [`is_whole_without_end`]).
 
+use crate::error::{Finding, Severity};
+
 /// What the segments say.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct JpegFacts {
@@ -108,6 +110,24 @@ impl Progress {
     }
 }
 
+/// Rows that a block has.
+const ROWS_OF_BLOCK: usize = 8;
+
+/// Tells of rows at the end that are the grey which decoders fill in for pixels that are missing, of rows of so many samples.
+pub fn told_of_filled(samples: &[u8], samples_per_row: usize) -> Option<Finding> {
+    const FILLED: u8 = 128;
+    let rows = samples.len() / samples_per_row.max(1);
+    let filled = samples.rchunks_exact(samples_per_row.max(1)).take_while(|row| row.iter().all(|&own| own == FILLED));
+    let filled = filled.count();
+    (filled >= ROWS_OF_BLOCK).then(|| {
+        let message = format!(
+            "the last {filled} of {rows} rows are one grey, which decoders fill in for pixels that are missing: the JPEG was \
+             probably cut short"
+        );
+        Finding::new(Severity::Warning, "photo-cut", message).remedy("copy the photo again, or leave it out")
+    })
+}
+
 /// Whether a file without an end marker holds all its pixels.
 ///
 /// Decoders fill what is missing. The file is decoded with different bytes after its end: what depends on them was missing.
@@ -144,6 +164,13 @@ mod tests {
         assert!(!progress.is_complete(2));
         progress.add(&[2, 1, 0, 2, 0, 0, 0, 0x10]);
         assert!(progress.is_complete(2) && !progress.is_complete(3));
+    }
+
+    #[test]
+    fn rows_that_were_filled_in_are_told() {
+        let photo = |filled: usize| [vec![90u8; 30 * (40 - filled)], vec![128; 30 * filled]].concat();
+        assert!(told_of_filled(&photo(9), 30).unwrap().message.contains("9 of 40 rows"));
+        assert_eq!((told_of_filled(&photo(7), 30), told_of_filled(&[], 0)), (None, None));
     }
 
     #[test]

@@ -226,6 +226,10 @@ pub fn read_photo(source: &Source, layer: Option<&str>) -> Result<PhotoFile> {
         photo.findings.extend(exr_layers::told(&layers, chosen));
         return Ok(photo);
     }
+    let names: Vec<&str> = file.parts.iter().flat_map(|part| part.channels.iter().map(AsRef::as_ref)).collect();
+    if !names.is_empty() && names.iter().all(|name| is_no_light(name)) {
+        return Err(file.nothing_fits(source, "colour (R G B)"));
+    }
     match file.grey(source)? {
         Some((image, alpha)) => {
             let pixels = PhotoPixels::Linear(image.map(|&value| Vec3::splat(value)));
@@ -233,6 +237,12 @@ pub fn read_photo(source: &Source, layer: Option<&str>) -> Result<PhotoFile> {
         }
         None => Err(file.nothing_fits(source, "colour (R G B)")),
     }
+}
+
+/// Whether a channel by its name holds distances, opacity or numbers of things, which a map may be made of and a photo not.
+fn is_no_light(channel: &str) -> bool {
+    let own = channel.rsplit('.').next().unwrap_or(channel);
+    ["z", "zback", "depth", "distance", "id", "mask", "a", "alpha"].iter().any(|other| own.eq_ignore_ascii_case(other))
 }
 
 /// A lone channel as stored, else the luminance of the colour.

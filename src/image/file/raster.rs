@@ -43,6 +43,10 @@ pub fn read(source: &Source) -> Result<(Stored, exif::Exif)> {
         }
         decoded => decoded?,
     };
+    if is_jpeg {
+        let width = decoded.image.width() as usize * usize::from(decoded.image.color().channel_count());
+        findings.extend(jpeg::told_of_filled(decoded.image.as_bytes(), width));
+    }
     let declared = if is_jpeg { Declared::Nothing } else { png::declared(&source.bytes) };
     let Decoded { image, icc, exif } = decoded;
     let icc = icc.filter(|_| is_jpeg || !png::has_code_points(&source.bytes));

@@ -16,6 +16,8 @@ use tiff::{ColorType, TiffError};
 
 /// Most bytes that one byte of a strip can stand for: deflate at its best (1032), with room for tags.
 const BEST_RATIO: u64 = 1_100;
+/// Pictures of reduced size that are stepped over.
+const MOST_THUMBNAILS: usize = 8;
 
 /// What a header says.
 pub struct TiffHeader {
@@ -63,7 +65,7 @@ pub fn read_header(reader: &mut (impl BufRead + Seek), path: &Path, length: u64)
 }
 
 fn header_of(cursor: &mut Cursor<&[u8]>) -> std::result::Result<(TiffHeader, ColorType), TiffError> {
-    let mut decoder = Decoder::new(cursor)?;
+    let mut decoder = at_picture(Decoder::new(cursor)?)?;
     let (width, height) = decoder.dimensions()?;
     let colour = decoder.colortype()?;
     let format = decoder.find_tag_unsigned_vec::<u16>(Tag::SampleFormat)?.unwrap_or_default();
@@ -83,7 +85,27 @@ fn refused_kind(path: &Path, kind: &str) -> Error {
         .remedy("export it as RGB TIFF with 8 or 16 bits a channel")
 }
 
-/// Decodes the first picture.
+/// Goes on to the first picture that is none reduced in size (TIFF 6.0, NewSubfileType bit 0): some programs put the thumbnail
+/// first. Where all are, the first is read.
+fn at_picture<R: std::io::Read + std::io::Seek>(mut decoder: Decoder<R>) -> std::result::Result<Decoder<R>, TiffError> {
+    let is_reduced = |decoder: &mut Decoder<R>| {
+        let kind = decoder.find_tag_unsigned::<u32>(Tag::NewSubfileType);
+        kind.map(|kind| kind.unwrap_or_default() & 1 == 1)
+    };
+    for _ in 0..MOST_THUMBNAILS {
+        if !is_reduced(&mut decoder)? {
+            return Ok(decoder);
+        }
+        if !decoder.more_images() {
+            break;
+        }
+        decoder.next_image()?;
+    }
+    decoder.seek_to_image(0)?;
+    Ok(decoder)
+}
+
+/// Decodes the first picture that is no thumbnail.
 pub fn read(source: &Source) -> Result<Stored> {
     let outcome = guarded(&source.path, || Ok(decode(&source.bytes)))?;
     let (samples, mut stored) = outcome.map_err(|error| explain(error, &source.path))?;
@@ -106,7 +128,7 @@ fn decode(bytes: &[u8]) -> std::result::Result<(DecodingResult, Stored), TiffErr
     limits.decoding_buffer_size = (bytes.len() as u64).saturating_mul(BEST_RATIO + 1) as usize;
     limits.intermediate_buffer_size = limits.decoding_buffer_size;
     limits.ifd_value_size = bytes.len().max(1024);
-    let mut decoder = Decoder::new(Cursor::new(bytes))?.with_limits(limits);
+    let mut decoder = at_picture(Decoder::new(Cursor::new(bytes))?.with_limits(limits))?;
     let (width, height) = decoder.dimensions()?;
     let (width, height) = (width as usize, height as usize);
     let (channels, bits) = match decoder.colortype()? {

@@ -49,7 +49,9 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
     }
     let middle = quantile(&known, 0.5);
     report.agreement = Some(middle);
-    if let Some(Shift { by, from, own, shifted, .. }) = shift::best(&trial, scene.views.len(), &found) {
+    // Gloss from far apart has photos agree as poorly from some photo on as a shift does; outlines of masks tell.
+    let shift = shift::best(&trial, scene.views.len(), &found).filter(|shift| shift.from == 0 || !masks_prove(report));
+    if let Some(Shift { by, from, own, shifted, .. }) = shift {
         let first = &scene.views[from].name;
         let which = if from == 0 { String::new() } else { format!(" from {first} on") };
         let message = format!(
@@ -71,6 +73,10 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
     }
     if middle >= JUDGED_ABOVE {
         outlying::check(scene, &trial, found, report);
+        let is_named = report.views.iter().any(|line| line.is_misplaced);
+        if middle < USUAL && !is_named && scene.mesh.triangles.len() > 1 {
+            report.findings.push(disagree(Severity::Note, "less than usual", middle));
+        }
     } else if let Some((lie, turned)) = best_lie(&trial, scene, middle) {
         let message = format!(
             "the photos match each other only when all of them are {}: where they show the same surface their correlation is \
@@ -82,24 +88,46 @@ pub fn check(scene: &Scene, bvh: &Bvh, probes: &[Vec<Probe>], report: &mut Repor
                 .remedy("rotate or flip the photo files, to lie as they did when the cameras were calibrated"),
         );
     } else if scene.mesh.triangles.len() > 1 && (middle < HARDLY || !masks_tell(report)) {
-        let hardly = if middle < HARDLY { "barely" } else { "poorly" };
-        let message = format!(
-            "photos correlate {hardly} where the cameras say they show the same surface ({middle:.2}; 1 is a perfect match, \
-             captures that fit have {USUAL:.1} and more)"
-        );
-        report.findings.push(Finding::new(Severity::Warning, "photos-disagree", message).remedy(
-            "look at the outlines over the photos (check -o FOLDER): the mesh may be larger, smaller or turned, photos may have \
-             been cropped, resized, turned or given another's camera; mirrors, glass and moving light have the same effect",
-        ));
+        let (severity, how) = match middle < HARDLY {
+            true => (Severity::Warning, "barely"),
+            false if masks_prove(report) => (Severity::Note, "poorly"),
+            false => (Severity::Warning, "poorly"),
+        };
+        report.findings.push(disagree(severity, how, middle));
     }
+}
+
+/// Photos agree so, without a single one to blame.
+fn disagree(severity: Severity, how: &str, agreement: f64) -> Finding {
+    let message = format!(
+        "photos correlate {how} where the cameras say they show the same surface ({agreement:.2}; 1 is a perfect match, \
+         captures that fit have {USUAL:.1} and more)"
+    );
+    Finding::new(severity, "photos-disagree", message).remedy(
+        "look at the outlines over the photos (check -o FOLDER): the mesh may be larger, smaller or turned, photos may have been \
+         cropped, resized, turned or given another's camera; mirrors, glass, gloss seen from far apart and moving light have \
+         the same effect",
+    )
+}
+
+/// The median overlap of masks and outlines of the mesh, where there are masks.
+fn usual_overlap(report: &Report) -> Option<f64> {
+    let overlaps: Vec<f64> = report.views.iter().filter_map(|view| view.mask_overlap).collect();
+    (!overlaps.is_empty()).then(|| quantile(&overlaps, 0.5))
+}
+
+/// Whether masks say that cameras and mesh belong together: then photos that agree poorly show gloss from far apart.
+fn masks_prove(report: &Report) -> bool {
+    /// Above this median overlap of masks and outline.
+    const SAME: f64 = 0.985;
+    usual_overlap(report).is_some_and(|overlap| overlap > SAME)
 }
 
 /// Whether masks say already that the mesh is not the object: then photos cannot agree through it.
 fn masks_tell(report: &Report) -> bool {
     /// Below this median overlap of masks and outline.
     const ANOTHER: f64 = 0.5;
-    let overlaps: Vec<f64> = report.views.iter().filter_map(|view| view.mask_overlap).collect();
-    !overlaps.is_empty() && quantile(&overlaps, 0.5) < ANOTHER
+    usual_overlap(report).is_some_and(|overlap| overlap < ANOTHER)
 }
 
 /// How all photos are to be turned or mirrored to agree well, and how they agree then.

@@ -52,6 +52,12 @@ const MOST_LEFT_BY_SHINE: f64 = 0.85;
 /// leave three groups two thirds of it.
 const LEAST_SHARE_OF_ANY: f64 = 0.6;
 const LEAST_PART_OF_ANY: f64 = 0.85;
+/// Share that two groups must take away where there is little to explain, and that of what a light for each photo does: of
+/// captures under one light they come to 0.2 and 0.7.
+const LEAST_SHARE_IF_NEAT: f64 = 0.35;
+const LEAST_PART_IF_NEAT: f64 = 0.85;
+/// What a light that turns takes away is at most this part of that: of what both explain alike nothing is said.
+const MOST_TURNING_IF_NEAT: f64 = 0.75;
 /// What it leaves is at most this part of what the next best leaves.
 const CLEAR_PART: f64 = 0.6;
 /// Share that a light for each photo must take away where nothing simpler does: gloss under one light comes to 0.76.
@@ -110,8 +116,14 @@ impl LightCheck {
                 && 1.0 - share < CLEAR_PART * (1.0 - other.max(self.shine_in_world))
                 && self.size_of(share) > LEAST_SIZE_IF_SURE
         };
-        // Where gloss under one light explains as much, nothing says that it turns.
+        // Where gloss under one light explains as much, nothing says that there is another.
         let turns = explained(self.with_camera) && self.with_camera >= self.in_groups.max(self.shine_in_world);
+        let groups = explained(self.in_groups) && self.in_groups >= self.shine_in_world;
+        // Groups that do nearly all that a light for each photo does are no gloss, however little differs.
+        let is_neat = self.in_groups > LEAST_SHARE_IF_NEAT.max(self.shine_in_world)
+            && self.in_groups > LEAST_PART_IF_NEAT * self.of_each
+            && self.with_camera < MOST_TURNING_IF_NEAT * self.in_groups
+            && self.size_of(self.in_groups) > LEAST_SIZE_IF_SURE;
         // Gloss of a camera that goes around falls into groups as well, but not so neatly, and it does not leave so little.
         let is_clear = |share: f64, least: f64| {
             share > least.max(LEAST_SHARE_OF_ANY)
@@ -120,7 +132,7 @@ impl LightCheck {
         };
         if shines || turns || is_sure(turning, self.in_groups) {
             LightKind::WithCamera
-        } else if explained(self.in_groups) || is_sure(self.in_groups, turning) {
+        } else if groups || is_neat || is_sure(self.in_groups, turning) {
             LightKind::InGroups
         } else if is_clear(self.in_any_groups, LEAST_PART_OF_ANY * self.of_each) {
             LightKind::InAnyGroups
@@ -298,6 +310,12 @@ mod tests {
         assert_eq!(of(0.09, [0.69, 0.73, 0.58, 0.46, 0.76]), LightKind::One);
         assert_eq!(of(0.03, [0.1, 0.1, 0.0, 0.95, 0.97]), LightKind::One);
         assert_eq!(of(0.1, [0.9, 0.92, 0.1, 0.93, 0.97]), LightKind::One);
+        // A facade in the shade and in the sun; and a capture under one light whose photos differ as little.
+        assert_eq!(of(0.123, [0.29, 0.47, 0.14, 0.44, 0.47]), LightKind::InGroups);
+        assert_eq!(of(0.11, [0.32, 0.35, 0.11, 0.08, 0.35]), LightKind::One);
+        // A glossy head that turns, of few photos, and one that a photographer walks around.
+        assert_eq!(of(0.27, [0.04, 0.68, 0.49, 0.05, 0.1]), LightKind::WithCamera);
+        assert_eq!(of(0.28, [0.33, 0.46, 0.45, 0.2, 0.52]), LightKind::One);
         // Another light for each photo, and gloss of few views.
         assert_eq!(of(0.3, [0.12, 0.13, 0.02, 0.14, 0.93]), LightKind::OfEach);
         assert_eq!(of(0.09, [0.69, 0.73, 0.58, 0.46, 0.93]), LightKind::One);

@@ -51,6 +51,9 @@ pub fn read(folder: &Path) -> Result<SourceScene> {
             .remedy("a BlendedMVS folder holds blended_images/, cams/ and textured_mesh/; a scene.toml can name the parts by hand"));
     };
     let views = views(images, cams, mask_names::folder_of_masks(folder).as_deref(), false, &mut findings)?;
+    if views.iter().all(|view| view.mask.is_none()) {
+        findings.extend(mask_names::told_of_unread([folder]));
+    }
     check_pairs(&cams.join("pair.txt"), &views, &mut findings);
     if folder.join("rendered_depth_maps").is_dir() {
         findings.push(Finding::new(

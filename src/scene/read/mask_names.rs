@@ -19,7 +19,7 @@ pub const EXTENSIONS_NOT_READ: [&str; 22] = [
 /// Names of folders of masks, in any case, the likelier first.
 const FOLDER_NAMES: [&str; 4] = ["masks", "mask", "silhouettes", "silhouette"];
 /// Names of folders of photos, in which masks may have a folder of theirs.
-pub const PHOTO_FOLDERS: [&str; 5] = ["images", "image", "photos", "rgb", "input"];
+pub const PHOTO_FOLDERS: [&str; 6] = ["images", "image", "photos", "rgb", "input", "blended_images"];
 /// What is added to a photo's name.
 const SUFFIXES: [&str; 8] = ["_mask", "-mask", ".mask", "_masks", "_seg", "_segmentation", "_silhouette", "_matte"];
 const PREFIXES: [&str; 5] = ["mask_", "mask-", "mask.", "masks_", "seg_"];
@@ -51,19 +51,39 @@ pub fn folder_of_masks(scene: &Path) -> Option<PathBuf> {
     })
 }
 
+/// Words in the name of a folder that may hold masks and no photos.
+const WORDS_OF_MASKS: [&str; 10] = [
+    "mask",
+    "masks",
+    "masked",
+    "silhouette",
+    "silhouettes",
+    "matte",
+    "mattes",
+    "segmentation",
+    "segmentations",
+    "foreground",
+];
+/// And of one that may hold either.
+const WORDS_OF_SOME_MASKS: [&str; 2] = ["seg", "alpha"];
+
 /// Whether a folder by its name, in lower case, may hold masks and no photos.
 pub fn may_hold_masks(folder: &str) -> bool {
-    let is_of_masks =
-        |word: &str| ["mask", "masks", "masked", "silhouette", "silhouettes", "matte", "mattes"].contains(&word);
+    let is_of_masks = |word: &str| WORDS_OF_MASKS.contains(&word);
     folder.split(|letter: char| !letter.is_alphabetic()).any(is_of_masks)
 }
 
-/// A folder in a scene's folder that by its name may hold masks, but is none of those that are read.
-pub fn unread_folder_of_masks(scene: &Path) -> Option<PathBuf> {
-    folders_in(scene).into_iter().find(|folder| {
+/// Tells of a folder in one of these that by its name may hold masks, but is none of those that are read.
+pub fn told_of_unread<'a>(homes: impl IntoIterator<Item = &'a Path>) -> Option<Finding> {
+    let is_unread = |folder: &PathBuf| {
         let name = name_of(folder).to_lowercase();
-        may_hold_masks(&name) && !FOLDER_NAMES.contains(&name.as_str())
-    })
+        let may = may_hold_masks(&name) || WORDS_OF_SOME_MASKS.contains(&name.as_str());
+        may && !FOLDER_NAMES.contains(&name.as_str())
+    };
+    let unread = homes.into_iter().find_map(|home| folders_in(home).into_iter().find(is_unread))?;
+    let message = "the folder may hold masks, but by its name it is none that is looked into";
+    let remedy = "name it masks/, and each mask after its photo, to use them";
+    Some(Finding::new(Severity::Note, "masks-unread", message).at(Place::File(unread)).remedy(remedy))
 }
 
 /// A mask and the names it may go by.
@@ -313,5 +333,17 @@ mod tests {
         let photos = names.iter().map(|name| ((*name).to_owned(), PathBuf::from(name))).collect();
         let pairs = beside_photos(&photos);
         assert_eq!(pairs, [("a_mask".to_owned(), "a".to_owned()), ("mask_b".to_owned(), "b".to_owned())]);
+    }
+
+    #[test]
+    fn folders_that_may_hold_masks_are_told_and_others_are_not() {
+        let home = tempfile::tempdir().unwrap();
+        for name in ["masks", "images", "alpha7", "cams"] {
+            std::fs::create_dir(home.path().join(name)).unwrap();
+        }
+        assert_eq!(told_of_unread([home.path()]), None);
+        std::fs::create_dir(home.path().join("Object_Mask")).unwrap();
+        let told = told_of_unread([home.path()]).unwrap();
+        assert!(told.code == "masks-unread" && format!("{told}").contains("Object_Mask"), "{told}");
     }
 }

@@ -135,6 +135,13 @@ pub fn apply_mask(
             (state, _) => state,
         };
     }
+    if object_pixels == size.0 * size.1 && !is_twin(path) {
+        findings.push(
+            Finding::new(Severity::Note, "mask-full", "the mask marks every pixel as object")
+                .at(Place::View(view.name.clone()))
+                .remedy("255 is object, 0 is background: make the mask again where the photo shows a background"),
+        );
+    }
     if object_pixels == 0 {
         findings.push(
             Finding::new(

@@ -1,6 +1,6 @@
 //! The views of cameras that a project lists: each with its photo and its mask.
 
-use super::mask_names::{Masks, folder_of_masks, unread_folder_of_masks};
+use super::mask_names::{Masks, folder_of_masks, told_of_unread};
 use super::photo_index::{DEEPEST, PhotoIndex, agreement, reduced, some_of};
 use super::source::{SourceCamera, SourceView};
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
@@ -144,12 +144,8 @@ pub fn views_of(
     }
     findings.extend(told_of_smaller(&views, photos));
     findings.extend(told_of_elsewhere(&views, photos));
-    if views.iter().all(|view| view.mask.is_none())
-        && let Some(unread) = homes_of_masks.iter().find_map(|home| unread_folder_of_masks(home))
-    {
-        let message = "the folder may hold masks, but by its name it is none that is looked into";
-        let remedy = "name it masks/, and each mask after its photo, to use them";
-        findings.push(Finding::new(Severity::Note, "masks-unread", message).at(Place::File(unread)).remedy(remedy));
+    if views.iter().all(|view| view.mask.is_none()) {
+        findings.extend(told_of_unread(homes_of_masks.iter().map(PathBuf::as_path)));
     }
     if let Some(folder) = &masks_folder {
         // Those of photos that take no part were meant for somebody too.
