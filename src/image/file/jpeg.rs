@@ -110,19 +110,25 @@ impl Progress {
     }
 }
 
-/// Rows that a block has.
-const ROWS_OF_BLOCK: usize = 8;
+/// Rows that blocks have at most, where colour has half the resolution.
+const ROWS_OF_BLOCK: usize = 16;
 
-/// Tells of rows at the end that are the grey which decoders fill in for pixels that are missing, of rows of so many samples.
-pub fn told_of_filled(samples: &[u8], samples_per_row: usize) -> Option<Finding> {
-    const FILLED: u8 = 128;
-    let rows = samples.len() / samples_per_row.max(1);
-    let filled = samples.rchunks_exact(samples_per_row.max(1)).take_while(|row| row.iter().all(|&own| own == FILLED));
-    let filled = filled.count();
+/// Tells of rows at the end that decoders fill in for pixels that are missing, of rows of so many samples: blocks of the last
+/// mean or of grey, so that each row is the one of the block above. Rows of one colour are none of those: a background may be.
+pub fn told_of_filled(samples: &[u8], samples_per_row: usize, samples_per_pixel: usize) -> Option<Finding> {
+    const GREY: u8 = 128;
+    let rows: Vec<&[u8]> = samples.chunks_exact(samples_per_row.max(1)).collect();
+    let is_filled = |&row: &usize| {
+        let pixels = rows[row].chunks_exact(samples_per_pixel.max(1));
+        let is_of_one_colour = pixels.clone().zip(pixels.skip(1)).all(|(one, next)| one == next);
+        rows[row] == rows[row - ROWS_OF_BLOCK] && (!is_of_one_colour || rows[row][0] == GREY)
+    };
+    let filled = (ROWS_OF_BLOCK..rows.len()).rev().take_while(is_filled).count();
     (filled >= ROWS_OF_BLOCK).then(|| {
         let message = format!(
-            "the last {filled} of {rows} rows are one grey, which decoders fill in for pixels that are missing: the JPEG was \
-             probably cut short"
+            "the last {filled} of {} rows repeat those above, as decoders do for pixels that are missing: the JPEG was probably \
+             cut short",
+            rows.len()
         );
         Finding::new(Severity::Warning, "photo-cut", message).remedy("copy the photo again, or leave it out")
     })
@@ -168,9 +174,18 @@ mod tests {
 
     #[test]
     fn rows_that_were_filled_in_are_told() {
-        let photo = |filled: usize| [vec![90u8; 30 * (40 - filled)], vec![128; 30 * filled]].concat();
-        assert!(told_of_filled(&photo(9), 30).unwrap().message.contains("9 of 40 rows"));
-        assert_eq!((told_of_filled(&photo(7), 30), told_of_filled(&[], 0)), (None, None));
+        let photo = |rows: usize, filled: usize, of: &dyn Fn(usize) -> u8| {
+            let noise = (0..30 * rows).map(|k| (k * k % 251) as u8);
+            let filling = (0..30 * filled).map(|k| of(k % 30));
+            noise.chain(filling).collect::<Vec<u8>>()
+        };
+        let told = told_of_filled(&photo(40, 40, &|column| 90 + column as u8), 30, 3).unwrap();
+        assert!(told.message.contains("24 of 80 rows"), "{told}");
+        assert!(told_of_filled(&photo(40, 40, &|_| 128), 30, 3).is_some());
+        // Too few, a white background, and no photo at all.
+        assert_eq!(told_of_filled(&photo(40, 20, &|column| column as u8), 30, 3), None);
+        assert_eq!(told_of_filled(&photo(40, 40, &|_| 255), 30, 3), None);
+        assert_eq!(told_of_filled(&[], 0, 3), None);
     }
 
     #[test]

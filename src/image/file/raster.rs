@@ -44,8 +44,9 @@ pub fn read(source: &Source) -> Result<(Stored, exif::Exif)> {
         decoded => decoded?,
     };
     if is_jpeg {
-        let width = decoded.image.width() as usize * usize::from(decoded.image.color().channel_count());
-        findings.extend(jpeg::told_of_filled(decoded.image.as_bytes(), width));
+        let per_pixel = usize::from(decoded.image.color().channel_count());
+        let width = decoded.image.width() as usize;
+        findings.extend(jpeg::told_of_filled(decoded.image.as_bytes(), width * per_pixel, per_pixel));
     }
     let declared = if is_jpeg { Declared::Nothing } else { png::declared(&source.bytes) };
     let Decoded { image, icc, exif } = decoded;

@@ -85,6 +85,6 @@ mod tests {
         vectors[5] = DVec3::X;
         assert_eq!(of(&vectors, 2), None);
         assert_eq!(of(&vectors[..3], 2), None);
-        assert_eq!(of(&vec![DVec3::X; 8], 2), None, "all alike");
+        assert_eq!(of(&[DVec3::X; 8], 2), None, "all alike");
     }
 }
