@@ -1,43 +1,31 @@
 //! How far a job is, from its first step to its report: one share that never goes back, and the seconds that are left; the
 //! same in window and terminal.
 //!
-//! Steps are weighed by the seconds they are expected to take, as the job tells them; what comes after the last step as well,
-//! times a factor by which it was off on this machine before ([`Advance::learned_factor`], kept between runs).
+//! Steps are weighed by the seconds they are expected to take, as the job tells them; what comes after the last step as well. What a job
+//! has shown of the machine is kept between runs ([`Advance::learned_pace`]).
 
+use super::time_left::MachinePace;
 use super::{FinishingStage, Progress, StepTime};
 use std::time::Instant;
 
-/// Smallest and largest factor that is believed.
-const FACTORS: (f64, f64) = (0.1, 10.0);
 /// Share of a step, or of the finishing, that passing time alone may claim.
 const MOST_BY_TIME: f64 = 0.9;
 
 /// How far a job is.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Advance {
-    factor: f64,
     share: f64,
-    /// Seconds that finishing is expected to take, the factor left out.
+    /// Seconds that finishing is expected to take.
     finishing_seconds: f64,
     /// Seconds of the steps so far, those still expected, and those of one step; when that was told.
     steps: Option<(f64, f64, f64, Instant)>,
     finishing: Option<(FinishingStage, Instant)>,
-    learned: Option<f64>,
-}
-
-impl Default for Advance {
-    fn default() -> Self {
-        Advance::new(1.0)
-    }
+    learned: Option<MachinePace>,
+    /// What the steps so far tell of the pace of this machine.
+    machine_pace: MachinePace,
 }
 
 impl Advance {
-    /// At the start of a job whose finishing is expected to take so many times what is told of it.
-    pub fn new(factor: f64) -> Self {
-        let factor = if factor.is_finite() { factor.clamp(FACTORS.0, FACTORS.1) } else { 1.0 };
-        Advance { factor, share: 0.0, finishing_seconds: 0.0, steps: None, finishing: None, learned: None }
-    }
-
     /// The share of the whole job that is done, in [0, 1]; it never goes back.
     pub fn share(&self) -> f32 {
         self.share as f32
@@ -51,7 +39,7 @@ impl Advance {
     /// Seconds until the report is written; `None` while nothing is known.
     pub fn seconds_left(&self) -> Option<f64> {
         let (_, left, _, then) = self.steps?;
-        let finishing = self.factor * self.finishing_seconds;
+        let finishing = self.finishing_seconds;
         let seconds = match &self.finishing {
             Some((_, began)) => finishing - began.elapsed().as_secs_f64(),
             None => left - then.elapsed().as_secs_f64() + finishing,
@@ -59,14 +47,15 @@ impl Advance {
         seconds.is_finite().then_some(seconds.max(0.0))
     }
 
-    /// The factor that a job which ended has shown; handed out once.
-    pub fn learned_factor(&mut self) -> Option<f64> {
+    /// What a job which ended has shown of the machine; handed out once.
+    pub fn learned_pace(&mut self) -> Option<MachinePace> {
         self.learned.take()
     }
 
     /// A step was done.
     pub fn stepped(&mut self, progress: &Progress) {
-        let Progress { row, seconds_left, finishing_seconds, steps_per_second, .. } = progress;
+        let Progress { row, seconds_left, finishing_seconds, steps_per_second, machine_pace, .. } = progress;
+        self.machine_pace = *machine_pace;
         self.take((row.seconds, *seconds_left, *finishing_seconds), 1.0 / steps_per_second.max(1e-9));
     }
 
@@ -96,7 +85,8 @@ impl Advance {
     pub fn finished(&mut self) {
         self.share = 1.0;
         if let (Some((_, began)), true) = (self.finishing, self.finishing_seconds > 0.0) {
-            self.learned = Some((began.elapsed().as_secs_f64() / self.finishing_seconds).clamp(FACTORS.0, FACTORS.1));
+            let finishing = self.machine_pace.finishing * began.elapsed().as_secs_f64() / self.finishing_seconds;
+            self.learned = Some(MachinePace { finishing, ..self.machine_pace });
         }
     }
 
@@ -109,7 +99,7 @@ impl Advance {
                 self.claim((done + within) / self.whole(done, left));
             }
             Some((_, began)) => {
-                let share = began.elapsed().as_secs_f64() / (self.factor * self.finishing_seconds).max(1e-3);
+                let share = began.elapsed().as_secs_f64() / self.finishing_seconds.max(1e-3);
                 let before = self.before_finishing();
                 self.claim(before + (1.0 - before) * share.min(MOST_BY_TIME));
             }
@@ -117,7 +107,7 @@ impl Advance {
     }
 
     fn whole(&self, done: f64, left: f64) -> f64 {
-        (done + left.max(0.0) + self.factor * self.finishing_seconds).max(1e-9)
+        (done + left.max(0.0) + self.finishing_seconds).max(1e-9)
     }
 
     fn before_finishing(&self) -> f64 {
@@ -148,12 +138,19 @@ mod tests {
             surface_rmse: None,
             held_out_rmse: None,
         };
-        Progress { row, steps_total: 10, steps_per_second: 1.0, seconds_left, finishing_seconds: 20.0 }
+        Progress {
+            row,
+            steps_total: 10,
+            steps_per_second: 1.0,
+            seconds_left,
+            finishing_seconds: 10.0,
+            machine_pace: MachinePace::default(),
+        }
     }
 
     #[test]
     fn the_share_covers_finishing_and_never_goes_back() {
-        let mut advance = Advance::new(0.5);
+        let mut advance = Advance::default();
         let mut before = 0;
         // The expectation grows on the way: what was shown stays.
         for (seconds, left) in [(10.0, 30.0), (20.0, 20.0), (30.0, 90.0), (40.0, 0.0)] {
@@ -177,12 +174,12 @@ mod tests {
         }
         advance.finished();
         assert_eq!(advance.percent(), 100);
-        assert!(advance.learned_factor().is_some_and(|factor| factor > 0.0) && advance.learned_factor().is_none());
+        assert!(advance.learned_pace().is_some_and(|pace| pace.finishing > 0.0) && advance.learned_pace().is_none());
     }
 
     #[test]
     fn the_time_left_counts_finishing_and_nothing_is_said_before_the_first_step() {
-        let mut advance = Advance::new(0.5);
+        let mut advance = Advance::default();
         assert!(advance.seconds_left().is_none() && advance.percent() == 0);
         advance.stepped(&progress(10.0, 30.0));
         let left = advance.seconds_left().unwrap();
@@ -191,7 +188,7 @@ mod tests {
             seconds: 12.0,
             step_seconds_left: 12.0,
             seconds_left: 12.0,
-            finishing_seconds: 20.0,
+            finishing_seconds: 10.0,
         });
         let left = advance.seconds_left().unwrap();
         assert!((21.0..=22.0).contains(&left) && advance.percent() == 35, "{left}");

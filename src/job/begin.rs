@@ -56,6 +56,7 @@ pub fn start_with(
         steps_asked: 0,
         reached: None,
         first_of_session,
+        machine_pace: options.machine_pace,
     };
     let thread = std::thread::Builder::new()
         .name("patina-fit".into())

@@ -1,5 +1,6 @@
 //! What a watcher holds of a running job: where commands go, where events and snapshots come from.
 
+use super::time_left::MachinePace;
 use super::{Budget, Command, Event, Slot, Snapshot};
 use crossbeam_channel::{Receiver, Sender};
 use std::sync::Arc;
@@ -19,6 +20,8 @@ pub struct JobOptions {
     /// How long the fit may take; as long as it needs when not given. It ends by then with what there is, as any fit ends,
     /// and can be taken up.
     pub budget: Option<Budget>,
+    /// How long steps take on this machine, as fits before have shown; only what is told of the time left depends on it.
+    pub machine_pace: MachinePace,
     /// Called before each step with the number of steps done; a seam for tests of faults.
     #[doc(hidden)]
     pub before_step: Option<Box<dyn FnMut(usize) + Send>>,

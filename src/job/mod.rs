@@ -192,6 +192,8 @@ pub struct Progress {
     pub seconds_left: f64,
     /// Seconds that what comes after the last step is expected to take.
     pub finishing_seconds: f64,
+    /// What the steps so far tell of the pace of this machine.
+    pub machine_pace: time_left::MachinePace,
 }
 
 /// How far a step is.

@@ -4,7 +4,7 @@ use super::outcome;
 use super::prepare::{Prepared, RunSettings};
 use super::save::Saver;
 use super::teller::Teller;
-use super::time_left::{self, Pace};
+use super::time_left::{self, MachinePace, Pace};
 use super::{Budget, Command, Event, Progress, Slot, Snapshot, SolverTold, StepTime};
 use crate::error::{ErrorKind, Finding, Result, Severity};
 use crate::fit::underway::{Reached, Underway};
@@ -39,11 +39,13 @@ pub(super) struct Worker {
     pub(super) reached: Option<Reached>,
     /// Steps that were done before this job.
     pub(super) first_of_session: usize,
+    /// How long steps take on this machine, as fits before have shown.
+    pub(super) machine_pace: MachinePace,
 }
 
-fn pace_of(fitter: &Fitter, first_of_session: usize) -> Pace {
+fn pace_of(fitter: &Fitter, first_of_session: usize, known: MachinePace) -> Pace {
     let state = fitter.state();
-    time_left::pace(&state.plan, &state.losses, first_of_session, fitter.surface_megapixels())
+    time_left::pace(&state.plan, &state.losses, first_of_session, fitter.surface_megapixels(), known)
 }
 
 impl Worker {
@@ -153,13 +155,13 @@ impl Worker {
     /// One step; where the time is limited, it is dropped when that is up, but for what it had reached.
     /// Also whether something within it was shown.
     fn step(&mut self) -> Result<(StepOutcome, bool)> {
-        let Worker { fitter, budget, stop, snapshot, teller, reached, first_of_session, .. } = self;
+        let Worker { fitter, budget, stop, snapshot, teller, reached, first_of_session, machine_pace, .. } = self;
         *reached = None;
         let is_limited = budget.is_some();
         let mut last_snapshot = Instant::now();
         let mut was_shown = false;
         let (began, before) = (Instant::now(), fitter.state().seconds);
-        let Pace { seconds_after_next, finishing_seconds, .. } = pace_of(fitter, *first_of_session);
+        let Pace { seconds_after_next, finishing_seconds, .. } = pace_of(fitter, *first_of_session, *machine_pace);
         let mut watch = |underway: &Underway| {
             let seconds = before + began.elapsed().as_secs_f64();
             if let Some(step_seconds_left) = underway.seconds_left {
@@ -311,8 +313,8 @@ impl Worker {
 
     fn progress(&self, row: LossRow) -> Progress {
         let steps_total = self.fitter.steps_total();
-        let Pace { steps_per_second, seconds_left, finishing_seconds, .. } =
-            pace_of(&self.fitter, self.first_of_session);
-        Progress { row, steps_total, steps_per_second, seconds_left, finishing_seconds }
+        let Pace { steps_per_second, seconds_left, finishing_seconds, factors, .. } =
+            pace_of(&self.fitter, self.first_of_session, self.machine_pace);
+        Progress { row, steps_total, steps_per_second, seconds_left, finishing_seconds, machine_pace: factors }
     }
 }

@@ -58,7 +58,7 @@ fn each_small_case_opens_and_tells_what_is_special() {
 
 #[test]
 fn a_turntable_is_told_and_captures_under_one_light_are_not() {
-    let settings = || ReadSettings { shrink: 2, ..Default::default() };
+    let settings = || ReadSettings { shrink: 4, ..Default::default() };
     if let Some(folder) = data("multilight/head_turntable_bmvs") {
         let (_, report) = checked(&folder, settings());
         let light = report.light.clone().unwrap();

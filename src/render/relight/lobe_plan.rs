@@ -13,6 +13,7 @@ use crate::render::cached::lobe_sum::lobe_sums;
 use crate::render::cached::{CachedTransport, LightPlanes, PointLight, SeenRows, ShadingPoint, ViewFootprints};
 use glam::Vec3;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// How far a normal may lie from the mean of those at the points of the grid, as a share of the lobe's microfacet width.
 const NORMAL_TOLERANCE: f32 = 0.05;
@@ -40,10 +41,19 @@ struct Place {
     first_sum: usize,
 }
 
+/// All lobes that look into the surroundings of one point of the grid: these are turned to what it sees but once.
+struct Group {
+    /// Its place, or [`NO_PLACE`].
+    place: u32,
+    /// Its shading points with integrals of their own.
+    alone: Range<usize>,
+}
+
 /// Where lobes are integrated.
 #[derive(Default)]
 pub struct LobePlan {
     places: Vec<Place>,
+    groups: Vec<Group>,
     /// Number of their sums.
     sums: usize,
     /// Of each point of the grid: its place, or [`NO_PLACE`].
@@ -107,8 +117,18 @@ impl LobePlan {
         }
         // Lobes of one point of the grid look into the same surroundings: they come one after another.
         let mut alone: Vec<u32> = (0..points.len() as u32).filter(|&index| is_alone[index as usize]).collect();
-        alone.sort_by_key(|&index| points[index as usize].lobe_point);
-        LobePlan { places, sums, of_grid, widths, alone, is_alone }
+        let lobe_point = |index: u32| points[index as usize].lobe_point;
+        alone.sort_by_key(|&index| lobe_point(index));
+        let mut groups = Vec::with_capacity(places.len());
+        let mut end = 0;
+        for (grid_point, &place) in (0..).zip(&of_grid) {
+            let begin = end;
+            end += alone[begin..].iter().take_while(|&&index| lobe_point(index) == grid_point).count();
+            if place != NO_PLACE || end > begin {
+                groups.push(Group { place, alone: begin..end });
+            }
+        }
+        LobePlan { places, groups, sums, of_grid, widths, alone, is_alone }
     }
 
     /// Lobes that are integrated.
@@ -142,16 +162,23 @@ impl LobePlan {
             }
             sums.into_iter().take(count)
         };
-        let of_places = |_: usize, places: &[Place]| -> Vec<LobeSums> {
-            let mut seen = SeenRows::default();
-            places.iter().flat_map(|own| of_place(&mut seen, own)).collect()
+        let of_groups = |_: usize, groups: &[Group]| -> (Vec<LobeSums>, Vec<LobeSums>) {
+            let (mut seen, mut of_places, mut of_alone) = (SeenRows::default(), Vec::new(), Vec::new());
+            for group in groups {
+                if group.place != NO_PLACE {
+                    of_places.extend(of_place(&mut seen, &self.places[group.place as usize]));
+                }
+                for &index in &self.alone[group.alone.clone()] {
+                    let point = ShadingPoint { normal_variance: 0.0, ..footprints.points[index as usize] };
+                    let width = self.widths[index as usize];
+                    of_alone.push(transport.lobe_at(&point, (light, at), &mut seen, width, false));
+                }
+            }
+            (of_places, of_alone)
         };
-        let sums = parallel::map_chunks(&self.places, 16, of_places).concat();
-        let of_alone = parallel::map_with(self.alone.len(), SeenRows::default, |seen, place| {
-            let index = self.alone[place] as usize;
-            let point = ShadingPoint { normal_variance: 0.0, ..footprints.points[index] };
-            transport.lobe_at(&point, (light, at), seen, self.widths[index], false)
-        });
+        let parts = parallel::map_chunks(&self.groups, 16, of_groups);
+        let (sums, of_alone): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+        let (sums, of_alone) = (sums.concat(), of_alone.concat());
         let between = |index: usize| match self.is_alone[index] {
             true => LobeSums::default(),
             false => self.between(footprints.lit_of(&footprints.points[index]), self.widths[index], &sums),

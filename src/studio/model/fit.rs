@@ -78,7 +78,7 @@ pub struct FitControl {
 
 impl FitControl {
     /// Takes over a job that was just started.
-    pub fn begin(&mut self, job: JobHandle, folder: RunFolder, settings: FitSettings, finishing_factor: f64) {
+    pub fn begin(&mut self, job: JobHandle, folder: RunFolder, settings: FitSettings) {
         *self = FitControl {
             job: Some(job),
             status: FitStatus::Running,
@@ -87,7 +87,7 @@ impl FitControl {
             snapshot: self.snapshot.take(),
             settings_in_force: Some(settings.clone()),
             settings_confirmed: Some(settings),
-            advance: Advance::new(finishing_factor),
+            advance: Advance::default(),
             ..FitControl::default()
         };
     }

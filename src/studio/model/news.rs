@@ -40,8 +40,9 @@ impl Model {
         let was_live = self.fit.status.is_live();
         changed |= self.fit.poll(&mut self.log);
         self.card |= was_live && self.fit.status == FitStatus::Finished;
-        if let Some(factor) = self.fit.advance.learned_factor() {
-            self.preferences.finishing_factor = 0.5 * (self.preferences.finishing_factor + factor);
+        if let Some(shown) = self.fit.advance.learned_pace() {
+            let known = &mut self.preferences.machine_pace;
+            *known = Some(known.map_or(shown, |before| before.towards(shown)));
         }
         changed |= self.poll_object();
         self.take_back_refused();

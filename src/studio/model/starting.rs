@@ -119,6 +119,7 @@ impl Model {
             pool: background::pool("patina-fit"),
             before_step,
             budget: None,
+            machine_pace: self.preferences.machine_pace.unwrap_or_default(),
         }
     }
 
@@ -172,7 +173,7 @@ impl Model {
         // A failure of the fit before is past.
         self.log.dismiss();
         self.log.note_of_file(format!("Output folder: {}", folder.path().display()), folder.path());
-        self.fit.begin(job, folder, settings, self.preferences.finishing_factor);
+        self.fit.begin(job, folder, settings);
         self.activate = Some(Panel::Curves);
     }
 

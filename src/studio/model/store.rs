@@ -7,6 +7,7 @@ use crate::error::{Error, ErrorKind, Place, Result};
 use crate::image::display::DisplaySettings;
 use crate::image::{RgbImage, file};
 use crate::job::kept::{self, Kept};
+use crate::job::time_left::MachinePace;
 use crate::studio::stage::Navigation;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -80,8 +81,8 @@ pub struct Preferences {
     pub follow: Follow,
     /// Whose hand movements the viewport follows.
     pub navigation: Navigation,
-    /// How many times as long as expected finishing takes on this machine, as learned from former runs.
-    pub finishing_factor: f64,
+    /// How long the parts of a fit take on this machine, as learned from former runs; `None` before the first.
+    pub machine_pace: Option<MachinePace>,
     /// Seconds a path of a render took on this machine, as learned from former renders; `None` before the first.
     pub seconds_per_path: Option<f64>,
     /// The run that was in progress when this was written; a later start finds it here after a crash.
@@ -115,7 +116,7 @@ impl Default for Preferences {
             object_layout: String::new(),
             follow: Follow::Live,
             navigation: Navigation::default(),
-            finishing_factor: 1.0,
+            machine_pace: None,
             seconds_per_path: None,
             running: None,
         }
@@ -132,6 +133,7 @@ impl Preferences {
 
     /// Brings numbers of a hand-edited file into their range.
     fn mended(mut self) -> Self {
+        self.machine_pace = self.machine_pace.map(MachinePace::within_range);
         if !(0.5..=4.0).contains(&self.zoom) {
             self.zoom = 1.0;
         }
