@@ -10,7 +10,7 @@ use crate::object::prior::LightPriorKind;
 use crate::object::progress::ObjectEvent;
 use crate::object::read::{ObjectFiles, read_views};
 use crate::object::result_read::ObjectInputs;
-use crate::object::settings::{LightMethod, ObjectSettings};
+use crate::object::settings::{LightMethod, LightsOf, ObjectSettings};
 use crate::object::starts::{ModelKind, StartedModel};
 use crate::object::{result_folder, split};
 use crate::scene::settings::{PixelCentre, Up};
@@ -23,7 +23,7 @@ use std::sync::atomic::AtomicBool;
 #[derive(Debug, Args)]
 #[command(group(clap::ArgGroup::new("shape").required(true).args(["mesh", "sphere", "normals"])))]
 pub struct ObjectOptions {
-    /// One photo or several of the same object under the same environment: EXR, HDR, PFM, PNG, TIFF or JPEG.
+    /// One photo or several of the same object: EXR, HDR, PFM, PNG, TIFF or JPEG.
     #[arg(required = true)]
     pub photos: Vec<PathBuf>,
     /// The mesh of the object: OBJ, PLY, glTF, GLB or STL.
@@ -46,6 +46,12 @@ pub struct ObjectOptions {
     /// A known environment: only the reflectance is estimated.
     #[arg(long)]
     pub env: Option<PathBuf>,
+    /// Whether the photos are under one environment, or each under one of its own; they share the reflectance.
+    #[arg(long, value_enum, default_value_t = LightsOf::One, conflicts_with = "env")]
+    pub lights: LightsOf,
+    /// Known environments of the first photos, with `--lights each`: they fix the scale that photos leave open.
+    #[arg(long, num_args = 1..)]
+    pub probe: Vec<PathBuf>,
     /// Model of the reflectance.
     #[arg(long, value_enum, default_value_t = ModelKind::default())]
     pub model: ModelKind,
@@ -104,6 +110,7 @@ impl ObjectOptions {
             _ => ObjectSettings::default(),
         };
         settings.seed = self.seed;
+        settings.lights = self.lights;
         settings.shadows = !self.no_shadows;
         settings.prior = self.prior.unwrap_or(settings.prior);
         settings.method = self.method.unwrap_or(settings.method);
@@ -136,6 +143,11 @@ pub fn object(options: &ObjectOptions, json: bool) -> Result<()> {
         let (light, mut noticed) = Environment::read(path)?;
         findings.append(&mut noticed);
         known.light = Some(light);
+    }
+    for path in &options.probe {
+        let (light, mut noticed) = Environment::read(path)?;
+        findings.append(&mut noticed);
+        known.probes.push(light);
     }
     let (mut names, mut lights) = (Vec::new(), Vec::new());
     for path in &options.relight {

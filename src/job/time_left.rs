@@ -171,15 +171,15 @@ pub fn pace(
 }
 
 /// Seconds of all that comes after the last step, most of them for scores: so many, and for each million pixels of surface.
-const FINISHING_SECONDS: (f64, f64) = (13.0, 7.5);
+const FINISHING_SECONDS: (f64, f64) = (18.0, 5.0);
 /// The same of making a level ready, at its pixels.
-const LEVEL_SECONDS: (f64, f64) = (2.0, 4.0);
+const LEVEL_SECONDS: (f64, f64) = (4.0, 3.0);
 /// The same of a round on the light.
-const ROUND_SECONDS: (f64, f64) = (1.0, 0.3);
+const ROUND_SECONDS: (f64, f64) = (1.4, 0.5);
 /// The same of maps.
-const MAPS_SECONDS: (f64, f64) = (0.2, 8.5);
+const MAPS_SECONDS: (f64, f64) = (1.5, 8.0);
 /// Seconds of the descent from whole pixels.
-const REFINE_SECONDS: (f64, f64) = (12.0, 14.5);
+const REFINE_SECONDS: (f64, f64) = (18.0, 22.0);
 /// Millions of pixels that the solver keeps, about: more of them are thinned out.
 const MOST_MEGAPIXELS: f64 = 4.0;
 /// Seconds of a step of the optimiser, about.

@@ -7,36 +7,34 @@
 
 use super::bands::LightBands;
 use super::light_holder::LightHolder;
-use super::light_step::{LightOutcome, NewtonBudget, first_order, newton, objective};
-use super::matrices::{LightMatrix, NodeMatrix};
-use super::nodes::{NodeGrid, NodeTable};
+use super::matrices::LightMatrix;
+use super::nodes::NodeTable;
 use super::observations::ObjectView;
 use super::prior::LogLight;
 use super::problem::ObjectProblem;
 use super::progress::{ObjectEvent, ObjectiveRow, StepKind};
-use super::reflectance_step::{ReflectanceProblem, StepMemory};
+use super::reflectance_step::StepMemory;
+use super::run::{REFLECTANCE_PATIENCE, Run};
 use super::screen::{Candidate, screen};
 use super::seen::LightSeen;
-use super::settings::{LightMethod, ObjectSettings};
+use super::settings::{LightsOf, ObjectSettings};
 use super::starts::StartedModel;
 use crate::error::{Error, ErrorKind, Finding, Result, Severity};
 use crate::light::Environment;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-/// A step on the reflectance that gains less than this part of the objective is the last of its round.
-const REFLECTANCE_PATIENCE: f64 = 1e-3;
-/// The same under a known light: there is no other unknown that could move instead, and the last tenth of a percent of
+/// [`REFLECTANCE_PATIENCE`] under a known light: there is no other unknown that could move instead, and the last tenth of a percent of
 /// the objective is what tells a narrow lobe's width.
 const KNOWN_LIGHT_PATIENCE: f64 = 1e-5;
-/// First-order steps without gain after which a round ends, as released.
-const FIRST_ORDER_PATIENCE: usize = 50;
 
 /// What is known beforehand.
 #[derive(Clone, Debug, Default)]
 pub struct Known {
-    /// The light.
+    /// The light of all photos.
     pub light: Option<Environment>,
+    /// The lights of the first photos, where each has its own: those of the others are estimated.
+    pub probes: Vec<Environment>,
     /// Parameters of the model that are the reflectance.
     pub reflectance: Option<Vec<f64>>,
 }
@@ -48,8 +46,10 @@ pub struct Estimate {
     pub parameters: Vec<f64>,
     /// The reflectance at the nodes of the fit.
     pub table: NodeTable,
-    /// The light.
+    /// The light; that of the first photo where each has its own.
     pub light: LogLight,
+    /// Those of the further photos, in their order; empty where all have one.
+    pub further_lights: Vec<LogLight>,
     /// The start that led here.
     pub start: String,
     /// Starts that were followed, the best first.
@@ -66,19 +66,6 @@ pub struct Estimate {
     pub findings: Vec<Finding>,
     /// Seconds.
     pub seconds: f64,
-}
-
-/// An estimation in progress.
-struct Run<'a> {
-    problem: ObjectProblem,
-    model: &'a StartedModel,
-    settings: &'a ObjectSettings,
-    rows: Vec<ObjectiveRow>,
-    began: Instant,
-    stop: &'a AtomicBool,
-    watch: &'a (dyn Fn(ObjectEvent) + Sync),
-    light_prior: f64,
-    code_prior: f64,
 }
 
 /// Estimates what is not known of light and reflectance.
@@ -101,10 +88,18 @@ pub fn estimate(
             .remedy("leave one of them out"));
     }
     settings.validate_for(known.light.is_some())?;
+    // Under a light that is known for all there is but one.
+    let lights = if known.light.is_some() { LightsOf::One } else { settings.lights };
+    let settings = &ObjectSettings { lights, ..settings.clone() };
+    if !known.probes.is_empty() && (settings.lights == LightsOf::One || known.probes.len() >= views.len()) {
+        let message = format!("{} known lights for {} photos", known.probes.len(), views.len());
+        return Err(Error::new(ErrorKind::InvalidSetting, message)
+            .remedy("give --lights each and fewer probes than photos, or --env where one light is known for all"));
+    }
     watch(ObjectEvent::Stage("tracing what each pixel sees"));
-    let (problem, mut findings) = ObjectProblem::new(views, settings)?;
-    let mut run =
-        Run { problem, model, settings, rows: Vec::new(), began, stop, watch, light_prior: 0.0, code_prior: 0.0 };
+    let (problems, mut findings) = ObjectProblem::by_light(views, settings)?;
+    let of_lights = vec![[0.0; 2]; problems.len()];
+    let mut run = Run { problems, model, settings, rows: Vec::new(), began, stop, watch, of_lights, code_prior: 0.0 };
     let (width, height) = settings.light_size();
     let given = known.light.as_ref().map(|light| LogLight::of(&light.resampled(width, height), 1e-12));
 
@@ -112,7 +107,12 @@ pub fn estimate(
     if known.reflectance.is_none() {
         watch(ObjectEvent::Stage("trying starts"));
         let coarse = ObjectProblem::coarse(views, settings)?;
-        candidates = screen(&coarse, model, known.light.as_ref(), settings, stop)?;
+        let coarse_size = coarse.first().map(|own| own.transport.directions());
+        let of_probe = |light: &Environment| {
+            coarse_size.map(|size| LogLight::of(&light.resampled(size.width, size.height), 1e-12))
+        };
+        let probes: Vec<LogLight> = known.probes.iter().filter_map(of_probe).collect();
+        candidates = screen(&coarse, model, known.light.as_ref(), &probes, settings, stop)?;
         for candidate in &candidates {
             run.push(0, StepKind::Start, candidate.objective, candidate.not_finite);
         }
@@ -125,60 +125,77 @@ pub fn estimate(
                 .remedy("check the photo, or try another model"));
         }
     };
-    let grid = std::sync::Arc::clone(run.problem.transport.grid());
+    let grid = std::sync::Arc::clone(run.problems[0].transport.grid());
     let mut table = grid.tabulate(model.model.as_ref(), &parameters);
-    let mut light = match (&given, candidates.first().and_then(|best| best.light.as_ref())) {
-        (Some(light), _) => light.clone(),
+    let probes = known.probes.len();
+    let begun = |index: usize| match (&given, known.probes.get(index), candidates.first()) {
+        (Some(light), ..) => light.clone(),
+        (None, Some(probe), _) => LogLight::of(&probe.resampled(width, height), 1e-12),
         // The light found at low resolution is where the fine one begins.
-        (None, Some(coarse)) => LogLight::of(&coarse.environment().resampled(width, height), 1e-12),
-        (None, None) => {
-            let matrix = LightMatrix::new(&run.problem.transport, &table);
-            LightHolder::first_light(&run.problem, &matrix, settings)
+        (None, None, Some(Candidate { lights, .. })) if index < lights.len() => {
+            LogLight::of(&lights[index].environment().resampled(width, height), 1e-12)
+        }
+        (None, None, _) => {
+            let problem = &run.problems[index];
+            let matrix = LightMatrix::new(&problem.transport, &table);
+            LightHolder::first_light(problem, &matrix, settings)
         }
     };
+    let mut lights: Vec<LogLight> = (0..run.problems.len()).map(begun).collect();
 
     watch(ObjectEvent::Stage("estimating"));
     let rounds = if known.reflectance.is_some() { settings.outer_loops.div_ceil(2) } else { settings.outer_loops };
     // A light that is given does not move: no prior asks anything of it, nor of its size.
-    let mut holder = match given {
-        None => LightHolder::new(settings, known.reflectance.is_some(), &light)?,
-        Some(_) => LightHolder::default(),
+    let holder_of = |(index, light): (usize, &LogLight)| match given.is_some() || index < probes {
+        false => LightHolder::new(settings, known.reflectance.is_some(), light),
+        true => Ok(LightHolder::default()),
     };
+    let mut holders = lights.iter().enumerate().map(holder_of).collect::<Result<Vec<LightHolder>>>()?;
     // While the light is held the objective is one from round to round, and what was learned of it stays true.
     let mut memory = StepMemory::default();
     for round in 1..=rounds {
-        let grey = given.is_none() && known.reflectance.is_none() && round <= settings.grey_loops;
+        let grey = given.is_none() && probes == 0 && known.reflectance.is_none() && round <= settings.grey_loops;
         if given.is_none() {
-            run.step_light(round, grey, &table, &mut holder, &mut light)?;
+            run.step_lights((round, grey), &table, &mut holders, &mut lights, probes)?;
         }
         if known.reflectance.is_none() {
             if given.is_none() {
                 memory = StepMemory::default();
             }
             let patience = if given.is_some() { KNOWN_LIGHT_PATIENCE } else { REFLECTANCE_PATIENCE };
-            run.step_reflectance(round, &grid, &light, &mut parameters, &mut memory, patience)?;
+            if probes > 0 {
+                run.follow_probes(&grid, &mut lights, &mut parameters, probes)?;
+            }
+            run.step_reflectance(round, &grid, &lights, &mut parameters, &mut memory, patience)?;
             table = grid.tabulate(model.model.as_ref(), &parameters);
         }
-        watch(ObjectEvent::State { light: &light, table: &table, parameters: &parameters });
+        let (light, further_lights) = (&lights[0], &lights[1..]);
+        watch(ObjectEvent::State { light, further_lights, table: &table, parameters: &parameters });
     }
     if given.is_none() && known.reflectance.is_none() {
         // The reflectance had the last word; the light answers once more.
-        run.step_light(rounds, false, &table, &mut holder, &mut light)?;
+        run.step_lights((rounds, false), &table, &mut holders, &mut lights, probes)?;
     }
 
-    let matrix = LightMatrix::new(&run.problem.transport, &table);
-    let picture_log_rmse = run.problem.likelihood.log_rmse(&matrix.forward(&light.radiance()));
+    let squares = run.problems.iter().zip(&lights).map(|(problem, light)| {
+        let matrix = LightMatrix::new(&problem.transport, &table);
+        problem.likelihood.log_rmse(&matrix.forward(&light.radiance())).powi(2)
+    });
+    let picture_log_rmse = (squares.sum::<f64>() / run.problems.len() as f64).sqrt();
     let not_finite: usize = run.rows.iter().map(|row| row.not_finite).sum();
     if not_finite > 0 {
         let message = format!("{not_finite} numbers were not finite and were left out");
         findings
             .push(Finding::new(Severity::Warning, "object-not-finite", message).remedy("try another start or model"));
     }
-    let light_seen = Some(LightSeen::of(&run.problem.transport, &table, &light));
+    let further_lights = lights.split_off(1);
+    let light = lights.remove(0);
+    let light_seen = Some(LightSeen::of(&run.problems[0].transport, &table, &light));
     let mut light_bands = None;
-    if given.is_none() {
+    if given.is_none() && probes == 0 {
         watch(ObjectEvent::Stage("asking which details of the light the photos tell"));
-        let small = ObjectProblem::for_bands(views, settings)?;
+        let of_light = if settings.lights == LightsOf::Each { &views[..1] } else { views };
+        let small = ObjectProblem::for_bands(of_light, settings)?;
         let directions = small.transport.directions();
         let resampled = light.environment().resampled(directions.width, directions.height);
         let table = small.transport.grid().tabulate(model.model.as_ref(), &parameters);
@@ -188,6 +205,7 @@ pub fn estimate(
         parameters,
         table,
         light,
+        further_lights,
         start,
         candidates,
         rows: run.rows,
@@ -197,127 +215,4 @@ pub fn estimate(
         findings,
         seconds: began.elapsed().as_secs_f64(),
     })
-}
-
-impl Run<'_> {
-    fn check_stop(&self) -> Result<()> {
-        match self.stop.load(Ordering::Relaxed) {
-            true => Err(Error::new(ErrorKind::Stopped, "the estimation was stopped")),
-            false => Ok(()),
-        }
-    }
-
-    fn push(&mut self, round: usize, kind: StepKind, objective: [f64; 3], not_finite: usize) {
-        let [data, light_prior, code_prior] = objective;
-        let step = self.rows.len() + 1;
-        let seconds = self.began.elapsed().as_secs_f64();
-        let row = ObjectiveRow { step, round, kind, data, light_prior, code_prior, seconds, not_finite };
-        self.rows.push(row);
-        (self.watch)(ObjectEvent::Row(row));
-    }
-
-    fn step_light(
-        &mut self,
-        round: usize,
-        grey: bool,
-        table: &NodeTable,
-        holder: &mut LightHolder,
-        light: &mut LogLight,
-    ) -> Result<()> {
-        self.check_stop()?;
-        let matrix = LightMatrix::new(&self.problem.transport, table);
-        let likelihood = &self.problem.likelihood;
-        // As released the light itself is grey; our own way takes only its mean colour out.
-        holder.terms.grey = grey && self.settings.method == LightMethod::FirstOrder;
-        // The first round starts from little: it gets more steps.
-        let steps = if round == 1 { 3 * self.settings.light_steps } else { self.settings.light_steps };
-        let budget = NewtonBudget { steps: 1, products: self.settings.light_products };
-        let mut outcome = LightOutcome::default();
-        // In the grey rounds another thing is asked of the light than what is told; and first-order steps are as released.
-        let may_rise = grey || self.settings.method == LightMethod::FirstOrder;
-        let total = |light: &LogLight, holder: &LightHolder| {
-            let reached = objective(&matrix, likelihood, &holder.terms, light);
-            reached.total() + holder.deep.as_ref().map_or(0.0, |deep| deep.energy(light))
-        };
-        let before = (!may_rise).then(|| (total(light, holder), light.clone(), holder.deep.clone()));
-        match (&mut holder.deep, self.settings.method) {
-            (Some(deep), LightMethod::FirstOrder) => {
-                let (mut best, mut since) = (f64::INFINITY, 0);
-                for _ in 0..self.settings.light_steps {
-                    outcome = first_order(&matrix, likelihood, &mut deep.prior, grey, deep.rate, light);
-                    let total = outcome.objective.total();
-                    since = if total < best { 0 } else { since + 1 };
-                    best = best.min(total);
-                    if since > FIRST_ORDER_PATIENCE || self.stop.load(Ordering::Relaxed) {
-                        break;
-                    }
-                }
-                *light = deep.net_light(light.width, light.height);
-                if grey {
-                    light.make_grey();
-                }
-            }
-            (Some(deep), LightMethod::ClosedForm) => {
-                for _ in 0..steps {
-                    outcome = deep.round(&matrix, likelihood, &holder.terms, light, budget);
-                    if self.stop.load(Ordering::Relaxed) {
-                        break;
-                    }
-                }
-            }
-            (None, _) => {
-                let budget = NewtonBudget { steps: 2 * steps, ..budget };
-                outcome = newton(&matrix, likelihood, &holder.terms, light, budget);
-            }
-        }
-        if grey && self.settings.method == LightMethod::ClosedForm {
-            light.level_colours();
-        }
-        self.check_stop()?;
-        if let Some((least, before, deep)) = before
-            && !(total(light, holder) <= least)
-        {
-            // The net moves under the steps of the light: where both together made it worse the round is taken back, and
-            // the net alone comes nearer to the light, unless that is worse, too.
-            *light = before;
-            holder.deep = deep.clone();
-            if let Some(own) = &mut holder.deep {
-                own.follow(light);
-            }
-            if !(total(light, holder) <= least) {
-                holder.deep = deep;
-            }
-        }
-        // What is told is a function of light, net and reflectance as they are now. The steps above each lower another
-        // one: the net moves under them, and so does what is carried along.
-        let reached = objective(&matrix, likelihood, &holder.terms, light);
-        self.light_prior = reached.prior + holder.deep.as_ref().map_or(0.0, |deep| deep.energy(light));
-        self.push(round, StepKind::Light, [reached.data, self.light_prior, self.code_prior], outcome.not_finite);
-        Ok(())
-    }
-
-    fn step_reflectance(
-        &mut self,
-        round: usize,
-        grid: &NodeGrid,
-        light: &LogLight,
-        parameters: &mut Vec<f64>,
-        memory: &mut StepMemory,
-        patience: f64,
-    ) -> Result<()> {
-        self.check_stop()?;
-        let matrix = NodeMatrix::new(&self.problem.transport, &light.texels());
-        let problem = ReflectanceProblem {
-            model: self.model.model.as_ref(),
-            grid,
-            matrix: &matrix,
-            likelihood: &self.problem.likelihood,
-            prior: &self.model.prior,
-        };
-        let reached = problem.improve_with(memory, parameters, self.settings.reflectance_steps, patience);
-        self.check_stop()?;
-        self.code_prior = reached.prior;
-        self.push(round, StepKind::Reflectance, [reached.data, self.light_prior, self.code_prior], reached.not_finite);
-        Ok(())
-    }
 }

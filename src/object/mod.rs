@@ -10,7 +10,7 @@
 //! | [`directions`], [`nodes`], [`transport`], [`matrices`] | the image as a linear function of the light and of the reflectance |
 //! | [`likelihood`] | Laplace on log radiance |
 //! | [`prior`] | what is known of light: the deep prior and its rivals |
-//! | [`light_step`], [`reflectance_step`] | one unknown while the other is held |
+//! | [`light_step`], [`reflectance_step`], `run` | one unknown while the other is held; each light, and the reflectance that they share |
 //! | [`starts`], [`screen`], [`evidence`] | where to begin, tried at low resolution and ranked |
 //! | [`split`], [`seen`], [`bands`] | what the photo leaves open; which directions and which details of the light it sees |
 //! | [`picture`] | re-renders and relit pictures |
@@ -45,6 +45,7 @@ pub mod read;
 pub mod reflectance_step;
 pub mod result_folder;
 pub mod result_read;
+mod run;
 pub mod screen;
 pub mod seen;
 pub mod settings;

@@ -3,9 +3,9 @@
 use super::likelihood::Likelihood;
 use super::matrices::LightMatrix;
 use super::nodes::NodeGrid;
-use super::observations::{ObjectView, Observations};
+use super::observations::{FEWEST_PIXELS, ObjectView, Observations};
 use super::prior::LogLight;
-use super::settings::ObjectSettings;
+use super::settings::{LightsOf, ObjectSettings};
 use super::transport::{TexelDirections, Transport};
 use crate::error::{Finding, Result};
 use std::sync::Arc;
@@ -45,18 +45,38 @@ impl ObjectProblem {
         Ok((ObjectProblem { observations, transport, likelihood }, findings))
     }
 
+    /// One problem for all photos, or one for each where each has a light of its own; they share the pixels.
+    ///
+    /// # Errors
+    /// As [`ObjectProblem::new`].
+    pub fn by_light(views: &[ObjectView], settings: &ObjectSettings) -> Result<(Vec<Self>, Vec<Finding>)> {
+        let groups: Vec<&[ObjectView]> = match settings.lights {
+            LightsOf::One => vec![views],
+            LightsOf::Each => views.chunks(1).collect(),
+        };
+        let pixels = settings.pixels.div_ceil(groups.len().max(1)).max(FEWEST_PIXELS);
+        let own = ObjectSettings { pixels, ..settings.clone() };
+        let (mut problems, mut findings) = (Vec::new(), Vec::new());
+        for group in groups {
+            let (problem, noticed) = ObjectProblem::new(group, &own)?;
+            problems.push(problem);
+            findings.extend(noticed);
+        }
+        Ok((problems, findings))
+    }
+
     /// The same photos at a resolution at which many starts can be tried.
     ///
     /// # Errors
     /// As [`ObjectProblem::new`].
-    pub fn coarse(views: &[ObjectView], settings: &ObjectSettings) -> Result<Self> {
+    pub fn coarse(views: &[ObjectView], settings: &ObjectSettings) -> Result<Vec<Self>> {
         let coarse = ObjectSettings {
             light_height: settings.light_height.min(COARSE_HEIGHT),
             pixels: settings.pixels.min(COARSE_PIXELS),
             nodes: [24, 12, 8],
             ..settings.clone()
         };
-        ObjectProblem::new(views, &coarse).map(|(problem, _)| problem)
+        ObjectProblem::by_light(views, &coarse).map(|(problems, _)| problems)
     }
 
     /// The same photos with few pixels and a light of few rows, to ask which of its
@@ -78,10 +98,22 @@ impl ObjectProblem {
     /// channel.
     pub fn even_light(&self, matrix: &LightMatrix, width: usize, height: usize) -> LogLight {
         let ones = LogLight::constant(width, height, [0.0; 3]);
-        let picture = matrix.forward(&ones.radiance());
+        let logs = self.median_log_ratios(&matrix.forward(&ones.radiance()));
+        LogLight::constant(width, height, logs)
+    }
+
+    /// Brings a light, under which pictures are like this one, to the level and colour of the photos.
+    pub fn level(&self, light: &mut LogLight, picture: &[[f32; 3]]) {
+        for (channel, ratio) in light.channels.iter_mut().zip(self.median_log_ratios(picture)) {
+            channel.iter_mut().for_each(|log| *log += ratio);
+        }
+    }
+
+    /// Natural logarithm of the photos over a picture, per channel: the median, so that saturated and black pixels do not move
+    /// it.
+    fn median_log_ratios(&self, picture: &[[f32; 3]]) -> [f32; 3] {
         let mut logs = [0.0; 3];
         for channel in 0..3 {
-            // The median of the ratios: saturated and black pixels do not move it.
             let mut ratios: Vec<f64> = picture
                 .iter()
                 .zip(&self.observations.measured)
@@ -92,6 +124,6 @@ impl ObjectProblem {
             ratios.sort_by(f64::total_cmp);
             logs[channel] = ratios.get(ratios.len() / 2).copied().unwrap_or(0.0) as f32;
         }
-        LogLight::constant(width, height, logs)
+        logs
     }
 }

@@ -66,6 +66,8 @@ pub enum ObjectEvent<'a> {
     State {
         /// The light.
         light: &'a LogLight,
+        /// Those of the further photos, where each has its own.
+        further_lights: &'a [LogLight],
         /// The reflectance at its nodes.
         table: &'a NodeTable,
         /// Parameters of the model.

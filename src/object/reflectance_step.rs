@@ -64,10 +64,8 @@ pub struct ReflectanceProblem<'a> {
     pub model: &'a dyn ReflectanceModel,
     /// Where it is tabulated.
     pub grid: &'a NodeGrid,
-    /// The picture on the nodes, under the light that is held.
-    pub matrix: &'a NodeMatrix,
-    /// The loss.
-    pub likelihood: &'a Likelihood,
+    /// For each light that is held the picture on the nodes under it, and the loss; the mean over lights counts.
+    pub parts: &'a [(NodeMatrix, &'a Likelihood)],
     /// The pull.
     pub prior: &'a ParameterPrior,
 }
@@ -76,16 +74,25 @@ impl ReflectanceProblem<'_> {
     /// Objective without derivatives.
     pub fn value(&self, parameters: &[f64]) -> f64 {
         let table = self.grid.tabulate(self.model, parameters);
-        self.likelihood.loss(&self.matrix.forward(&table)) + self.prior.energy(parameters)
+        let losses = self.parts.iter().map(|(matrix, likelihood)| likelihood.loss(&matrix.forward(&table)));
+        losses.sum::<f64>() / self.parts.len() as f64 + self.prior.energy(parameters)
     }
 
     /// Objective with derivatives.
     pub fn slopes(&self, parameters: &[f64]) -> ReflectanceObjective {
         let table = self.grid.tabulate(self.model, parameters);
-        let state = self.likelihood.slopes(&self.matrix.forward(&table));
-        let adjoint = self.matrix.adjoint(&state.by_pixel);
+        let share = 1.0 / self.parts.len() as f64;
+        let (mut data, mut not_finite) = (0.0, table.not_finite);
+        let mut adjoint = vec![[0.0f64; 3]; self.grid.len()];
+        for (matrix, likelihood) in self.parts {
+            let state = likelihood.slopes(&matrix.forward(&table));
+            data += share * state.loss;
+            not_finite += state.not_finite;
+            for (sum, own) in adjoint.iter_mut().zip(matrix.adjoint(&state.by_pixel)) {
+                (0..3).for_each(|c| sum[c] += share * own[c]);
+            }
+        }
         let mut gradient = self.grid.pull_back(self.model, parameters, &adjoint);
-        let mut not_finite = state.not_finite + table.not_finite;
         for (index, slope) in gradient.iter_mut().enumerate() {
             if !slope.is_finite() {
                 *slope = 0.0;
@@ -93,7 +100,7 @@ impl ReflectanceProblem<'_> {
             }
             *slope += 2.0 * self.prior.weight[index] * (parameters[index] - self.prior.centre[index]);
         }
-        ReflectanceObjective { data: state.loss, prior: self.prior.energy(parameters), gradient, not_finite }
+        ReflectanceObjective { data, prior: self.prior.energy(parameters), gradient, not_finite }
     }
 
     /// [`ReflectanceProblem::improve_with`] from no memory.

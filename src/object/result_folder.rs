@@ -5,7 +5,7 @@
 //! | `object.json` | model, parameters (codes, then colours), start, gauge, spread, findings; marks the folder |
 //! | `settings.toml` | the settings |
 //! | `reflectance.binary` | the reflectance as a table of MERL's format |
-//! | `env.exr` | the light |
+//! | `env.exr` `env_N.exr` | the light; of the further photos, where each has its own |
 //! | `environment_seen.exr` | how much each direction matters to the photos, see [`LightSeen`](super::seen::LightSeen) |
 //! | `rerender_N.exr` `relit_N_LIGHT.exr` | the object under the fitted light, and under others |
 //! | `loss.csv` | the objective after every step |
@@ -17,8 +17,9 @@ use super::nodes::NodeGrid;
 use super::observations::ObjectView;
 use super::page::{self, Shown};
 use super::picture::render;
+use super::prior::LogLight;
 use super::progress::write_rows;
-use super::result_read::{MARK, ObjectInputs, SEEN};
+use super::result_read::{MARK, ObjectInputs, SEEN, light_file};
 use super::settings::ObjectSettings;
 use super::split::{Gauge, SplitSpread};
 use super::starts::StartedModel;
@@ -63,7 +64,10 @@ pub fn write(
     let directions = TexelDirections::new(width, height)?;
     let environment = estimate.light.environment();
     remove_pictures(folder)?;
-    environment.write(&folder.join("env.exr"))?;
+    let further: Vec<Environment> = estimate.further_lights.iter().map(LogLight::environment).collect();
+    for (photo, light) in std::iter::once(&environment).chain(&further).enumerate() {
+        light.write(&folder.join(light_file(photo)))?;
+    }
     match &estimate.light_seen {
         Some(seen) => file::write_exr_rgb(&folder.join(SEEN), &seen.sensitivity)?,
         // What an earlier estimation left here is not true of this one; it need not be there.
@@ -98,13 +102,14 @@ pub fn write(
     crate::files::write_bytes(&folder.join(MARK), format!("{json:#}\n").as_bytes())?;
 
     let resampled: Vec<Environment> = relights.iter().map(|(_, light)| light.resampled(width, height)).collect();
-    let lights: Vec<&Environment> = std::iter::once(&environment).chain(&resampled).collect();
     let mut sections = vec![("Found", page::facts(estimate, model.model.name(), &gauge, &spread))];
     let mut galleries = String::new();
     for (index, view) in views.iter().enumerate() {
         let geometry = view.geometry.with_grazing();
         let visibility: Option<Visibility> =
             geometry.visibility(&geometry.pixels, width, height).filter(|_| settings.shadows);
+        let own = index.checked_sub(1).and_then(|index| further.get(index)).unwrap_or(&environment);
+        let lights: Vec<&Environment> = std::iter::once(own).chain(&resampled).collect();
         let pictures = render(&geometry, visibility.as_ref(), &directions, &grid, &estimate.table, &lights);
         let stops = page::stops_of(&view.photo.radiance);
         let mut shown = vec![
@@ -121,7 +126,15 @@ pub fn write(
     }
     sections.push(("Photo and pictures", galleries));
     let stops = page::stops_of(&environment.radiance);
-    let mut lights = vec![Shown { caption: "estimated light".into(), picture: &environment.radiance, stops }];
+    let caption = match further.is_empty() {
+        true => "estimated light".to_owned(),
+        false => format!("light of {}", views.first().map_or("", |view| &view.photo.name)),
+    };
+    let mut lights = vec![Shown { caption, picture: &environment.radiance, stops }];
+    for (view, light) in views.iter().skip(1).zip(&further) {
+        let (caption, picture) = (format!("light of {}", view.photo.name), &light.radiance);
+        lights.push(Shown { caption, picture, stops: page::stops_of(picture) });
+    }
     if let Some(seen) = &estimate.light_seen {
         let caption = "how much each direction matters to the photos".into();
         lights.push(Shown { caption, picture: &seen.sensitivity, stops: page::stops_of(&seen.sensitivity) });
@@ -142,7 +155,7 @@ fn remove_pictures(folder: &Path) -> Result<()> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
     for path in entries.flatten().map(|entry| entry.path()) {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        if name.ends_with(".exr") && (name.starts_with("rerender_") || name.starts_with("relit_")) {
+        if name.ends_with(".exr") && (["rerender_", "relit_", "env_"].iter().any(|start| name.starts_with(start))) {
             std::fs::remove_file(&path).map_err(|source| Error::writing(&path, source))?;
         }
     }

@@ -19,6 +19,11 @@ use std::path::{Path, PathBuf};
 pub const MARK: &str = "object.json";
 /// Name of the file that says what the photos see of the light.
 pub const SEEN: &str = "environment_seen.exr";
+/// Name of the file of the light of a photo, counted from 0; of the first, or of all, it is `env.exr`.
+pub fn light_file(photo: usize) -> String {
+    if photo == 0 { "env.exr".into() } else { format!("env_{photo}.exr") }
+}
+
 /// Darkest radiance of a light that was read, so that it has a logarithm.
 const FLOOR: f32 = 1e-12;
 
@@ -140,6 +145,9 @@ pub fn read(folder: &Path) -> Result<ObjectResult> {
     }
     let table = NodeGrid::new(settings.nodes).tabulate(model.model.as_ref(), &written.parameters);
     let (light, _) = Environment::read(&folder.join("env.exr"))?;
+    let further = (1..).map(|index| folder.join(light_file(index))).take_while(|path| path.is_file());
+    let read = |path: PathBuf| Environment::read(&path).map(|(light, _)| LogLight::of(&light, FLOOR));
+    let further_lights = further.map(read).collect::<Result<Vec<LogLight>>>()?;
     let seen = folder.join(SEEN);
     let light_seen = if seen.is_file() { Some(LightSeen::new(file::read_rgb(&seen)?)) } else { None };
     let finding = |own: WrittenFinding| Finding::new(own.severity, "object-result", own.message).remedy(own.remedy);
@@ -147,6 +155,7 @@ pub fn read(folder: &Path) -> Result<ObjectResult> {
         parameters: written.parameters,
         table,
         light: LogLight::of(&light, FLOOR),
+        further_lights,
         start: written.start,
         candidates: Vec::new(),
         rows: read_rows(&folder.join("loss.csv"))?,

@@ -6,12 +6,14 @@
 
 use super::evidence::{negative_log_evidence, of_known_light};
 use super::light_step::{LightObjective, LightTerms, NewtonBudget, newton};
+use super::likelihood::Likelihood;
 use super::matrices::{LightMatrix, NodeMatrix};
 use super::nodes::NodeTable;
 use super::prior::LogLight;
 use super::prior::gradient::GradientPrior;
 use super::problem::ObjectProblem;
 use super::reflectance_step::ReflectanceProblem;
+use super::run::{level_to, parts_of};
 use super::settings::ObjectSettings;
 use super::starts::{Start, StartedModel};
 use crate::error::{Error, ErrorKind, Result};
@@ -34,8 +36,8 @@ pub struct Candidate {
     pub name: String,
     /// Where it came to.
     pub parameters: Vec<f64>,
-    /// Its light at low resolution; `None` when the light is known.
-    pub light: Option<LogLight>,
+    /// Its lights at low resolution, one a problem; empty when the light is known.
+    pub lights: Vec<LogLight>,
     /// Its reflectance at the coarse nodes.
     pub table: NodeTable,
     /// Loss, prior of the light and prior of the codes.
@@ -44,6 +46,23 @@ pub struct Candidate {
     pub evidence: f64,
     /// Numbers that were not finite.
     pub not_finite: usize,
+}
+
+/// The loss of a picture after the best factor of each channel, which is the median of the ratios.
+fn shape_loss(problem: &ObjectProblem, mut picture: Vec<[f32; 3]>) -> f64 {
+    let measured = &problem.observations.measured;
+    for channel in 0..3 {
+        let mut ratios: Vec<f32> = picture
+            .iter()
+            .zip(measured)
+            .filter(|(own, measured)| own[channel] > 0.0 && measured[channel] > 0.0)
+            .map(|(own, measured)| measured[channel] / own[channel])
+            .collect();
+        ratios.sort_by(f32::total_cmp);
+        let factor = ratios.get(ratios.len() / 2).copied().unwrap_or(1.0);
+        picture.iter_mut().for_each(|pixel| pixel[channel] *= factor);
+    }
+    problem.likelihood.loss(&picture)
 }
 
 impl Candidate {
@@ -58,35 +77,42 @@ impl Candidate {
 /// # Errors
 /// `Stopped`, or a known light of another kind than a full sphere.
 pub fn screen(
-    problem: &ObjectProblem,
+    problems: &[ObjectProblem],
     model: &StartedModel,
     known_light: Option<&Environment>,
+    probes: &[LogLight],
     settings: &ObjectSettings,
     stop: &AtomicBool,
 ) -> Result<Vec<Candidate>> {
-    let directions = problem.transport.directions();
+    let Some(first) = problems.first() else { return Ok(Vec::new()) };
+    let directions = first.transport.directions();
     let (width, height) = (directions.width, directions.height);
     let known = known_light.map(|light| LogLight::of(&light.resampled(width, height), 1e-12));
     let gradient = GradientPrior::new(width, height, GRADIENT_WEIGHT, 0.05);
     let terms = LightTerms { gradient: Some(gradient), ..LightTerms::default() };
-    let known_matrix = known.as_ref().map(|light| NodeMatrix::new(&problem.transport, &light.texels()));
+    let known_matrix = known.as_ref().map(|light| NodeMatrix::new(&first.transport, &light.texels()));
     let try_one = |start: &Start| -> Result<Candidate> {
         check(stop)?;
         let mut candidate = Candidate {
             name: start.name.clone(),
             parameters: start.parameters.clone(),
-            light: None,
-            table: problem.transport.grid().tabulate(model.model.as_ref(), &start.parameters),
+            lights: Vec::new(),
+            table: first.transport.grid().tabulate(model.model.as_ref(), &start.parameters),
             objective: [f64::INFINITY, 0.0, 0.0],
             evidence: f64::INFINITY,
             not_finite: 0,
         };
         match &known_matrix {
-            Some(matrix) => candidate.rank_under(problem, matrix),
+            Some(matrix) => candidate.rank_under(first, matrix),
             None => {
-                let matrix = LightMatrix::new(&problem.transport, &candidate.table);
-                let light = problem.even_light(&matrix, width, height);
-                candidate.light_through(problem, &matrix, &terms, light, TRIED_STEPS);
+                let begun = |(index, problem): (usize, &ObjectProblem)| {
+                    let matrix = LightMatrix::new(&problem.transport, &candidate.table);
+                    let light = probes.get(index).cloned();
+                    let light = light.unwrap_or_else(|| problem.even_light(&matrix, width, height));
+                    (matrix, light)
+                };
+                let begun = problems.iter().enumerate().map(begun).collect();
+                candidate.light_through(problems, begun, (&terms, TRIED_STEPS), probes.len());
             }
         }
         Ok(candidate)
@@ -99,12 +125,12 @@ pub fn screen(
         match &known_matrix {
             Some(matrix) => {
                 check(stop)?;
-                candidate.follow_reflectance(problem, model, matrix, 4 * ROUNDS);
+                candidate.follow_reflectance(model, &[(matrix.clone(), &first.likelihood)], first, 4 * ROUNDS);
             }
             None => {
                 for _ in 0..ROUNDS {
                     check(stop)?;
-                    candidate.follow(problem, model, &terms);
+                    candidate.follow(problems, model, &terms, probes.len());
                 }
             }
         }
@@ -122,69 +148,75 @@ fn check(stop: &AtomicBool) -> Result<()> {
 }
 
 impl Candidate {
-    /// Ranks a start under a known light by its shape alone: each channel first takes its best factor, which is the
-    /// median of the ratios. Colours are left to the steps that follow.
+    /// Ranks a start under a known light by its shape alone. Colours are left to the steps that follow.
     fn rank_under(&mut self, problem: &ObjectProblem, matrix: &NodeMatrix) {
-        let mut picture = matrix.forward(&self.table);
-        let measured = &problem.observations.measured;
-        for channel in 0..3 {
-            let mut ratios: Vec<f32> = picture
-                .iter()
-                .zip(measured)
-                .filter(|(own, measured)| own[channel] > 0.0 && measured[channel] > 0.0)
-                .map(|(own, measured)| measured[channel] / own[channel])
-                .collect();
-            ratios.sort_by(f32::total_cmp);
-            let factor = ratios.get(ratios.len() / 2).copied().unwrap_or(1.0);
-            picture.iter_mut().for_each(|pixel| pixel[channel] *= factor);
-        }
-        self.objective[0] = problem.likelihood.loss(&picture);
+        self.objective[0] = shape_loss(problem, matrix.forward(&self.table));
         let objective = LightObjective { data: self.objective[0], prior: 0.0 };
         self.evidence = of_known_light(objective, problem.likelihood.len());
     }
 
-    fn follow_reflectance(&mut self, problem: &ObjectProblem, model: &StartedModel, matrix: &NodeMatrix, steps: usize) {
-        let grid = problem.transport.grid();
-        let reflectance = ReflectanceProblem {
-            model: model.model.as_ref(),
-            grid,
-            matrix,
-            likelihood: &problem.likelihood,
-            prior: &model.prior,
-        };
+    /// Steps on the reflectance under lights that are held; all problems have the nodes of `first`.
+    fn follow_reflectance(
+        &mut self,
+        model: &StartedModel,
+        parts: &[(NodeMatrix, &Likelihood)],
+        first: &ObjectProblem,
+        steps: usize,
+    ) {
+        let grid = first.transport.grid();
+        let reflectance = ReflectanceProblem { model: model.model.as_ref(), grid, parts, prior: &model.prior };
         let reached = reflectance.improve(&mut self.parameters, steps, 1e-3);
         self.table = grid.tabulate(model.model.as_ref(), &self.parameters);
         (self.objective[0], self.objective[2]) = (reached.data, reached.prior);
         let objective = LightObjective { data: reached.data, prior: 0.0 };
-        self.evidence = of_known_light(objective, problem.likelihood.len());
+        let pixels = parts.iter().map(|(_, likelihood)| likelihood.len()).sum();
+        self.evidence = of_known_light(objective, pixels);
         self.not_finite += reached.not_finite;
     }
 
-    /// One round: reflectance under the light so far, then the light.
-    fn follow(&mut self, problem: &ObjectProblem, model: &StartedModel, terms: &LightTerms) {
-        let Some(mut light) = self.light.take() else { return };
-        // The mean colour is the reflectance's until shown otherwise.
-        light.level_colours();
-        let matrix = NodeMatrix::new(&problem.transport, &light.texels());
-        self.follow_reflectance(problem, model, &matrix, 4);
-        let matrix = LightMatrix::new(&problem.transport, &self.table);
-        self.light_through(problem, &matrix, terms, light, 2);
+    /// One round: reflectance under the lights so far, then the lights.
+    fn follow(&mut self, problems: &[ObjectProblem], model: &StartedModel, terms: &LightTerms, probes: usize) {
+        let mut lights = std::mem::take(&mut self.lights);
+        let [first, ..] = problems else { return };
+        if probes == 0 {
+            // The mean colour is the reflectance's until shown otherwise.
+            LogLight::level_colours(&mut lights);
+        } else {
+            self.follow_reflectance(model, &parts_of(&problems[..probes], &lights), first, 4);
+            level_to(&problems[probes..], &mut lights[probes..], &self.table);
+        }
+        self.follow_reflectance(model, &parts_of(problems, &lights), first, 4);
+        let begun = problems.iter().map(|problem| LightMatrix::new(&problem.transport, &self.table)).zip(lights);
+        self.light_through(problems, begun.collect(), (terms, 2), probes);
     }
 
-    /// The best light from `light` on, and the evidence around it.
+    /// The best light of each problem from those that are begun with, and the evidence around them. The lights of the first
+    /// `probes` are known.
     fn light_through(
         &mut self,
-        problem: &ObjectProblem,
-        matrix: &LightMatrix,
-        terms: &LightTerms,
-        mut light: LogLight,
-        steps: usize,
+        problems: &[ObjectProblem],
+        begun: Vec<(LightMatrix, LogLight)>,
+        (terms, steps): (&LightTerms, usize),
+        probes: usize,
     ) {
         let budget = NewtonBudget { steps, products: 10 };
-        let outcome = newton(matrix, &problem.likelihood, terms, &mut light, budget);
-        (self.objective[0], self.objective[1]) = (outcome.objective.data, outcome.objective.prior);
-        self.not_finite += outcome.not_finite;
-        self.evidence = negative_log_evidence(matrix, &problem.likelihood, &light);
-        self.light = Some(light);
+        (self.objective[0], self.objective[1], self.evidence) = (0.0, 0.0, 0.0);
+        let share = 1.0 / problems.len() as f64;
+        for (index, (problem, (matrix, mut light))) in problems.iter().zip(begun).enumerate() {
+            if index < probes {
+                // Its level and colour are the reflectance's to follow: starts are ranked by their shape.
+                let data = shape_loss(problem, matrix.forward(&light.radiance()));
+                self.objective[0] += share * data;
+                self.evidence += of_known_light(LightObjective { data, prior: 0.0 }, problem.likelihood.len());
+                self.lights.push(light);
+                continue;
+            }
+            let outcome = newton(&matrix, &problem.likelihood, terms, &mut light, budget);
+            self.objective[0] += share * outcome.objective.data;
+            self.objective[1] += share * outcome.objective.prior;
+            self.not_finite += outcome.not_finite;
+            self.evidence += negative_log_evidence(&matrix, &problem.likelihood, &light);
+            self.lights.push(light);
+        }
     }
 }

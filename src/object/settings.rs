@@ -20,6 +20,18 @@ pub enum LightMethod {
     FirstOrder,
 }
 
+/// How many lights the photos are taken under.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "kebab-case")]
+pub enum LightsOf {
+    /// All under the same.
+    #[default]
+    One,
+    /// Each photo under one of its own; they share the reflectance.
+    Each,
+}
+
 /// Settings of an estimation.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, rename_all = "kebab-case")]
@@ -32,6 +44,8 @@ pub struct ObjectSettings {
     pub nodes: [usize; 3],
     /// Whether shadow rays are traced.
     pub shadows: bool,
+    /// Whether photos share a light.
+    pub lights: LightsOf,
     /// Prior of the light.
     pub prior: LightPriorKind,
     /// How the light is improved.
@@ -78,6 +92,7 @@ impl Default for ObjectSettings {
             pixels: 2048,
             nodes: [48, 24, 15],
             shadows: true,
+            lights: LightsOf::One,
             prior: LightPriorKind::Deep,
             method: LightMethod::ClosedForm,
             outer_loops: 8,

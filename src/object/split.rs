@@ -85,7 +85,7 @@ impl SplitSpread {
         let Some(best) = candidates.first() else { return SplitSpread::default() };
         let good = candidates.iter().filter(|candidate| candidate.evidence <= best.evidence + AS_GOOD);
         let starts = good.map(|candidate| candidate.name.clone()).collect();
-        let lights: Vec<&LogLight> = candidates.iter().filter_map(|candidate| candidate.light.as_ref()).collect();
+        let lights: Vec<&LogLight> = candidates.iter().filter_map(|candidate| candidate.lights.first()).collect();
         let light = lights.first().and_then(|first| {
             let weights = shares(first.width, first.height);
             let log = |light: &&LogLight| light.channels.iter().flatten().map(|&log| f64::from(log)).collect();
@@ -153,11 +153,11 @@ mod tests {
         let candidate = |name: &str, factor: f32, bend: f32| Candidate {
             name: name.into(),
             parameters: Vec::new(),
-            light: Some(LogLight {
+            lights: vec![LogLight {
                 width: 32,
                 height: 16,
                 channels: [0; 3].map(|_| (0..512).map(|i| factor.ln() + bend * (i % 2) as f32).collect()),
-            }),
+            }],
             table: NodeTable { values: vec![[0.1 / factor; 3]; 8], not_finite: 0 },
             objective: [0.1, 0.0, 0.0],
             evidence: 7.0,

@@ -120,8 +120,8 @@ impl Studio {
         }
         let dropped: Vec<PathBuf> =
             context.input(|input| input.raw.dropped_files.iter().map(|file| file.path().to_path_buf()).collect());
-        for path in dropped {
-            self.model.dropped(path);
+        if !dropped.is_empty() {
+            self.model.all_dropped(dropped);
         }
         if self.theme_in_force != Some(self.model.preferences.theme) {
             theme::apply(context, self.model.preferences.theme);

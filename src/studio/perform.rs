@@ -28,6 +28,7 @@ pub fn perform(act: Act, model: &mut Model, layout: &mut Layout, context: &Conte
     let ask = |purpose| Dialog::Path { purpose, text: String::new() };
     match act {
         Act::OpenFolder => model.dialog = ask(PickFor::Open),
+        Act::QueueScene => model.dialog = ask(PickFor::Queue),
         Act::Import => model.ask_to_import(None),
         Act::AddLightFolder => model.dialog = ask(PickFor::LightFolder),
         Act::AddLight => model.dialog = ask(PickFor::Light),

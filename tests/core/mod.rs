@@ -40,6 +40,7 @@ mod neural_shaped;
 mod object_cli;
 mod object_flow;
 mod object_joint;
+mod object_lights;
 mod object_path_tracer;
 mod object_scene;
 mod object_study;

@@ -31,7 +31,7 @@ fn the_neural_model_explains_a_plastic_that_it_never_saw() {
     let mut model = StartedModel::neural(trained, 2, settings.code_weight, &[]);
     model.starts.retain(|start| ["red-plastic", "cherry-235", "light-brown-fabric"].contains(&start.name.as_str()));
     assert_eq!(model.starts.len(), 3);
-    let known = Known { light: Some(sky()), reflectance: None };
+    let known = Known { light: Some(sky()), ..Known::default() };
     let estimate = found(&[view], &model, &known, &settings);
 
     // Codes stay in the ball, and what they cost is counted.

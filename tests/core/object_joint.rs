@@ -90,7 +90,7 @@ fn a_known_light_gives_the_reflectance_back() {
     let geometry = ObjectGeometry::sphere(48, 48, 24.0);
     let view = view_of(&geometry, photograph(&geometry, &sky()));
     let model = StartedModel::lobes(LobeKind::Ggx);
-    let known = Known { light: Some(sky()), reflectance: None };
+    let known = Known { light: Some(sky()), ..Known::default() };
     let settings = ObjectSettings { light_height: 32, nodes: [28, 15, 8], ..small() };
     let found = run(&[view], &model, &known, &settings).unwrap();
     // Diffuse colours and width of the lobe; strength and Fresnel trade.
@@ -199,7 +199,7 @@ fn what_cannot_be_estimated_is_refused_in_words() {
     assert!(error.kind() == ErrorKind::InvalidScene && error.message().contains("3 pixels"), "{error}");
 
     let view = view_of(&geometry, picture.clone());
-    let both = Known { light: Some(sky()), reflectance: Some(model.model.start()) };
+    let both = Known { light: Some(sky()), reflectance: Some(model.model.start()), ..Known::default() };
     let error = run(std::slice::from_ref(&view), &model, &both, &small()).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::InvalidSetting);
     let error =

@@ -78,7 +78,10 @@ pub fn known_truth() -> (StartedModel, Known) {
     let (model, parameters) = truth_model();
     let prior = ParameterPrior::none(parameters.len());
     let starts = vec![Start { name: "truth".into(), parameters: parameters.clone() }];
-    (StartedModel { model: Box::new(model), starts, prior }, Known { reflectance: Some(parameters), light: None })
+    (
+        StartedModel { model: Box::new(model), starts, prior },
+        Known { reflectance: Some(parameters), ..Known::default() },
+    )
 }
 
 pub fn light_error(found: &Estimate) -> f64 {

@@ -16,6 +16,7 @@ mod object_again;
 mod panels;
 mod picture;
 mod pictures;
+mod queue;
 mod relight;
 mod saving;
 mod stage;

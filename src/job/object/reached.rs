@@ -21,6 +21,7 @@ pub(super) const LOOK_PIXELS: usize = 6_000;
 pub(super) struct Reached {
     pub round: usize,
     pub light: LogLight,
+    pub further_lights: Vec<LogLight>,
     pub table: NodeTable,
     pub parameters: Vec<f64>,
 }
@@ -45,11 +46,16 @@ pub fn estimate_as_far_as_it_goes(
         match &event {
             ObjectEvent::Stage(_) => {}
             ObjectEvent::Row(row) => rows.lock().unwrap_or_else(PoisonError::into_inner).push(*row),
-            ObjectEvent::State { light, table, parameters } => {
+            ObjectEvent::State { light, further_lights, table, parameters } => {
                 let mut slot = reached.lock().unwrap_or_else(PoisonError::into_inner);
                 let round = slot.as_ref().map_or(1, |own| own.round + 1);
-                let (light, table) = ((*light).clone(), (*table).clone());
-                *slot = Some(Reached { round, light, table, parameters: parameters.to_vec() });
+                *slot = Some(Reached {
+                    round,
+                    light: (*light).clone(),
+                    further_lights: further_lights.to_vec(),
+                    table: (*table).clone(),
+                    parameters: parameters.to_vec(),
+                });
             }
         }
         watch(event);
@@ -86,6 +92,7 @@ fn partial(
         parameters: reached.parameters,
         table: reached.table,
         light: reached.light,
+        further_lights: reached.further_lights,
         start: "not followed to the end".into(),
         candidates: Vec::new(),
         rows,

@@ -55,11 +55,12 @@ impl Worker {
             let watch = |event: ObjectEvent| match event {
                 ObjectEvent::Stage(stage) => self.stage(stage),
                 ObjectEvent::Row(row) => self.teller.send(ObjectNews::Row(row)),
-                ObjectEvent::State { light, table, parameters } => {
+                ObjectEvent::State { light, further_lights, table, parameters } => {
                     let round = 1 + rounds.fetch_add(1, Ordering::Relaxed);
                     paint(Reached {
                         round,
                         light: light.clone(),
+                        further_lights: further_lights.to_vec(),
                         table: table.clone(),
                         parameters: parameters.to_vec(),
                     });

@@ -92,7 +92,7 @@ pub fn run(case: &Case, inputs: &Inputs, photos: &Photographed, stop: &AtomicBoo
             let weights = || Ok(Arc::clone(&inputs.trained));
             let model = StartedModel::without(kind, &weights, 2, &settings, &without)?;
             let light = (figure == Figure::Reflectance).then(|| light.clone());
-            (model, Known { light, reflectance: None })
+            (model, Known { light, ..Known::default() })
         }
         (_, None) => {
             let start = Start { name: "measured".into(), parameters: Vec::new() };
@@ -101,7 +101,7 @@ pub fn run(case: &Case, inputs: &Inputs, photos: &Photographed, stop: &AtomicBoo
                 starts: vec![start],
                 prior: ParameterPrior::none(0),
             };
-            (model, Known { light: None, reflectance: Some(Vec::new()) })
+            (model, Known { reflectance: Some(Vec::new()), ..Known::default() })
         }
     };
     let found = estimate(&views, &model, &known, &settings, stop, &|_| {})?;

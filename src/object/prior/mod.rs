@@ -80,11 +80,14 @@ impl LogLight {
         })
     }
 
-    /// Takes the mean colour out: afterwards all channels have the same mean logarithm.
-    pub fn level_colours(&mut self) {
-        let means = self.mean();
+    /// Takes the mean colour of lights out: afterwards all channels have the same mean logarithm over all of them.
+    pub fn level_colours(lights: &mut [LogLight]) {
+        let mut means = [0.0; 3];
+        for light in lights.iter() {
+            means.iter_mut().zip(light.mean()).for_each(|(sum, mean)| *sum += mean / lights.len() as f64);
+        }
         let middle = means.iter().sum::<f64>() / 3.0;
-        for (channel, mean) in self.channels.iter_mut().zip(means) {
+        for (channel, mean) in lights.iter_mut().flat_map(|light| light.channels.iter_mut().zip(means)) {
             channel.iter_mut().for_each(|log| *log += (middle - mean) as f32);
         }
     }

@@ -17,6 +17,7 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
     }
     match act {
         Act::OpenFolder
+        | Act::QueueScene
         | Act::Import
         | Act::OpenDemo
         | Act::Quit

@@ -98,6 +98,7 @@ pub const LIST: &[ActInfo] = &[
     info(Act::Stop, Group::Fit, "Stop fit", "Stop the fit at once; a checkpoint keeps the progress.", with(CTRL, Key::Period)),
     info(Act::StepOnce, Group::Fit, "Single step", "Run one step of a paused fit.", key(Key::Period)),
     info(Act::Checkpoint, Group::Fit, "Save checkpoint", "Save the state of the fit now.", with(CTRL_SHIFT, Key::S)),
+    info(Act::QueueScene, Group::Fit, "Add to queue…", "Fit a scene after those that are queued before it.", None),
 
     info(Act::FitView, Group::View, "Frame all", "Frame the object that the photos show.", key(Key::F)),
     info(Act::NavigatePatina, Group::View, "Navigate as in Patina", "Drag or middle-drag to orbit, right-drag to pan, wheel to zoom.", None),

@@ -35,6 +35,7 @@ pub enum Act {
     Stop,
     StepOnce,
     Checkpoint,
+    QueueScene,
     FitView,
     NavigatePatina,
     NavigateBlender,

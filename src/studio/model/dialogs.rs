@@ -12,6 +12,8 @@ use std::path::{Path, PathBuf};
 pub enum PickFor {
     /// To open a scene or run folder.
     Open,
+    /// To fit a scene after those before it.
+    Queue,
     /// To put a light on the shelf.
     Light,
     /// A folder whose HDR maps are put on the shelf.
@@ -115,6 +117,7 @@ impl Model {
     pub fn picked(&mut self, purpose: PickFor, path: PathBuf) {
         match purpose {
             PickFor::Open => self.open(path),
+            PickFor::Queue => self.queue_scenes(vec![path]),
             PickFor::OtherRun => self.compare_with(path),
             PickFor::Light => self.add_light(path),
             PickFor::LightFolder => self.add_light_folder(&path),
@@ -196,6 +199,7 @@ impl Model {
             let dialog = rfd::FileDialog::new();
             let path = match purpose {
                 PickFor::Open => dialog.set_title("Open a scene or run folder").pick_folder(),
+                PickFor::Queue => dialog.set_title("Add a scene to the queue").pick_folder(),
                 PickFor::LightFolder => dialog.set_title("Folder of HDRIs").pick_folder(),
                 PickFor::OtherRun => dialog.set_title("Run to compare with").pick_folder(),
                 PickFor::RunsFolder => dialog.set_title("Output folder for new runs").pick_folder(),

@@ -45,6 +45,7 @@ impl Model {
             *known = Some(known.map_or(shown, |before| before.towards(shown)));
         }
         changed |= self.poll_object();
+        changed |= self.poll_queue();
         self.take_back_refused();
         self.remember_run();
         changed

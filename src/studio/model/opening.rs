@@ -87,6 +87,16 @@ impl Model {
         });
     }
 
+    /// Takes in all that was dropped at once: of several folders a queue is made.
+    pub fn all_dropped(&mut self, paths: Vec<PathBuf>) {
+        let are_scenes =
+            self.workspace == Workspace::Scene && paths.len() > 1 && paths.iter().all(|path| path.is_dir());
+        match are_scenes {
+            true => self.queue_scenes(paths),
+            false => paths.into_iter().for_each(|path| self.dropped(path)),
+        }
+    }
+
     /// Takes in what was dropped on the window: a picture is a light, anything else a scene or run. In object mode it is
     /// what [`Model::object_dropped`] takes it for.
     pub fn dropped(&mut self, path: PathBuf) {

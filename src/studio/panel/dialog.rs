@@ -190,6 +190,7 @@ fn path(ui: &mut Ui, model: &mut Model, purpose: PickFor, text: &mut String) -> 
     let (title, hint) = match purpose {
         PickFor::Light => ("Import an HDRI", "/home/me/lights/garden.hdr"),
         PickFor::OtherRun => ("Compare with another run of this scene", "/home/me/runs/place-2"),
+        PickFor::Queue => ("Add a scene to the queue", "/home/me/scenes/place"),
         PickFor::LightFolder => ("Import a folder of HDRIs", "/home/me/lights"),
         PickFor::ObjectPhoto => ("Add a photo of an object", "/home/me/photos/ball.exr"),
         PickFor::ObjectResult => ("Save result as", "/home/me/results/ball"),
@@ -210,13 +211,14 @@ fn path(ui: &mut Ui, model: &mut Model, purpose: PickFor, text: &mut String) -> 
         let typed = !text.trim().is_empty();
         let confirm = match purpose {
             PickFor::ObjectResult => "Save here",
-            PickFor::Light | PickFor::LightFolder | PickFor::ObjectPhoto => "Add this",
+            PickFor::Light | PickFor::LightFolder | PickFor::ObjectPhoto | PickFor::Queue => "Add this",
             _ => "Open this",
         };
         if ui.add_enabled(typed, Button::new(confirm)).clicked() || (enter && typed) {
             match purpose {
                 PickFor::Light => model.add_light(text.trim().into()),
                 PickFor::OtherRun
+                | PickFor::Queue
                 | PickFor::LightFolder
                 | PickFor::ObjectPhoto
                 | PickFor::ObjectResult

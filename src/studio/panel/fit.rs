@@ -1,6 +1,6 @@
 //! The fit: what is open, presets, settings, where the run goes.
 
-use super::{act_button, act_button_named, form, heading, reading};
+use super::{act_button, act_button_named, form, heading, queue, reading};
 use crate::error::Place;
 use crate::fit::{FitSettings, Method, Preset};
 use crate::insight::report::number;
@@ -28,6 +28,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut form::FormMemory, readi
             ui.label(RichText::new(error.to_string()).color(theme::palette(ui.visuals()).error));
         }
         run_folder(ui, model);
+        queue::show(ui, model);
         ui.add_space(6.0);
         reading::show(ui, model, reading);
     });
