@@ -5,6 +5,7 @@ use eframe::egui::OutputCommand;
 use patina::fit::{FitSettings, Method, Preset};
 use patina::studio::model::FitStatus;
 use patina::studio::workspace::Panel;
+use std::sync::Arc;
 
 #[test]
 fn a_fit_is_started_paused_stepped_continued_and_stopped_by_hand() {
@@ -209,4 +210,26 @@ fn another_size_of_the_maps_makes_another_atlas_and_fits() {
     studio.wait("maps", |model| model.project.as_ref().unwrap().maps.is_some());
     studio.show(Panel::Maps);
     studio.control("Map");
+}
+
+#[test]
+fn the_timeline_shows_the_fit_as_it_was_while_it_goes_on() {
+    let mut studio = TestStudio::with_running_fit();
+    studio.show(Panel::Curves);
+    studio.wait("three states", |model| model.timeline.states().len() >= 3);
+    studio.move_slider("Timeline", 0.0);
+    assert_eq!(studio.model().timeline.shown(), Some(0));
+    let first = Arc::clone(&studio.model().timeline.states()[0].maps);
+    let count = studio.model().timeline.states().len();
+    studio.wait("newer states", move |model| model.timeline.states().len() > count);
+    let shown = studio.model().project.as_ref().unwrap().maps.clone().unwrap();
+    assert!(Arc::ptr_eq(&shown, &first), "what is looked at stays");
+    studio.click("Latest");
+    studio.frames(2);
+    let newest = Arc::clone(&studio.model().timeline.states().last().unwrap().maps);
+    let shown = studio.model().project.as_ref().unwrap().maps.clone().unwrap();
+    assert!(studio.model().timeline.shown().is_none() && !Arc::ptr_eq(&shown, &first));
+    assert!(Arc::ptr_eq(&shown, &newest) || studio.model().timeline.states().len() > count + 1);
+    studio.model().close();
+    assert!(studio.model().timeline.states().is_empty());
 }

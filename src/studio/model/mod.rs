@@ -5,7 +5,7 @@
 //! the cache that relights, [`edits`] what undo covers, [`lights`] the shelf, [`tasks`] work beside the window and [`done`]
 //! what it brings, [`log`] what was noticed, with what it [`offers`] and how [`offering`] does it, [`words`] how settings
 //! and flags are said, [`store`] what is remembered. [`opening`] reads a folder, [`opened`] is what was read, `arriving`
-//! makes a project of it and [`starting`] a fit, [`queue`] fits one scene after another, `news` takes in what was brought, [`viewing`] where the eye stands,
+//! makes a project of it and [`starting`] a fit, [`queue`] fits one scene after another, [`timeline`] keeps the fit as it was, `news` takes in what was brought, [`viewing`] where the eye stands,
 //! [`dialogs`] what is asked in windows over the window, [`exporting`] a run on its way to other programs, [`importing`] a
 //! folder on its way to a scene, [`rescaling`] sets the scale by a known patch. In object mode [`object_form`] is what is
 //! asked for, [`object`] the estimation, [`estimating`] how one becomes the other, [`materials`] the library. Panels read
@@ -41,6 +41,7 @@ pub mod saving;
 pub mod starting;
 pub mod store;
 pub mod tasks;
+pub mod timeline;
 pub mod viewing;
 pub mod words;
 
@@ -140,6 +141,8 @@ pub struct Model {
     pub card: bool,
     /// Whether the fit starts by itself once the scene is prepared.
     pub start_is_queued: bool,
+    /// The fit as it was.
+    pub timeline: timeline::Timeline,
     /// Scenes that are fitted one after the other.
     pub queue: queue::SceneQueue,
     /// The cache that is being traced, until a fit waits for it or it is there.
@@ -224,6 +227,7 @@ impl Model {
             exported: None,
             card: false,
             start_is_queued: false,
+            timeline: timeline::Timeline::default(),
             queue: queue::SceneQueue::default(),
             being_cached: None,
             preferences,

@@ -3,6 +3,8 @@
 use super::lights::{LightName, ShelfLight};
 use super::tasks::TaskKind;
 use super::{Done, FitStatus, Model, known};
+use crate::light::Environment;
+use crate::material::MaterialMaps;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -115,22 +117,36 @@ impl Model {
             // Start values are nothing that was found: the photos stay until there is something.
             return false;
         }
-        let newer = project.environment.as_ref().is_none_or(|own| !Arc::ptr_eq(own, &snapshot.environment));
-        if newer {
-            project.maps = Some(Arc::clone(&snapshot.maps));
-            project.environment = Some(Arc::clone(&snapshot.environment));
-            project.view_errors.clone_from(&snapshot.view_rmse);
-            // What was measured on older maps no longer holds.
-            project.photo_error = None;
-            project.disagreement = None;
-            project.known = known::Known::of(snapshot.told.clone());
-            self.shelf.put(ShelfLight::new(LightName::Fitted, Arc::clone(&snapshot.environment)));
-            if self.light_was_chosen_for_us.take().is_some_and(|sky| self.edits.relight.first == sky) {
-                self.edits.relight.first = LightName::Fitted;
-                self.history.restart(&self.edits);
-            }
+        let is_shown = project.environment.as_ref().is_some_and(|own| Arc::ptr_eq(own, &snapshot.environment));
+        if is_shown || self.timeline.has_newest(&snapshot.environment) {
+            return false;
         }
-        newer
+        self.timeline.keep(snapshot);
+        if self.timeline.shown().is_none() {
+            self.show_newest();
+        }
+        true
+    }
+
+    /// The panels show the newest snapshot.
+    pub(super) fn show_newest(&mut self) {
+        let (Some(project), Some(snapshot)) = (&mut self.project, &self.fit.snapshot) else { return };
+        project.view_errors.clone_from(&snapshot.view_rmse);
+        project.known = known::Known::of(snapshot.told.clone());
+        self.show_maps(Arc::clone(&snapshot.maps), Arc::clone(&snapshot.environment));
+    }
+
+    /// The panels show these maps under this light.
+    pub(super) fn show_maps(&mut self, maps: Arc<MaterialMaps>, environment: Arc<Environment>) {
+        let Some(project) = &mut self.project else { return };
+        (project.maps, project.environment) = (Some(maps), Some(Arc::clone(&environment)));
+        // What was measured on other maps no longer holds.
+        (project.photo_error, project.disagreement) = (None, None);
+        self.shelf.put(ShelfLight::new(LightName::Fitted, environment));
+        if self.light_was_chosen_for_us.take().is_some_and(|sky| self.edits.relight.first == sky) {
+            self.edits.relight.first = LightName::Fitted;
+            self.history.restart(&self.edits);
+        }
     }
 
     /// Keeps the run in progress in the remembered settings, so that a start after a crash finds it.

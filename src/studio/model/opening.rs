@@ -117,6 +117,7 @@ impl Model {
         (self.card, self.exported, self.other_run) = (false, None, None);
         self.log.scene_was_closed();
         self.fit.forget();
+        self.timeline = super::timeline::Timeline::default();
         self.project = None;
         self.cursor = None;
         self.shelf.forget_scene();

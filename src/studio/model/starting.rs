@@ -168,6 +168,7 @@ impl Model {
         if !goes_on {
             // Only now: a start that fails leaves the curve and the scores of the run before.
             self.fit.losses.clear();
+            self.timeline = super::timeline::Timeline::default();
         }
         self.preferences.remember(folder.path(), true);
         // A failure of the fit before is past.

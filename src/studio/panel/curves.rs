@@ -5,9 +5,10 @@ mod series;
 
 use super::empty;
 use crate::fit::LossRow;
+use crate::insight::report::number;
 use crate::studio::model::Model;
 use crate::studio::theme;
-use egui::{Align2, Color32, ComboBox, RichText, Sense, Stroke, Ui, vec2};
+use egui::{Align2, Button, Color32, ComboBox, RichText, Sense, Slider, Stroke, Ui, vec2};
 use egui_plot::{GridMark, HoverPosition, Line, Plot, PlotPoint, PlotPoints, Points, Polygon, Text};
 use series::{Series, identity, series};
 
@@ -97,7 +98,32 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut CurvesMemory) {
         memory.lines = series(rows, memory.over_seconds, memory.logarithmic, memory.stage.as_deref());
         memory.made = Some(key);
     }
+    timeline(ui, model);
     plot(ui, memory);
+}
+
+/// A slider over the kept states: viewport and maps show the fit as it was.
+fn timeline(ui: &mut Ui, model: &mut Model) {
+    let count = model.timeline.states().len();
+    if count < 2 {
+        return;
+    }
+    let mut at = model.timeline.shown().unwrap_or(count - 1);
+    ui.horizontal(|ui| {
+        let label = ui.label("Timeline").on_hover_text("Viewport and maps show the fit as it was; the fit goes on");
+        let slider = ui.add(Slider::new(&mut at, 0..=count - 1).show_value(false)).labelled_by(label.id);
+        if slider.changed() {
+            model.look_back(Some(at));
+        }
+        let is_past = model.timeline.shown().is_some();
+        if ui.add_enabled(is_past, Button::new("Latest")).on_hover_text("Show the newest maps again").clicked() {
+            model.look_back(None);
+        }
+        let own = &model.timeline.states()[model.timeline.shown().unwrap_or(count - 1)];
+        let words = format!("{} s, {}", number::fixed(own.seconds, 1), stage_words(&own.stage).to_lowercase());
+        let words = RichText::new(words);
+        ui.label(if is_past { words.strong() } else { words.weak() });
+    });
 }
 
 /// The newest held-out error; the training error where no photo is held out.
