@@ -39,10 +39,9 @@ impl Advance {
     /// Seconds until the report is written; `None` while nothing is known.
     pub fn seconds_left(&self) -> Option<f64> {
         let (_, left, _, then) = self.steps?;
-        let finishing = self.finishing_seconds;
         let seconds = match &self.finishing {
-            Some((_, began)) => finishing - began.elapsed().as_secs_f64(),
-            None => left - then.elapsed().as_secs_f64() + finishing,
+            Some((_, began)) => self.finishing_seconds - began.elapsed().as_secs_f64(),
+            None => left - then.elapsed().as_secs_f64() + self.finishing_seconds,
         };
         seconds.is_finite().then_some(seconds.max(0.0))
     }

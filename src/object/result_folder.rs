@@ -155,7 +155,7 @@ fn remove_pictures(folder: &Path) -> Result<()> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
     for path in entries.flatten().map(|entry| entry.path()) {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        if name.ends_with(".exr") && (["rerender_", "relit_", "env_"].iter().any(|start| name.starts_with(start))) {
+        if name.ends_with(".exr") && ["rerender_", "relit_", "env_"].iter().any(|start| name.starts_with(start)) {
             std::fs::remove_file(&path).map_err(|source| Error::writing(&path, source))?;
         }
     }

@@ -61,9 +61,12 @@ impl Run<'_> {
         lights: &mut [LogLight],
         probes: usize,
     ) -> Result<()> {
+        let matrix = |problem: &ObjectProblem| LightMatrix::new(&problem.transport, table);
+        let matrices: Vec<LightMatrix> = self.problems.iter().map(matrix).collect();
         let mut not_finite = 0;
         for index in probes..lights.len() {
-            not_finite += self.step_light((round, grey), index, table, &mut holders[index], &mut lights[index])?;
+            let seen = (&matrices[index], &self.problems[index].likelihood);
+            not_finite += self.step_light((round, grey), seen, &mut holders[index], &mut lights[index])?;
         }
         if grey && self.settings.method == LightMethod::ClosedForm {
             LogLight::level_colours(lights);
@@ -71,9 +74,8 @@ impl Run<'_> {
         // What is told is a function of light, net and reflectance as they are now. The steps above each lower another
         // one: the net moves under them, and so does what is carried along.
         for (index, (own, holder)) in self.of_lights.iter_mut().zip(holders.iter()).enumerate() {
-            let problem = &self.problems[index];
-            let matrix = LightMatrix::new(&problem.transport, table);
-            let reached = objective(&matrix, &problem.likelihood, &holder.terms, &lights[index]);
+            let likelihood = &self.problems[index].likelihood;
+            let reached = objective(&matrices[index], likelihood, &holder.terms, &lights[index]);
             let deep = holder.deep.as_ref().map_or(0.0, |deep| deep.energy(&lights[index]));
             *own = [reached.data, reached.prior + deep];
         }
@@ -90,15 +92,11 @@ impl Run<'_> {
     fn step_light(
         &self,
         (round, grey): (usize, bool),
-        index: usize,
-        table: &NodeTable,
+        (matrix, likelihood): (&LightMatrix, &Likelihood),
         holder: &mut LightHolder,
         light: &mut LogLight,
     ) -> Result<usize> {
         self.check_stop()?;
-        let problem = &self.problems[index];
-        let matrix = LightMatrix::new(&problem.transport, table);
-        let likelihood = &problem.likelihood;
         // As released the light itself is grey; our own way takes only its mean colour out.
         holder.terms.grey = grey && self.settings.method == LightMethod::FirstOrder;
         // The first round starts from little: it gets more steps.
@@ -108,7 +106,7 @@ impl Run<'_> {
         // In the grey rounds another thing is asked of the light than what is told; and first-order steps are as released.
         let may_rise = grey || self.settings.method == LightMethod::FirstOrder;
         let total = |light: &LogLight, holder: &LightHolder| {
-            let reached = objective(&matrix, likelihood, &holder.terms, light);
+            let reached = objective(matrix, likelihood, &holder.terms, light);
             reached.total() + holder.deep.as_ref().map_or(0.0, |deep| deep.energy(light))
         };
         let before = (!may_rise).then(|| (total(light, holder), light.clone(), holder.deep.clone()));
@@ -116,7 +114,7 @@ impl Run<'_> {
             (Some(deep), LightMethod::FirstOrder) => {
                 let (mut best, mut since) = (f64::INFINITY, 0);
                 for _ in 0..self.settings.light_steps {
-                    outcome = first_order(&matrix, likelihood, &mut deep.prior, grey, deep.rate, light);
+                    outcome = first_order(matrix, likelihood, &mut deep.prior, grey, deep.rate, light);
                     let total = outcome.objective.total();
                     since = if total < best { 0 } else { since + 1 };
                     best = best.min(total);
@@ -131,7 +129,7 @@ impl Run<'_> {
             }
             (Some(deep), LightMethod::ClosedForm) => {
                 for _ in 0..steps {
-                    outcome = deep.round(&matrix, likelihood, &holder.terms, light, budget);
+                    outcome = deep.round(matrix, likelihood, &holder.terms, light, budget);
                     if self.stop.load(Ordering::Relaxed) {
                         break;
                     }
@@ -139,7 +137,7 @@ impl Run<'_> {
             }
             (None, _) => {
                 let budget = NewtonBudget { steps: 2 * steps, ..budget };
-                outcome = newton(&matrix, likelihood, &holder.terms, light, budget);
+                outcome = newton(matrix, likelihood, &holder.terms, light, budget);
             }
         }
         self.check_stop()?;

@@ -90,7 +90,7 @@ pub fn screen(
     let known = known_light.map(|light| LogLight::of(&light.resampled(width, height), 1e-12));
     let gradient = GradientPrior::new(width, height, GRADIENT_WEIGHT, 0.05);
     let terms = LightTerms { gradient: Some(gradient), ..LightTerms::default() };
-    let known_matrix = known.as_ref().map(|light| NodeMatrix::new(&first.transport, &light.texels()));
+    let known_parts = known.as_ref().map(|light| parts_of(std::slice::from_ref(first), std::slice::from_ref(light)));
     let try_one = |start: &Start| -> Result<Candidate> {
         check(stop)?;
         let mut candidate = Candidate {
@@ -102,8 +102,8 @@ pub fn screen(
             evidence: f64::INFINITY,
             not_finite: 0,
         };
-        match &known_matrix {
-            Some(matrix) => candidate.rank_under(first, matrix),
+        match &known_parts {
+            Some(parts) => candidate.rank_under(first, &parts[0].0),
             None => {
                 let begun = |(index, problem): (usize, &ObjectProblem)| {
                     let matrix = LightMatrix::new(&problem.transport, &candidate.table);
@@ -122,10 +122,10 @@ pub fn screen(
     tried.sort_by(|a, b| a.evidence.total_cmp(&b.evidence));
     tried.truncate(settings.followed.max(1));
     for candidate in &mut tried {
-        match &known_matrix {
-            Some(matrix) => {
+        match &known_parts {
+            Some(parts) => {
                 check(stop)?;
-                candidate.follow_reflectance(model, &[(matrix.clone(), &first.likelihood)], first, 4 * ROUNDS);
+                candidate.follow_reflectance(model, parts, first, 4 * ROUNDS);
             }
             None => {
                 for _ in 0..ROUNDS {

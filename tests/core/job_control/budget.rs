@@ -111,6 +111,7 @@ fn assert_whole(settings: &FitSettings, steps: usize, left_out: &str) {
 fn a_fit_that_its_budget_ends_is_a_whole_run_and_goes_on_bit_for_bit() {
     let solver = of_solver();
     assert_whole(&solver, 0, "0 of 4 steps; left out: wide light 1/2, narrow light 1/2, maps 1/2, refine; no maps");
+    assert_whole(&solver, 1, "1 of 4 steps; left out: narrow light 1/2, maps 1/2, refine; no maps were made");
     assert_whole(&solver, 3, "left out: refine");
     let ggx = FitSettings { lobe: LobeModel::Ggx, ..solver };
     assert_whole(&ggx, 3, "left out: refine");
