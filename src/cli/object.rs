@@ -2,14 +2,13 @@
 
 use super::interrupt::stop_on_interrupt;
 use crate::error::{Error, Result};
-use crate::files::unrepeated;
+use crate::files::{stem_of, unrepeated};
 use crate::job::object::estimate_as_far_as_it_goes;
 use crate::light::Environment;
-use crate::object::joint::Known;
+use crate::object::inputs::ObjectInputs;
 use crate::object::prior::LightPriorKind;
 use crate::object::progress::ObjectEvent;
 use crate::object::read::{ObjectFiles, read_views};
-use crate::object::result_read::ObjectInputs;
 use crate::object::settings::{LightMethod, LightsOf, ObjectSettings};
 use crate::object::starts::{ModelKind, StartedModel};
 use crate::object::{result_folder, split};
@@ -137,25 +136,24 @@ pub fn object(options: &ObjectOptions, json: bool) -> Result<()> {
         up: options.up.unwrap_or_default(),
         pixel_centre: options.pixel_centre.unwrap_or_default(),
     };
-    let (views, mut findings) = read_views(&files)?;
-    let mut known = Known::default();
-    if let Some(path) = &options.env {
-        let (light, mut noticed) = Environment::read(path)?;
-        findings.append(&mut noticed);
-        known.light = Some(light);
-    }
-    for path in &options.probe {
-        let (light, mut noticed) = Environment::read(path)?;
-        findings.append(&mut noticed);
-        known.probes.push(light);
-    }
-    let (mut names, mut lights) = (Vec::new(), Vec::new());
+    let inputs = ObjectInputs {
+        files,
+        light: options.env.clone(),
+        probes: options.probe.clone(),
+        model: options.model,
+        lobes: usize::from(options.lobes),
+        weights: options.weights.clone(),
+    };
+    let (views, mut findings) = read_views(&inputs.files)?;
+    let (known, noticed) = inputs.known()?;
+    findings.extend(noticed);
+    let mut lights = Vec::new();
     for path in &options.relight {
-        let (light, mut noticed) = Environment::read(path)?;
-        findings.append(&mut noticed);
-        names.push(path.file_stem().unwrap_or_default().to_string_lossy().into_owned());
+        let (light, noticed) = Environment::read(path)?;
+        findings.extend(noticed);
         lights.push(light);
     }
+    let names: Vec<String> = options.relight.iter().map(|path| stem_of(path)).collect();
     let relights: Vec<(String, Environment)> = unrepeated(&names).into_iter().zip(lights).collect();
     let model = StartedModel::of(options.model, options.weights.as_deref(), usize::from(options.lobes), &settings)?;
     let watch = |event: ObjectEvent| match (event, json) {
@@ -176,13 +174,6 @@ pub fn object(options: &ObjectOptions, json: bool) -> Result<()> {
     };
     let (mut found, ended_early) = estimate_as_far_as_it_goes(&views, &model, &known, &settings, &stop, &watch)?;
     found.findings.splice(0..0, findings);
-    let inputs = ObjectInputs {
-        files,
-        light: options.env.clone(),
-        model: options.model,
-        lobes: usize::from(options.lobes),
-        weights: options.weights.clone(),
-    };
     result_folder::write(&options.output, &views, &model, &found, &settings, &inputs, &relights)?;
     if let Some(error) = ended_early {
         // What was reached is written; that it is not the end is no success.

@@ -12,8 +12,8 @@
 //! folder whole while it runs, [`budget`] limits how long that is,
 //! [`outcome`] renders, scores and writes the run folder, [`demo`] makes the built-in scene,
 //! [`capture_folder`] finds the parts of a scene in a folder and names them. [`preview`] draws for a window
-//! beside a fit, [`relit`] does so from cached transport, at once. After a fit, [`gallery`] makes what a user shows, [`gauge`] moves its scale, [`entanglement`] tells how
-//! much light is baked into the maps, [`regions`] reads measured materials for parts of a surface,
+//! beside a fit, [`relit`] does so from cached transport, at once. After a fit, [`gallery`] makes what a user shows,
+//! [`fit_film`] a film of the fit, [`gauge`] moves its scale, [`entanglement`] tells how much light is baked into the maps, [`regions`] reads measured materials for parts of a surface,
 //! [`relight`](mod@relight) makes one picture, [`export`] writes a run for other programs.
 //!
 //! [`ask`] tells beforehand what a fit will need, [`benchmark`] scores a run by the rules of published benchmarks.
@@ -35,6 +35,7 @@ mod explained;
 pub mod export;
 mod facts;
 pub mod film;
+pub mod fit_film;
 pub mod gallery;
 pub mod gauge;
 pub mod handle;

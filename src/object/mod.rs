@@ -15,7 +15,7 @@
 //! | [`split`], [`seen`], [`bands`] | what the photo leaves open; which directions and which details of the light it sees |
 //! | [`picture`] | re-renders and relit pictures |
 //! | [`settings`], [`progress`] | what is asked, what is told |
-//! | [`read`](mod@read), [`result_folder`], [`result_read`], [`page`] | files that are read, what is left on disk, that read again |
+//! | [`inputs`], [`read`](mod@read), [`result_folder`], [`result_read`], [`page`] | files that are read, what is left on disk, that read again |
 //!
 //! Any [`ReflectanceModel`](crate::measured::model::ReflectanceModel) can be estimated: it is asked for its values at
 //! nodes and nothing else. What this folder refuses to do: light that bounces between parts of the object, spatially
@@ -26,6 +26,7 @@ pub mod bands;
 pub mod directions;
 pub mod evidence;
 pub mod geometry;
+pub mod inputs;
 pub mod joint;
 mod light_holder;
 pub mod light_step;

@@ -12,6 +12,7 @@
 //! | `report.html` | all of it to look at |
 
 use super::geometry::Visibility;
+use super::inputs::ObjectInputs;
 use super::joint::Estimate;
 use super::nodes::NodeGrid;
 use super::observations::ObjectView;
@@ -19,7 +20,7 @@ use super::page::{self, Shown};
 use super::picture::render;
 use super::prior::LogLight;
 use super::progress::write_rows;
-use super::result_read::{MARK, ObjectInputs, SEEN, light_file};
+use super::result_read::{MARK, SEEN, light_file};
 use super::settings::ObjectSettings;
 use super::split::{Gauge, SplitSpread};
 use super::starts::StartedModel;

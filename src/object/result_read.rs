@@ -1,15 +1,15 @@
 //! A result folder read again: what was estimated, from what, and how it went.
 
 use super::bands::LightBands;
+use super::inputs::ObjectInputs;
 use super::joint::Estimate;
 use super::nodes::NodeGrid;
 use super::prior::LogLight;
 use super::progress::read_rows;
-use super::read::ObjectFiles;
 use super::seen::LightSeen;
 use super::settings::ObjectSettings;
 use super::split::SplitSpread;
-use super::starts::{ModelKind, StartedModel};
+use super::starts::StartedModel;
 use crate::error::{Error, ErrorKind, Finding, Place, Result, Severity};
 use crate::image::file;
 use crate::light::Environment;
@@ -19,46 +19,12 @@ use std::path::{Path, PathBuf};
 pub const MARK: &str = "object.json";
 /// Name of the file that says what the photos see of the light.
 pub const SEEN: &str = "environment_seen.exr";
-/// Name of the file of the light of a photo, counted from 0; of the first, or of all, it is `env.exr`.
-pub fn light_file(photo: usize) -> String {
-    if photo == 0 { "env.exr".into() } else { format!("env_{photo}.exr") }
-}
-
 /// Darkest radiance of a light that was read, so that it has a logarithm.
 const FLOOR: f32 = 1e-12;
 
-/// What a result was estimated from.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(default, rename_all = "kebab-case")]
-pub struct ObjectInputs {
-    /// Photos, masks, shape and cameras.
-    pub files: ObjectFiles,
-    /// The light, where it was known.
-    pub light: Option<PathBuf>,
-    /// Model of the reflectance.
-    pub model: ModelKind,
-    /// Lobes of the neural model.
-    pub lobes: usize,
-    /// Weights of the neural model; `None` for those that come with the program.
-    pub weights: Option<PathBuf>,
-}
-
-impl ObjectInputs {
-    /// The same with paths that hold from any working folder.
-    pub fn absolute(&self) -> Self {
-        let whole = |path: &PathBuf| std::path::absolute(path).unwrap_or_else(|_| path.clone());
-        let all = |paths: &[PathBuf]| paths.iter().map(whole).collect();
-        let files = ObjectFiles {
-            photos: all(&self.files.photos),
-            masks: all(&self.files.masks),
-            mesh: self.files.mesh.as_ref().map(whole),
-            normals: all(&self.files.normals),
-            cameras: all(&self.files.cameras),
-            ..self.files.clone()
-        };
-        let (light, weights) = (self.light.as_ref().map(whole), self.weights.as_ref().map(whole));
-        ObjectInputs { files, light, weights, ..self.clone() }
-    }
+/// Name of the file of the light of a photo, counted from 0; of the first, or of all, it is `env.exr`.
+pub fn light_file(photo: usize) -> String {
+    if photo == 0 { "env.exr".into() } else { format!("env_{photo}.exr") }
 }
 
 /// A start as the folder remembers it.

@@ -37,6 +37,7 @@ pub fn perform(act: Act, model: &mut Model, layout: &mut Layout, context: &Conte
         Act::Export => model.ask_to_export(),
         Act::SavePicture => model.ask_to_save(SaveWhat::Picture),
         Act::SaveTurntable => model.ask_to_save(SaveWhat::Turntable),
+        Act::SaveFitFilm => model.ask_to_save(SaveWhat::FitFilm),
         Act::SaveLightStrip => model.ask_to_save(SaveWhat::Strip),
         Act::OpenReport => {
             if let Some(folder) = &model.fit.folder {
@@ -82,6 +83,7 @@ pub fn perform(act: Act, model: &mut Model, layout: &mut Layout, context: &Conte
         Act::LayerDisagreement => show_computed(model, Layer::Disagreement),
         Act::LayerTimesSeen => show_computed(model, Layer::TimesSeen),
         Act::LayerPhotos => model.edits.layer = Layer::Photos,
+        Act::LayerCrossfade => model.edits.layer = Layer::Crossfade,
         Act::LayerLit => model.edits.layer = Layer::Lit,
         Act::LayerDiffuse => model.edits.layer = Layer::Diffuse,
         Act::LayerSpecular => model.edits.layer = Layer::Specular,
@@ -131,7 +133,7 @@ pub fn perform(act: Act, model: &mut Model, layout: &mut Layout, context: &Conte
                 Some(_) => None,
                 None => model.shelf.step(&relight.first, 1),
             };
-            model.edits.layer = Layer::Lit;
+            model.show_light();
         }
         Act::TurnLightLeft => turn_environment(model, TURN_DEGREES),
         Act::TurnLightRight => turn_environment(model, -TURN_DEGREES),
@@ -279,8 +281,7 @@ fn expose(model: &mut Model, stops: f32) {
 
 fn step_environment(model: &mut Model, places: isize) {
     if let Some(name) = model.shelf.step(&model.edits.relight.first, places) {
-        model.edits.relight.first = name;
-        model.edits.layer = Layer::Lit;
+        model.choose_light(name);
     }
 }
 

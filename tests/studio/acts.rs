@@ -157,11 +157,12 @@ fn every_act_does_something(way: Way) {
 }
 
 /// Acts that are grey while no fit is in progress.
-const NEED_A_FIT: [Act; 11] = [
+const NEED_A_FIT: [Act; 12] = [
     Act::PauseOrGoOn,
     Act::Stop,
     Act::StepOnce,
     Act::Checkpoint,
+    Act::SaveFitFilm,
     // And those that need a photo of an object, a result, or the library.
     Act::ObjectStart,
     Act::ObjectStop,
@@ -202,6 +203,10 @@ fn acts_on_a_fit_in_progress_do_something_from_menu_and_palette() {
         let written = studio.model().fit.last_checkpoint;
         ask_for(&mut studio, Act::Checkpoint.info(), way);
         studio.wait("the checkpoint", move |model| model.fit.last_checkpoint != written);
+        studio.wait("two states", |model| model.timeline.states().len() >= 2);
+        ask_for(&mut studio, Act::SaveFitFilm.info(), way);
+        assert!(matches!(studio.model().dialog, Dialog::Save(_)));
+        studio.model().dialog = Dialog::None;
         ask_for(&mut studio, Act::PauseOrGoOn.info(), way);
         studio.wait("going on", |model| model.fit.status == FitStatus::Running);
         ask_for(&mut studio, Act::Stop.info(), way);

@@ -230,6 +230,18 @@ fn the_timeline_shows_the_fit_as_it_was_while_it_goes_on() {
     let shown = studio.model().project.as_ref().unwrap().maps.clone().unwrap();
     assert!(studio.model().timeline.shown().is_none() && !Arc::ptr_eq(&shown, &first));
     assert!(Arc::ptr_eq(&shown, &newest) || studio.model().timeline.states().len() > count + 1);
+    let folder = tempfile::tempdir().unwrap();
+    studio.click("Film…");
+    studio.harness.check_accessibility();
+    studio.replace_text("Image folder", &folder.path().display().to_string());
+    for (field, number) in [("Width", "32"), ("Height", "24"), ("Images", "4")] {
+        studio.type_number(field, number);
+    }
+    studio.click("Save");
+    studio.wait_for_word("Saved 5 images");
+    let files: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let is_film = |path: &&std::path::PathBuf| path.file_stem().is_some_and(|stem| stem == "fit");
+    assert_eq!((files.len(), files.iter().filter(is_film).count()), (5, 1), "{files:?}");
     studio.model().close();
     assert!(studio.model().timeline.states().is_empty());
 }

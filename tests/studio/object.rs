@@ -8,6 +8,7 @@ use patina::light::sky::{SkySettings, sun_and_sky};
 use patina::measured::coordinates::HalfDifference;
 use patina::object::ObjectGeometry;
 use patina::object::picture::render_exact;
+use patina::object::settings::LightsOf;
 use patina::object::starts::ModelKind;
 use patina::object::transport::TexelDirections;
 use patina::studio::act::Act;
@@ -110,6 +111,45 @@ fn a_photo_of_a_sphere_becomes_light_and_reflectance_on_the_screen_and_on_disk()
         studio.click(button);
         studio.control(label);
     }
+}
+
+#[test]
+fn photos_under_environments_of_their_own_are_asked_for_where_there_are_several() {
+    let mut studio = with_photo();
+    assert!(!studio.says("An environment for each photo"), "one photo has one environment");
+    let path = studio.folder.path().join("other.exr");
+    write_sphere_photo(&path, 40);
+    type_path(&mut studio, "Photo", &path);
+    assert_eq!(studio.model().edits.object.settings().lights, LightsOf::One);
+    studio.click("An environment for each photo");
+    assert_eq!(studio.model().edits.object.settings().lights, LightsOf::Each);
+    studio.replace_text("Known environment path", "probe.exr");
+    assert!(studio.says("Known for the first photo: it fixes the absolute scale"));
+}
+
+#[test]
+#[ignore = "slow: an estimation of its own"]
+fn each_photo_shows_its_own_environment_and_the_result_asks_for_the_same_again() {
+    let mut studio = with_photo();
+    let path = studio.folder.path().join("other.exr");
+    write_sphere_photo(&path, 40);
+    type_path(&mut studio, "Photo", &path);
+    studio.click("An environment for each photo");
+    studio.click("Start estimation");
+    studio.wait("the end", |model| model.object.status == ObjectStatus::Finished);
+    assert_eq!(studio.model().object.outcome.as_ref().unwrap().lights.len(), 2);
+    studio.act(Act::PanelObjectLight);
+    assert!(studio.says("Environment of ball.exr, one of 2") && studio.says("Sensitivity"));
+    let first = studio.model().object.light().unwrap();
+    studio.model().object.chosen_photo = 1;
+    studio.frames(2);
+    assert!(studio.says("Environment of other.exr, one of 2") && !studio.says("Sensitivity"));
+    assert!(!Arc::ptr_eq(&first, &studio.model().object.light().unwrap()));
+    let folder = result_folder(&mut studio);
+    studio.model().edits.object.lights = LightsOf::One;
+    studio.model().open_object(folder);
+    studio.wait("the result", |model| model.edits.object.lights == LightsOf::Each);
+    assert_eq!(studio.model().object.outcome.as_ref().unwrap().lights.len(), 2);
 }
 
 #[test]

@@ -53,7 +53,7 @@ fn a_finished_result_is_opened_again_from_its_folder() {
         outcome.starts.iter().map(|start| start.name.clone()).collect::<Vec<_>>()
     };
     assert_eq!(names(&after), names(&before));
-    for (own, other) in after.light.radiance.pixels().iter().zip(before.light.radiance.pixels()) {
+    for (own, other) in after.lights[0].radiance.pixels().iter().zip(before.lights[0].radiance.pixels()) {
         assert!((*own - *other).abs().max_element() <= 1e-4 * other.max_element(), "{own} {other}");
     }
     let form = again.model().edits.object.clone();

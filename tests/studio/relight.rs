@@ -45,6 +45,22 @@ fn sky(name: &str) -> LightName {
 }
 
 #[test]
+fn a_slider_fades_from_the_photos_to_the_relit_surface() {
+    let mut studio = TestStudio::with_finished_run();
+    studio.click("Crossfade");
+    assert_eq!(studio.model().shown_layer(), Layer::Crossfade);
+    for (place, shows_light) in [(0.0, false), (1.0, false), (2.0, true)] {
+        studio.move_slider("Photo – albedo – relit", place);
+        assert_eq!((studio.model().edits.crossfade, studio.model().shows_light()), (place as f32, shows_light));
+    }
+    studio.click_role(Role::RadioButton, "Noon sky");
+    assert_eq!(studio.model().edits.layer, Layer::Crossfade, "the light is seen already");
+    studio.move_slider("Photo – albedo – relit", 0.5);
+    studio.click_role(Role::RadioButton, "Evening sky");
+    assert_eq!(studio.model().edits.layer, Layer::Lit, "a light that is chosen is seen");
+}
+
+#[test]
 fn lights_are_swapped_by_click_and_by_arrow_and_the_fitted_one_comes_back() {
     let mut studio = TestStudio::with_finished_run();
     assert_eq!(studio.model().edits.relight.first, LightName::Fitted);

@@ -26,13 +26,12 @@ use super::{Slot, Wake};
 use crate::error::{Error, ErrorKind, Finding, Result, text_of_panic};
 use crate::image::{GreyImage, Image, RgbImage};
 use crate::light::Environment;
+use crate::object::inputs::ObjectInputs;
 use crate::object::nodes::NodeGrid;
 use crate::object::progress::ObjectiveRow;
-use crate::object::read::ObjectFiles;
-use crate::object::result_read::{FollowedStart, ObjectInputs};
+use crate::object::result_read::FollowedStart;
 use crate::object::settings::ObjectSettings;
 use crate::object::split::{Gauge, SplitSpread};
-use crate::object::starts::ModelKind;
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -42,33 +41,14 @@ use std::thread::JoinHandle;
 /// What is to be estimated, from what.
 #[derive(Clone, Debug)]
 pub struct ObjectRequest {
-    /// Photos, masks, shape and cameras.
-    pub files: ObjectFiles,
-    /// The light, where it is known.
-    pub light: Option<PathBuf>,
-    /// Model of the reflectance.
-    pub model: ModelKind,
-    /// Lobes of the neural model.
-    pub lobes: usize,
+    /// Photos, shape, known lights, and the model.
+    pub inputs: ObjectInputs,
     /// Settings.
     pub settings: ObjectSettings,
     /// Lights to show the object under, with their names.
     pub relights: Vec<(String, Arc<Environment>)>,
     /// The result folder: new, empty, or one of an earlier estimation.
     pub output: PathBuf,
-}
-
-impl ObjectRequest {
-    /// What a result remembers of the request, so that it can be opened again.
-    fn inputs(&self) -> ObjectInputs {
-        ObjectInputs {
-            files: self.files.clone(),
-            light: self.light.clone(),
-            model: self.model,
-            lobes: self.lobes,
-            weights: None,
-        }
-    }
 }
 
 /// A photo as it was read.
@@ -108,8 +88,8 @@ pub struct ObjectOutcome {
     pub log_errors: Vec<Arc<GreyImage>>,
     /// The reflectance.
     pub material: Arc<MaterialLook>,
-    /// The light.
-    pub light: Arc<Environment>,
+    /// The light of each photo, or that of all.
+    pub lights: Vec<Arc<Environment>>,
     /// The starts that were followed, the best first; empty when the job was stopped before its end.
     pub starts: Vec<StartFollowed>,
     /// How far apart those are that are as good.
@@ -138,9 +118,10 @@ impl ObjectOutcome {
         let (rerenders, log_errors) = pictures.into_iter().unzip();
         let found = &parts.estimate;
         let gauge = Gauge::of(&found.light, &NodeGrid::new(parts.settings.nodes), &found.table);
-        let light = Arc::new(found.light.environment());
+        let lights = std::iter::once(&found.light).chain(&found.further_lights);
+        let lights = lights.map(|light| Arc::new(light.environment())).collect();
         let material = Arc::new(MaterialLook::of(&parts.reflectance(), None));
-        ObjectOutcome { parts, folder, rerenders, log_errors, material, light, starts, spread, gauge }
+        ObjectOutcome { parts, folder, rerenders, log_errors, material, lights, starts, spread, gauge }
     }
 }
 

@@ -6,9 +6,8 @@ use super::{ObjectLook, ObjectNews, ObjectOutcome, ObjectParts, ObjectRequest, P
 use crate::error::{Error, ErrorKind, Result};
 use crate::image::{Image, file};
 use crate::job::Slot;
-use crate::light::Environment;
 use crate::neural;
-use crate::object::joint::{Estimate, Known};
+use crate::object::joint::Estimate;
 use crate::object::nodes::NodeGrid;
 use crate::object::progress::ObjectEvent;
 use crate::object::read::read_views;
@@ -33,20 +32,16 @@ impl Worker {
     /// Does all of it. An error means that nothing was reached.
     pub fn run(self) -> Result<()> {
         let settings = &self.request.settings;
-        settings.validate_for(self.request.light.is_some())?;
+        settings.validate_for(self.request.inputs.light.is_some())?;
         result_folder::prepare(&self.request.output)?;
         self.stage("reading photos and shape");
-        let (views, mut findings) = read_views(&self.request.files)?;
+        let (views, mut findings) = read_views(&self.request.inputs.files)?;
         if views.is_empty() {
             return Err(Error::new(ErrorKind::Missing, "there is no photo").remedy("name at least one photo"));
         }
         self.teller.send(ObjectNews::Read(views.iter().map(seen).collect()));
-        let mut known = Known::default();
-        if let Some(path) = &self.request.light {
-            let (light, mut noticed) = Environment::read(path)?;
-            findings.append(&mut noticed);
-            known.light = Some(light);
-        }
+        let (known, noticed) = self.request.inputs.known()?;
+        findings.extend(noticed);
         let model = self.model()?;
         self.check_stop()?;
 
@@ -80,7 +75,7 @@ impl Worker {
         for finding in &found.findings {
             self.teller.send(ObjectNews::Finding(finding.clone()));
         }
-        let parts = Arc::new(ObjectParts::new(views, model, found, settings.clone(), self.request.inputs()));
+        let parts = Arc::new(ObjectParts::new(views, model, found, settings.clone(), self.request.inputs.clone()));
         let outcome = Box::new(self.finish(parts));
         self.teller.send(match is_whole {
             true => ObjectNews::Finished(outcome),
@@ -102,13 +97,13 @@ impl Worker {
 
     /// The model; the neural one with the weights that come with the program.
     fn model(&self) -> Result<StartedModel> {
-        let (request, settings) = (&self.request, &self.request.settings);
-        match request.model {
+        let (inputs, settings) = (&self.request.inputs, &self.request.settings);
+        match inputs.model {
             ModelKind::Ibrdf => {
                 let trained = Arc::new(neural::shipped()?);
-                Ok(StartedModel::neural(trained, request.lobes.clamp(1, 3), settings.code_weight, &[]))
+                Ok(StartedModel::neural(trained, inputs.lobes.clamp(1, 3), settings.code_weight, &[]))
             }
-            kind => StartedModel::of(kind, None, request.lobes, settings),
+            kind => StartedModel::of(kind, None, inputs.lobes, settings),
         }
     }
 

@@ -107,6 +107,10 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
         Act::SavePicture | Act::SaveTurntable | Act::SaveLightStrip | Act::LightStrip => {
             need(has_maps && project.is_some_and(|project| project.surface.is_some()), "no maps yet: start a fit")
         }
+        Act::SaveFitFilm => {
+            need(has_maps && project.is_some_and(|project| project.surface.is_some()), "no maps yet: start a fit")?;
+            need(model.timeline.states().len() >= 2, "available once a fit of this window has shown two states")
+        }
         Act::LookThrough
         | Act::NextView
         | Act::PreviousView
@@ -121,7 +125,12 @@ pub fn availability(act: Act, model: &Model) -> Result<(), &'static str> {
             need(has_views, "no photos")?;
             need(has_maps, "no maps yet: start a fit")
         }
-        Act::ErrorOverlay | Act::LayerPhotoError | Act::LayerCoverage | Act::LayerDisagreement | Act::SurfaceLayers => {
+        Act::LayerCrossfade
+        | Act::ErrorOverlay
+        | Act::LayerPhotoError
+        | Act::LayerCoverage
+        | Act::LayerDisagreement
+        | Act::SurfaceLayers => {
             need(has_views, "no photos")?;
             need(has_maps, "no maps yet: start a fit")
         }
@@ -175,6 +184,7 @@ fn is_of_scenes(act: Act) -> bool {
             Act::Export
                 | Act::SavePicture
                 | Act::SaveTurntable
+                | Act::SaveFitFilm
                 | Act::SaveLightStrip
                 | Act::OpenReport
                 | Act::OpenRunFolder

@@ -4,7 +4,6 @@ use super::exporting::ExportRequest;
 use super::importing::ImportRequest;
 use super::tasks::TaskKind;
 use super::{Done, LightName, Model, lights};
-use crate::studio::stage::Layer;
 use std::path::{Path, PathBuf};
 
 /// What a path is picked for.
@@ -93,7 +92,7 @@ pub struct SaveRequest {
     pub height: usize,
     /// Paths a pixel.
     pub samples: usize,
-    /// Number of frames of a turntable.
+    /// Number of frames of a turntable or film.
     pub frames: usize,
     /// Whether what the surface does not cover is left transparent; of a picture.
     pub cut_out: bool,
@@ -110,6 +109,8 @@ pub enum SaveWhat {
     Turntable,
     /// The view under every light of the shelf.
     Strip,
+    /// The view as the fit went on.
+    FitFilm,
 }
 
 impl Model {
@@ -173,7 +174,7 @@ impl Model {
     /// Lights the viewport by an environment of the shelf.
     pub fn choose_light(&mut self, name: LightName) {
         self.edits.relight.first = name;
-        self.edits.layer = Layer::Lit;
+        self.show_light();
     }
 
     /// Reads an HDR map and puts it on the shelf.

@@ -28,8 +28,8 @@ pub enum Done {
     LightRead(Box<ShelfLight>, Vec<Finding>),
     /// A folder or file was chosen in the system's dialog; `None` when it was closed.
     Picked(PickFor, Option<PathBuf>),
-    /// Files were saved, and the seconds that each of their paths took.
-    Saved(Vec<PathBuf>, f64),
+    /// Files were saved, and the seconds that each of their paths took where they were path-traced.
+    Saved(Vec<PathBuf>, Option<f64>),
     /// The run was written anew at another scale.
     Rescaled(Box<rescaling::Rescaled>),
     /// The run was written for other programs.

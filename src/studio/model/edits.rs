@@ -4,6 +4,7 @@ use super::lights::LightName;
 use super::object_form::ObjectForm;
 use crate::fit::FitSettings;
 use crate::image::display::DisplaySettings;
+use crate::light::Environment;
 use crate::light::day::Day;
 use crate::studio::stage::Layer;
 use egui::util::undoer::{Settings, Undoer};
@@ -71,6 +72,13 @@ impl Default for Relight {
 const BACKGROUND_BLUR_DEGREES: f32 = 10.0;
 
 impl Relight {
+    /// A light with turn and strength in its texels.
+    pub fn turned(&self, light: &Environment) -> Environment {
+        let turned = light.rotated_about_up(self.turn_degrees.to_radians());
+        let factor = self.strength_stops.exp2();
+        Environment { radiance: turned.radiance.map(|radiance| *radiance * factor) }
+    }
+
     /// By how many degrees the light is blurred where it shows behind the surface.
     pub fn background_blur_degrees(&self) -> f32 {
         if self.is_background_blurred { BACKGROUND_BLUR_DEGREES } else { 0.0 }
@@ -86,6 +94,8 @@ pub struct Edits {
     pub display: DisplaySettings,
     /// What the stage shows on the surface.
     pub layer: Layer,
+    /// Where between photos (0), diffuse reflectance (1) and materials under the light (2) [`Layer::Crossfade`] stands.
+    pub crossfade: f32,
     /// The light of the stage.
     pub relight: Relight,
     /// The photo against the stage.
@@ -100,6 +110,7 @@ impl Default for Edits {
             fit: FitSettings::default(),
             display: DisplaySettings::default(),
             layer: Layer::Lit,
+            crossfade: 1.0,
             relight: Relight::default(),
             photo: PhotoLook::Off,
             object: ObjectForm::default(),

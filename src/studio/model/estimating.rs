@@ -11,6 +11,8 @@ use crate::export::run_folder::new_run_folder;
 use crate::files::unrepeated;
 use crate::job::object::{self, ObjectJobOptions, ObjectOutcome, ObjectRequest, ReopenedObject};
 use crate::light::Environment;
+use crate::object::inputs::ObjectInputs;
+use crate::object::settings::LightsOf;
 use crate::studio::workspace::Workspace;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -52,12 +54,16 @@ impl Model {
             mesh: files.mesh.map(|mesh| mesh.display().to_string()).unwrap_or_default(),
             cameras: files.cameras,
             normals: files.normals,
-            light: inputs.light.map(|light| light.display().to_string()).unwrap_or_default(),
+            light: inputs
+                .light
+                .as_ref()
+                .or(inputs.probes.first())
+                .map_or(String::new(), |own| own.display().to_string()),
             model: inputs.model,
             lobes: inputs.lobes,
             ..ObjectForm::default()
         };
-        if !form.take_settings(&opened.outcome.parts.settings) {
+        if !form.take_settings(&opened.outcome.parts.settings) || inputs.probes.len() > 1 {
             self.log.note("Some settings of the result are not in this form: another estimation uses the defaults");
         }
         self.edits.object = form;
@@ -81,15 +87,11 @@ impl Model {
         let output = new_run_folder(&self.runs_folder(), &format!("object {stem}"));
         let settings = form.settings();
         let light = form.light.trim();
-        let request = ObjectRequest {
-            files,
-            light: (!light.is_empty()).then(|| light.into()),
-            model: form.model,
-            lobes: form.lobes,
-            relights: self.named_lights(),
-            output,
-            settings: settings.clone(),
-        };
+        let known: Option<PathBuf> = (!light.is_empty()).then(|| light.into());
+        let has_each = settings.lights == LightsOf::Each;
+        let (light, probes) = if has_each { (None, known.into_iter().collect()) } else { (known, Vec::new()) };
+        let inputs = ObjectInputs { files, light, probes, model: form.model, lobes: form.lobes, weights: None };
+        let request = ObjectRequest { inputs, relights: self.named_lights(), output, settings: settings.clone() };
         let options = ObjectJobOptions {
             wake: Some(Arc::clone(&self.wake)),
             after_round: self.after_round.clone().map(|own| Box::new(move |round| own(round)) as _),

@@ -149,7 +149,26 @@ impl Model {
     /// The layer that is drawn: before there are maps the photos stand in for shaded materials.
     pub fn shown_layer(&self) -> Layer {
         let is_blank = self.project.as_ref().is_some_and(|own| own.maps.is_none() && own.laid.is_some());
-        if self.edits.layer == Layer::Lit && is_blank { Layer::Photos } else { self.edits.layer }
+        match self.edits.layer {
+            Layer::Lit | Layer::Crossfade if is_blank => Layer::Photos,
+            layer => layer,
+        }
+    }
+
+    /// Shows the surface under the light, unless it is seen already.
+    pub fn show_light(&mut self) {
+        if !self.shows_light() {
+            self.edits.layer = Layer::Lit;
+        }
+    }
+
+    /// Whether the light is seen on the surface: materials under it, or a crossfade that nears them.
+    pub fn shows_light(&self) -> bool {
+        match self.shown_layer() {
+            Layer::Lit => true,
+            Layer::Crossfade => self.edits.crossfade > 1.0,
+            _ => false,
+        }
     }
 }
 

@@ -82,7 +82,9 @@ impl Model {
             Done::Picked(_, None) => {}
             Done::Picked(purpose, Some(path)) => self.picked(purpose, path),
             Done::Saved(paths, seconds_per_path) => {
-                self.preferences.seconds_per_path = Some(seconds_per_path).filter(|own| own.is_finite() && *own > 0.0);
+                if let Some(own) = seconds_per_path {
+                    self.preferences.seconds_per_path = Some(own).filter(|own| own.is_finite() && *own > 0.0);
+                }
                 let Some(first) = paths.first() else { return };
                 let text = match paths.len() {
                     1 => format!("Saved {}", first.display()),

@@ -193,9 +193,12 @@ impl ObjectControl {
         whole.or_else(|| self.look.as_ref().map(|look| Arc::clone(&look.material)))
     }
 
-    /// The newest light.
+    /// The newest light, of the photo that is shown where each has its own.
     pub fn light(&self) -> Option<Arc<Environment>> {
-        let whole = self.outcome.as_ref().map(|outcome| Arc::clone(&outcome.light));
+        let of_photo = |outcome: &Arc<ObjectOutcome>| {
+            outcome.lights.get(self.chosen_photo).or(outcome.lights.first()).map(Arc::clone)
+        };
+        let whole = self.outcome.as_ref().and_then(of_photo);
         whole.or_else(|| self.look.as_ref().map(|look| Arc::clone(&look.light)))
     }
 }

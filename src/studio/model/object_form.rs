@@ -3,7 +3,7 @@
 use crate::error::{Error, ErrorKind, Place, Result};
 use crate::object::prior::LightPriorKind;
 use crate::object::read::ObjectFiles;
-use crate::object::settings::ObjectSettings;
+use crate::object::settings::{LightsOf, ObjectSettings};
 use crate::object::starts::ModelKind;
 use std::path::{Path, PathBuf};
 
@@ -40,7 +40,7 @@ impl Effort {
 /// What an estimation is asked for; undo covers it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectForm {
-    /// Photos of one object under one light.
+    /// Photos of one object.
     pub photos: Vec<PathBuf>,
     /// One mask a photo, or none.
     pub masks: Vec<PathBuf>,
@@ -52,7 +52,9 @@ pub struct ObjectForm {
     pub cameras: Vec<PathBuf>,
     /// One picture of normals a photo in place of a mesh, as in a result that was opened; none otherwise.
     pub normals: Vec<PathBuf>,
-    /// The light, where it is known; empty where it is estimated.
+    /// Whether all photos are under one light, or each under one of its own.
+    pub lights: LightsOf,
+    /// The light, where it is known, or that of the first photo where each has its own; empty where it is estimated.
     pub light: String,
     /// Model of the reflectance.
     pub model: ModelKind,
@@ -81,6 +83,7 @@ impl Default for ObjectForm {
             mesh: String::new(),
             cameras: Vec::new(),
             normals: Vec::new(),
+            lights: LightsOf::One,
             light: String::new(),
             model: ModelKind::default(),
             lobes: 2,
@@ -102,6 +105,8 @@ impl ObjectForm {
             prior: self.prior,
             shadows: self.shadows,
             seed: self.seed,
+            // One photo has one light either way.
+            lights: if self.photos.len() > 1 { self.lights } else { LightsOf::One },
             light_height: self.light_rows.unwrap_or(own.light_height),
             pixels: self.pixels.unwrap_or(own.pixels),
             ..own
@@ -137,11 +142,11 @@ impl ObjectForm {
     /// Takes up the settings of a result. False when the form cannot ask for all of them: then it asks for the rest as
     /// the program takes it by itself.
     pub fn take_settings(&mut self, settings: &ObjectSettings) -> bool {
-        let (prior, shadows, seed) = (settings.prior, settings.shadows, settings.seed);
-        (self.prior, self.shadows, self.seed) = (prior, shadows, seed);
+        let (prior, shadows, seed, lights) = (settings.prior, settings.shadows, settings.seed, settings.lights);
+        (self.prior, self.shadows, self.seed, self.lights) = (prior, shadows, seed, lights);
         let asks_for = |effort: &Effort| {
             let (light_height, pixels) = (settings.light_height, settings.pixels);
-            *settings == ObjectSettings { prior, shadows, seed, light_height, pixels, ..effort.settings() }
+            *settings == ObjectSettings { prior, shadows, seed, lights, light_height, pixels, ..effort.settings() }
         };
         let found = Effort::NAMED.map(|(effort, ..)| effort).into_iter().find(asks_for);
         self.effort = found.unwrap_or_default();
@@ -170,10 +175,17 @@ mod tests {
             pixels: Some(300),
             prior: LightPriorKind::Gradient,
             shadows: false,
+            lights: LightsOf::Each,
+            photos: vec!["a.exr".into(), "b.exr".into()],
             seed: 7,
             ..ObjectForm::default()
         };
-        let mut again = ObjectForm { effort: Effort::Released, pixels: Some(5), ..ObjectForm::default() };
+        let mut again = ObjectForm {
+            effort: Effort::Released,
+            pixels: Some(5),
+            photos: asked.photos.clone(),
+            ..ObjectForm::default()
+        };
         assert!(again.take_settings(&asked.settings()));
         assert_eq!(again, asked);
         let other = ObjectSettings { outer_loops: 3, ..ObjectSettings::default() };

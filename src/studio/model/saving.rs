@@ -3,7 +3,10 @@
 use super::lights::LightName;
 use super::tasks::TaskKind;
 use super::{Done, Model, SaveRequest, SaveWhat};
+use crate::error::{Error, ErrorKind};
+use crate::job::fit_film::{self, FitFilmSettings, StateOfFit};
 use crate::job::gallery::{self, NamedLight, Turning, TurntableSettings};
+use crate::job::{film, relit};
 use crate::studio::stage::eye::Eye;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,6 +16,8 @@ use std::time::Instant;
 const STRIP_SIZE: (usize, usize) = (240, 160);
 /// Paths a pixel of the strip.
 const STRIP_SAMPLES: usize = 24;
+/// Frames of a film of a fit: ten seconds.
+const FRAMES_OF_FIT: usize = 10 * film::FRAMES_A_SECOND as usize;
 
 impl Model {
     /// Opens the dialog that asks how and where to save.
@@ -30,6 +35,7 @@ impl Model {
             SaveWhat::Picture => folder.join("renders").join(format!("{view}_{light}.png")),
             SaveWhat::Turntable => folder.join("renders").join(format!("turntable_{light}")),
             SaveWhat::Strip => folder.join("renders").join(format!("{view}_lights")),
+            SaveWhat::FitFilm => folder.join("renders").join(format!("{view}_fit_{light}")),
         };
         let (width, height) = match self.eye_in_force() {
             Eye::Photo(camera) => (camera.width, camera.height),
@@ -41,7 +47,7 @@ impl Model {
             width,
             height,
             samples: 64,
-            frames: 48,
+            frames: if what == SaveWhat::FitFilm { FRAMES_OF_FIT } else { 48 },
             cut_out: false,
             film: true,
         });
@@ -49,6 +55,9 @@ impl Model {
 
     /// Renders and saves what was asked for, beside the window.
     pub fn save(&mut self, request: SaveRequest) {
+        if request.what == SaveWhat::FitFilm {
+            return self.save_fit_film(request);
+        }
         let Some(project) = &self.project else { return };
         let Some(surface) = project.surface.clone() else { return };
         let first = self.edits.relight.first.clone();
@@ -95,18 +104,61 @@ impl Model {
                     )?;
                     if request.film {
                         context.tell("making the film", 1.0);
-                        film = Some(crate::job::film::write(&path, &frames, "turntable")?);
+                        film = Some(film::write(&path, &frames, "turntable")?);
                     }
                     frames
                 }
                 SaveWhat::Strip => {
                     gallery::write_strip(&path, &surface, &own, &camera, &lights, &settings, &display, stop, &tell)?
                 }
+                // Not path-traced: it went another way above.
+                SaveWhat::FitFilm => Vec::new(),
             };
             let paths = (request.width * request.height * request.samples * saved.len()) as f64;
             let seconds_per_path = began.elapsed().as_secs_f64() / paths.max(1.0);
             // The film is what was wanted: it is named first.
-            Ok(Done::Saved(film.into_iter().chain(saved).collect(), seconds_per_path))
+            Ok(Done::Saved(film.into_iter().chain(saved).collect(), Some(seconds_per_path)))
+        });
+    }
+
+    /// Relights the view as it was at each kept state of the fit, and saves a film of them, beside the window.
+    fn save_fit_film(&mut self, request: SaveRequest) {
+        let Some(project) = &self.project else { return };
+        let Some(surface) = project.surface.clone() else { return };
+        let relight = &self.edits.relight;
+        let chosen = (relight.first != LightName::Fitted).then(|| self.traced_light(&relight.first)).flatten();
+        let states: Vec<StateOfFit> = self
+            .timeline
+            .states()
+            .iter()
+            .map(|own| StateOfFit {
+                seconds: own.seconds,
+                maps: Arc::clone(&own.maps),
+                light: chosen.clone().unwrap_or_else(|| relight.turned(&own.environment)),
+            })
+            .collect();
+        let settings = FitFilmSettings {
+            camera: self.eye_in_force().as_camera(request.width, request.height),
+            frames: request.frames,
+            background_visible: relight.as_background,
+            background_blur_degrees: relight.background_blur_degrees(),
+        };
+        let cached =
+            project.transport.as_ref().filter(|own| Arc::ptr_eq(&own.surface, &surface)).map(|own| own.transport());
+        let wanted = relit::settings_beside(&self.edits.fit, self.picture_settings(1).max_bounces);
+        let (kept, display) = (self.kept.clone(), self.edits.display);
+        let folder = PathBuf::from(request.path.trim());
+        self.tasks.spawn(TaskKind::Saving, move |context| {
+            let stop = &context.stop;
+            let traced = || relit::transport_of(&surface, wanted, &kept, stop).map(Arc::new);
+            let stopped = || Error::new(ErrorKind::Stopped, "stopped while light transport was cached");
+            let transport = cached.or_else(traced).ok_or_else(stopped)?;
+            let tell = |share: f32| context.tell("rendering", share);
+            let frames =
+                fit_film::write_frames(&folder, &surface, &transport, &states, &settings, &display, stop, &tell)?;
+            context.tell("making the film", 1.0);
+            let film = film::write(&folder, &frames, "fit")?;
+            Ok(Done::Saved(std::iter::once(film).chain(frames).collect(), None))
         });
     }
 

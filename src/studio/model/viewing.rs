@@ -130,10 +130,7 @@ impl Model {
     /// The same with turn and strength in its texels, for the path tracer.
     pub fn traced_light(&self, name: &LightName) -> Option<Environment> {
         let light = self.stage_light(name)?;
-        let relight = &self.edits.relight;
-        let turned = light.rotated_about_up(relight.turn_degrees.to_radians());
-        let factor = relight.strength_stops.exp2();
-        Some(Environment { radiance: turned.radiance.map(|radiance| *radiance * factor) })
+        Some(self.edits.relight.turned(&light))
     }
 
     /// How the path tracer draws the stage.

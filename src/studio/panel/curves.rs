@@ -3,9 +3,10 @@
 
 mod series;
 
-use super::empty;
+use super::{act_button_named, empty};
 use crate::fit::LossRow;
 use crate::insight::report::number;
+use crate::studio::act::Act;
 use crate::studio::model::Model;
 use crate::studio::theme;
 use egui::{Align2, Button, Color32, ComboBox, RichText, Sense, Slider, Stroke, Ui, vec2};
@@ -119,6 +120,7 @@ fn timeline(ui: &mut Ui, model: &mut Model) {
         if ui.add_enabled(is_past, Button::new("Latest")).on_hover_text("Show the newest maps again").clicked() {
             model.look_back(None);
         }
+        act_button_named(ui, model, Act::SaveFitFilm, "Film…");
         let own = &model.timeline.states()[model.timeline.shown().unwrap_or(count - 1)];
         let words = format!("{} s, {}", number::fixed(own.seconds, 1), stage_words(&own.stage).to_lowercase());
         let words = RichText::new(words);

@@ -247,6 +247,7 @@ fn save(ui: &mut Ui, model: &mut Model, request: &mut SaveRequest) -> bool {
         SaveWhat::Picture => "Render image",
         SaveWhat::Turntable => "Render turntable",
         SaveWhat::Strip => "Export contact sheet",
+        SaveWhat::FitFilm => "Save film of the fit",
     });
     Grid::new("save").num_columns(2).spacing([12.0, 6.0]).show(ui, |ui| {
         let label = ui.label(if request.what == SaveWhat::Picture { "Image file" } else { "Image folder" });
@@ -263,12 +264,14 @@ fn save(ui: &mut Ui, model: &mut Model, request: &mut SaveRequest) -> bool {
             ui.add(side(&mut request.height)).labelled_by(label.id);
         });
         ui.end_row();
-        let label = ui.label("Samples per pixel");
-        ui.add(DragValue::new(&mut request.samples).range(1..=4096))
-            .labelled_by(label.id)
-            .on_hover_text("Four times as many samples halve the noise and take four times as long");
-        ui.end_row();
-        if request.what == SaveWhat::Turntable {
+        if request.what != SaveWhat::FitFilm {
+            let label = ui.label("Samples per pixel");
+            ui.add(DragValue::new(&mut request.samples).range(1..=4096))
+                .labelled_by(label.id)
+                .on_hover_text("Four times as many samples halve the noise and take four times as long");
+            ui.end_row();
+        }
+        if matches!(request.what, SaveWhat::Turntable | SaveWhat::FitFilm) {
             let label = ui.label("Images");
             ui.add(DragValue::new(&mut request.frames).range(2..=720)).labelled_by(label.id);
             ui.end_row();
@@ -283,7 +286,7 @@ fn save(ui: &mut Ui, model: &mut Model, request: &mut SaveRequest) -> bool {
             ui.checkbox(&mut request.film, "Film of the images")
                 .on_hover_text("MP4 where ffmpeg is installed, an animated PNG for browsers otherwise");
         }
-        SaveWhat::Strip => {}
+        SaveWhat::Strip | SaveWhat::FitFilm => {}
     }
     let images = if request.what == SaveWhat::Turntable { request.frames as f64 } else { 1.0 };
     let paths = (request.width * request.height * request.samples) as f64 * images;
@@ -292,7 +295,15 @@ fn save(ui: &mut Ui, model: &mut Model, request: &mut SaveRequest) -> bool {
         || format!("{:.0} million samples", paths * 1e-6),
         |seconds| format!("About {} on this machine", number::duration(seconds)),
     );
-    ui.label(RichText::new(told).weak());
+    ui.label(
+        RichText::new(match request.what {
+            SaveWhat::FitFilm => {
+                "Each state is shown for as long as it was the newest; MP4 where ffmpeg is installed".into()
+            }
+            _ => told,
+        })
+        .weak(),
+    );
     let mut done = false;
     ui.horizontal(|ui| {
         let colours = theme::palette(ui.visuals());

@@ -16,6 +16,7 @@ impl Act {
             own if Panel::of(own).is_some() => Some("Panels"),
             own if own.navigation().is_some() => Some("Navigation as in"),
             Act::LayerPhotos
+            | Act::LayerCrossfade
             | Act::LayerLit
             | Act::LayerDiffuse
             | Act::LayerSpecular

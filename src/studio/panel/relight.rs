@@ -7,7 +7,6 @@ use crate::light::day::Day;
 use crate::studio::act::Act;
 use crate::studio::model::Model;
 use crate::studio::model::lights::{LightName, ShelfLight};
-use crate::studio::stage::Layer;
 use crate::studio::theme::{self, SHELF_PICTURE};
 use egui::{
     ColorImage, ComboBox, Context, Rect, RichText, ScrollArea, Sense, Slider, Stroke, StrokeKind, TextureHandle, Ui,
@@ -171,8 +170,7 @@ fn shelf(ui: &mut Ui, model: &mut Model, memory: &mut RelightMemory) {
                     };
                     ui.painter().rect_stroke(rect, 2.0, stroke, StrokeKind::Outside);
                     if response.clicked() {
-                        model.edits.relight.first = light.name.clone();
-                        model.edits.layer = Layer::Lit;
+                        model.choose_light(light.name.clone());
                     }
                     let response = response.on_hover_text(about(light));
                     if matches!(light.name, LightName::File(_)) {
@@ -237,8 +235,7 @@ fn strip(ui: &mut Ui, model: &mut Model, memory: &mut RelightMemory) {
             let whole = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
             ui.painter().image(texture.id(), rect, whole, egui::Color32::WHITE);
             if response.on_hover_text(name.label()).clicked() {
-                model.edits.relight.first = name.clone();
-                model.edits.layer = Layer::Lit;
+                model.choose_light(name.clone());
             }
         }
     });

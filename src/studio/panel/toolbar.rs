@@ -7,7 +7,7 @@ use crate::studio::model::edits::PhotoLook;
 use crate::studio::model::{Model, Phase};
 use crate::studio::stage::Layer;
 use crate::studio::theme;
-use egui::{Button, ComboBox, DragValue, Ui};
+use egui::{Button, ComboBox, DragValue, Slider, Ui};
 
 /// Draws the row.
 pub fn show(ui: &mut Ui, model: &mut Model) {
@@ -105,6 +105,14 @@ fn layers(ui: &mut Ui, model: &mut Model) {
         (Act::LayerLobeSharing, Layer::LobeSharing),
         (Act::LayerChoice, Layer::Choice),
     ];
+    act_switch(ui, model, Act::LayerCrossfade, "Crossfade", model.edits.layer == Layer::Crossfade);
+    if model.edits.layer == Layer::Crossfade {
+        ui.add(Slider::new(&mut model.edits.crossfade, 0.0..=2.0).show_value(false))
+            .accessible_name("Photo – albedo – relit")
+            .on_hover_text(
+                "Projected photos at the left, diffuse reflectance in the middle, relit surface at the right",
+            );
+    }
     let chosen = further.iter().find(|(_, layer)| *layer == model.edits.layer);
     let text = chosen.map_or("Diagnostics", |(act, _)| act.name());
     let mut menu = Button::new(text);

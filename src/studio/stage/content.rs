@@ -49,11 +49,13 @@ pub enum Layer {
     Uv,
     /// The photos, laid on the surface: colours of vertices where the content has them, else its diffuse map as radiance.
     Photos,
+    /// Between the photos of the content and its diffuse map, and between that and its materials under the light.
+    Crossfade,
 }
 
 impl Layer {
     /// All layers with their names on screen.
-    pub const NAMED: [(Layer, &str); 16] = [
+    pub const NAMED: [(Layer, &str); 17] = [
         (Layer::Lit, "Shaded"),
         (Layer::Diffuse, "Diffuse"),
         (Layer::Specular, "Specular"),
@@ -70,6 +72,7 @@ impl Layer {
         (Layer::Choice, "Lobe model"),
         (Layer::Uv, "UV coordinates"),
         (Layer::Photos, "Projected photos"),
+        (Layer::Crossfade, "Photo – albedo – relit"),
     ];
 
     /// Whether the layer shows [`StageContent::quantity`] by the colour scale.
@@ -148,6 +151,9 @@ impl StageCamera {
 /// Texels inside a chart, found where they are first asked for: on the thread that uploads the maps.
 pub type CoveredTexels = LazyLock<Image<bool>, Box<dyn FnOnce() -> Image<bool> + Send>>;
 
+/// The mean of the photos in each texel as the diffuse map, and which texels some photo sees.
+pub type PhotosOnTexels = (Arc<MaterialMaps>, Arc<CoveredTexels>);
+
 /// What the stage shows.
 #[derive(Clone, Debug)]
 pub struct StageContent {
@@ -159,6 +165,9 @@ pub struct StageContent {
     pub covered: Option<Arc<CoveredTexels>>,
     /// Linear colours of the mesh's vertices times their weights, and the weights in [0, 1]; for [`Layer::Photos`].
     pub vertex_colours: Option<Arc<Vec<[f32; 4]>>>,
+    /// Photos laid on the atlas, as [`Layer::Crossfade`] begins with them, and which of the texels some photo sees; black
+    /// without.
+    pub photos: Option<PhotosOnTexels>,
     /// Strength of the specular lobe in [0, 1]; 0 for maps without one.
     pub lobe_strength: f32,
     /// The microfacets of the lobe.
@@ -171,7 +180,8 @@ pub struct StageContent {
     pub quantity: Option<StageQuantity>,
     /// The photo of the eye's camera, linear.
     pub photo: Option<Arc<RgbImage>>,
-    /// A path-traced picture at exactly this eye ([`Eye::as_camera`] of the rectangle's shape), shown instead of the mesh.
+    /// A path-traced picture at exactly this eye ([`Eye::as_camera`] of the rectangle's shape), shown instead of the mesh;
+    /// by [`Layer::Crossfade`] over it.
     pub traced: Option<Arc<RgbImage>>,
     /// Cameras drawn as frustums.
     pub cameras: Arc<Vec<StageCamera>>,
@@ -186,6 +196,7 @@ impl Default for StageContent {
             maps: None,
             covered: None,
             vertex_colours: None,
+            photos: None,
             lobe_strength: 1.0,
             lobe: LobeModel::default(),
             light: None,
@@ -219,6 +230,8 @@ pub struct StageLook {
     pub display: DisplaySettings,
     /// How the photo is laid on the picture.
     pub photo_mode: PhotoMode,
+    /// What [`Layer::Crossfade`] shows, in [0, 2]: the photos at 0, the diffuse map at 1, the materials under the light at 2.
+    pub crossfade: f32,
     /// Place in [0, 1] of the width where the first light ends and the other begins; only with two lights.
     pub light_wipe: Option<f32>,
     /// What is behind the mesh.
@@ -236,6 +249,7 @@ impl Default for StageLook {
             layer: Layer::Lit,
             display: DisplaySettings::default(),
             photo_mode: PhotoMode::Off,
+            crossfade: 1.0,
             light_wipe: None,
             backdrop: Backdrop::Colour(Color32::from_gray(38)),
             accent: Color32::from_rgb(255, 170, 40),
@@ -257,4 +271,28 @@ pub struct StageFrame {
     pub wait_for_uploads: bool,
     /// Nobody waits for what is uploaded: it is shown by whatever frame comes next, and asks for none.
     pub quiet_uploads: bool,
+}
+
+/// What a crossfade goes to, with the share of it in [0, 1].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Crossfade {
+    /// The diffuse map, from the photos.
+    Diffuse(f32),
+    /// The materials under the light as the mesh is drawn, from the diffuse map.
+    Lit(f32),
+    /// The path-traced picture, from the diffuse map.
+    Traced(f32),
+}
+
+impl StageFrame {
+    /// The crossfade that is shown, if one is.
+    pub(super) fn crossfade(&self) -> Option<Crossfade> {
+        let place = self.look.crossfade.clamp(0.0, 2.0);
+        match self.look.layer {
+            Layer::Crossfade if place.is_nan() || place <= 1.0 => Some(Crossfade::Diffuse(place.max(0.0))),
+            Layer::Crossfade if self.content.traced.is_some() => Some(Crossfade::Traced(place - 1.0)),
+            Layer::Crossfade => Some(Crossfade::Lit(place - 1.0)),
+            _ => None,
+        }
+    }
 }

@@ -91,6 +91,7 @@ pub(super) struct StageRenderer {
     mesh: Slot<MeshKey, GpuMesh>,
     maps: Slot<MapsKey, (GpuTexture, GpuTexture, Vec<Finding>)>,
     quantity: Slot<Arc<GreyImage>, GpuTexture>,
+    photos: Slot<MapsKey, GpuTexture>,
     lights: [Slot<LightKey, GpuLight>; 2],
     photo: Slot<Arc<RgbImage>, GpuTexture>,
     traced: Slot<Arc<RgbImage>, GpuTexture>,
@@ -134,6 +135,7 @@ impl StageRenderer {
             mesh: Slot::default(),
             maps: Slot::default(),
             quantity: Slot::default(),
+            photos: Slot::default(),
             lights: [Slot::keeping(LIGHTS_KEPT), Slot::keeping(LIGHTS_KEPT)],
             photo: Slot::default(),
             traced: Slot::default(),
@@ -246,6 +248,14 @@ impl StageRenderer {
         let texels = quantity.map_or(0, |texels| texels.pixels().len());
         changed |= self.quantity.follow(quantity.cloned(), speed(texels), move |texels| maker.quantity(texels));
 
+        let maker = self.maker.clone();
+        let photos = content.photos.as_ref().filter(|_| frame.crossfade().is_some());
+        let key = photos.map(|(colours, seen)| (Arc::clone(colours), Some(Arc::clone(seen))));
+        let texels = photos.map_or(0, |(colours, _)| pixels(&colours.diffuse));
+        changed |= self.photos.follow(key, speed(texels), move |(colours, seen)| {
+            maker.materials(colours, seen.as_deref().map(|seen| &**seen)).0
+        });
+
         for (slot, light) in self.lights.iter_mut().zip([&content.light, &content.other_light]) {
             let maker = self.maker.clone();
             let key = light.as_ref().map(|light: &StageLight| (light.environment.clone(), content.lobe));
@@ -269,6 +279,7 @@ impl StageRenderer {
         self.status.is_uploading = self.mesh.is_pending()
             || self.maps.is_pending()
             || self.quantity.is_pending()
+            || self.photos.is_pending()
             || self.status.is_light_uploading
             || self.photo.is_pending()
             || self.traced.is_pending();

@@ -1,7 +1,7 @@
 //! What the shaders are told: of the scene ([`ViewUniform`], whose change means drawing it anew) and of the screen
 //! ([`ScreenUniform`], which only changes how the drawn scene is shown). What no number says is in `variants`.
 
-use super::content::{Backdrop, PhotoMode, StageFrame, StageLight};
+use super::content::{Backdrop, Crossfade, PhotoMode, StageFrame, StageLight};
 use super::eye::Eye;
 use super::frustum::vec3_of;
 use glam::{Mat4, Vec2, Vec3, Vec4};
@@ -18,6 +18,7 @@ pub(super) struct ViewUniform {
     other_light: Vec4,
     shading: Vec4,
     backdrop: Vec4,
+    crossfade: Vec4,
 }
 
 /// `Screen` of `display.wgsl`.
@@ -103,6 +104,14 @@ impl ViewUniform {
                 Backdrop::Colour(colour) => vec3_of(colour).extend(0.0),
                 Backdrop::Light | Backdrop::BlurredLight => Vec4::ZERO,
             },
+            // The exposure alone would have every scene drawn anew that one sets it for.
+            crossfade: match frame.crossfade() {
+                None => Vec4::ZERO,
+                Some(Crossfade::Traced(_)) => Vec4::new(1.0, 0.0, 0.0, 0.0),
+                Some(Crossfade::Diffuse(share) | Crossfade::Lit(share)) => {
+                    Vec4::new(share, look.display.exposure_stops.exp2(), 0.0, 0.0)
+                }
+            },
         }
     }
 }
@@ -146,7 +155,7 @@ impl ScreenUniform {
                 light_wipe(frame).map_or(0.0, |place| place * target.x),
                 wipe * target.x,
                 sizes.target_pixels_per_point().max(0.1),
-                0.0,
+                if let Some(Crossfade::Traced(share)) = frame.crossfade() { share } else { 1.0 },
             ),
             size: target.extend(0.0).extend(0.0),
         };

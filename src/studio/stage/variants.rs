@@ -4,7 +4,7 @@
 //! but a setting. So settings are constants of a pipeline, and each combination in use has one, made when it is first
 //! drawn with.
 
-use super::content::{Backdrop, Layer, PhotoMode, StageFrame};
+use super::content::{Backdrop, Crossfade, Layer, PhotoMode, StageFrame};
 use super::eye::Eye;
 use super::uniforms::light_wipe;
 use crate::image::display::ToneCurve;
@@ -24,17 +24,21 @@ pub(super) struct MeshVariant {
     has_lobe: bool,
     has_other_light: bool,
     has_colours: bool,
+    /// A crossfade ends at the materials under the light.
+    fades_to_lit: bool,
 }
 
 impl MeshVariant {
     pub fn new(frame: &StageFrame) -> Self {
         let layer = if frame.look.layer.is_quantity() { Layer::PhotoError } else { frame.look.layer };
-        let lit = layer == Layer::Lit;
+        let fades_to_lit = matches!(frame.crossfade(), Some(Crossfade::Lit(_)));
+        let lit = layer == Layer::Lit || fades_to_lit;
         MeshVariant {
             layer,
             has_lobe: lit && frame.content.lobe_strength > 0.0,
             has_other_light: lit && light_wipe(frame).is_some(),
             has_colours: layer == Layer::Photos && frame.content.vertex_colours.is_some(),
+            fades_to_lit,
         }
     }
 
@@ -44,6 +48,7 @@ impl MeshVariant {
             ("HAS_LOBE", flag(self.has_lobe)),
             ("HAS_OTHER_LIGHT", flag(self.has_other_light)),
             ("HAS_COLOURS", flag(self.has_colours)),
+            ("FADES_TO_LIT", flag(self.fades_to_lit)),
         ]
     }
 }
@@ -82,6 +87,8 @@ pub(super) struct ScreenVariant {
     photo_mode: u8,
     photo_is_exact: bool,
     has_traced: bool,
+    /// The drawn scene shows through the traced picture.
+    fades_to_traced: bool,
     traced_is_exact: bool,
     has_light_wipe: bool,
     through_photo: bool,
@@ -91,6 +98,9 @@ impl ScreenVariant {
     /// `photo` and `traced` tell of pictures that are there whether their pixels are those of the target.
     pub fn new(frame: &StageFrame, photo: Option<bool>, traced: Option<bool>) -> Self {
         let display = &frame.look.display;
+        let fades_to_traced = matches!(frame.crossfade(), Some(Crossfade::Traced(_)));
+        // Over what a crossfade draws between photos and diffuse map lies none.
+        let traced = traced.filter(|_| fades_to_traced || frame.crossfade().is_none());
         let through_photo = matches!(frame.eye, Eye::Photo(_));
         let photo_mode = match frame.look.photo_mode {
             _ if photo.is_none() || !through_photo => 0,
@@ -106,6 +116,7 @@ impl ScreenVariant {
             photo_mode,
             photo_is_exact: photo_mode > 0 && photo == Some(true),
             has_traced: traced.is_some(),
+            fades_to_traced: fades_to_traced && traced.is_some(),
             traced_is_exact: traced == Some(true),
             has_light_wipe: light_wipe(frame).is_some(),
             through_photo,
@@ -125,6 +136,7 @@ impl ScreenVariant {
             ("PHOTO_MODE", f64::from(self.photo_mode)),
             ("PHOTO_IS_EXACT", flag(self.photo_is_exact)),
             ("HAS_TRACED", flag(self.has_traced)),
+            ("FADES_TO_TRACED", flag(self.fades_to_traced)),
             ("TRACED_IS_EXACT", flag(self.traced_is_exact)),
             ("HAS_LIGHT_WIPE", flag(self.has_light_wipe)),
             ("THROUGH_PHOTO", flag(self.through_photo)),

@@ -10,7 +10,7 @@ use patina::light::Environment;
 use patina::light::sky::{SkySettings, sun_and_sky};
 use patina::studio::stage::eye::Eye;
 use patina::studio::stage::eye::OrbitEye;
-use patina::studio::stage::{Backdrop, Layer, StageLight, StageQuantity};
+use patina::studio::stage::{Backdrop, CoveredTexels, Layer, StageLight, StageQuantity};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -194,6 +194,44 @@ fn photos_are_colours_of_vertices_or_of_texels_and_follow_the_exposure() {
     let unseen = Arc::new(vec![[0.0; 4]; vertices]);
     let picture = pixels(&mut window, |frame| frame.content.vertex_colours = Some(unseen));
     assert_colour(picture[(60, 80)], [102; 3], 2, "what no photo sees is grey");
+}
+
+#[test]
+fn a_crossfade_goes_from_the_photos_over_reflectance_without_exposure_to_the_light() {
+    if !has_adapter() {
+        return;
+    }
+    let (photo, diffuse) = (Vec3::new(0.4, 0.2, 0.0), Vec3::new(0.2, 0.6, 0.8));
+    let light = Environment::constant(16, 8, Vec3::splat(0.25));
+    let mut frame = sphere_frame(one_material(diffuse, Vec3::ZERO, 1.0), light);
+    let display = DisplaySettings { exposure_stops: 1.0, ..LINEAR };
+    (frame.look.display, frame.look.layer) = (display, Layer::Crossfade);
+    frame.content.lobe_strength = 0.0;
+    let seen = CoveredTexels::new(Box::new(|| Image::filled(1, 1, true)));
+    let photos = one_material(photo, Vec3::ZERO, 1.0);
+    frame.content.photos = Some((Arc::new(photos), Arc::new(seen)));
+    let mut window = window(SIZE, frame);
+    // What an exposure of one stop makes of the radiance of photo and surface.
+    let (photo, lit) = (2.0 * photo, 0.5 * diffuse);
+    for (place, wanted) in [
+        (0.0, photo),
+        (0.25, photo.lerp(diffuse, 0.25)),
+        (1.0, diffuse),
+        (1.5, diffuse.lerp(lit, 0.5)),
+        (2.0, lit),
+        (f32::NAN, photo),
+    ] {
+        let picture = pixels(&mut window, |frame| frame.look.crossfade = place);
+        assert_colour(picture[(60, 80)], LINEAR.bytes(wanted, 60, 80), 2, &format!("at {place}"));
+    }
+    let traced = Arc::new(Image::filled(SIZE.x as usize, SIZE.y as usize, Vec3::new(0.5, 0.0, 0.25)));
+    let exposed = Vec3::new(1.0, 0.0, 0.5);
+    for (place, wanted) in [(0.5, photo.lerp(diffuse, 0.5)), (1.75, diffuse.lerp(exposed, 0.75)), (2.0, exposed)] {
+        let picture = pixels(&mut window, |frame| {
+            (frame.look.crossfade, frame.content.traced) = (place, Some(traced.clone()));
+        });
+        assert_colour(picture[(60, 80)], LINEAR.bytes(wanted, 60, 80), 3, &format!("path traced, at {place}"));
+    }
 }
 
 #[test]

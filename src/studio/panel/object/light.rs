@@ -33,12 +33,21 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut ObjectLightMemory) {
     let Some(environment) = model.object.light() else {
         return empty(ui, "No environment yet", "It appears after the first round");
     };
+    let many = model.object.outcome.as_ref().filter(|outcome| outcome.lights.len() > 1);
+    if let Some(outcome) = many {
+        let photo = model.object.photos.get(model.object.chosen_photo);
+        let name = photo.map_or("the first photo", |photo| photo.name.as_str());
+        ui.label(RichText::new(format!("Environment of {name}, one of {}", outcome.lights.len())).weak())
+            .on_hover_text("Choose another photo to see its environment");
+    }
     if let Some(bands) = model.object.outcome.as_ref().and_then(|outcome| outcome.parts.estimate.light_bands.as_ref()) {
         ui.label(RichText::new(bands.sentence()).weak()).on_hover_text(
             "Blurred by this angle, at least half of the environment's variance is what the photos tell",
         );
     }
-    if model.object.outcome.as_ref().is_some_and(|outcome| outcome.parts.estimate.light_seen.is_some()) {
+    let is_of_first = many.is_none() || model.object.chosen_photo == 0;
+    let has_seen = model.object.outcome.as_ref().is_some_and(|outcome| outcome.parts.estimate.light_seen.is_some());
+    if has_seen && is_of_first {
         ui.horizontal(|ui| {
             ui.selectable_value(&mut memory.shows_seen, false, "Radiance").on_hover_text("The estimated environment");
             ui.selectable_value(&mut memory.shows_seen, true, "Sensitivity")

@@ -2,6 +2,7 @@
 
 use super::toolbar::start;
 use crate::object::prior::LightPriorKind;
+use crate::object::settings::LightsOf;
 use crate::object::starts::ModelKind;
 use crate::studio::act::Act;
 use crate::studio::model::object::ObjectStatus;
@@ -39,7 +40,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, memory: &mut SetupMemory) {
         let live = model.object.status.is_live();
         run(ui, model);
         ui.add_enabled_ui(!live, |ui| {
-            heading(ui, "Photos of one object under one environment");
+            heading(ui, "Photos of one object");
             paths(ui, model, "Photo", PickFor::ObjectPhoto, &mut memory.photo);
             heading(ui, "Shape");
             shape(ui, model, memory);
@@ -195,11 +196,22 @@ fn path_field(ui: &mut Ui, model: &mut Model, what: &str, purpose: PickFor) {
 }
 
 fn light(ui: &mut Ui, model: &mut Model) {
-    let is_known = !model.edits.object.light.is_empty();
+    let form = &mut model.edits.object;
+    let mut has_each = form.lights == LightsOf::Each;
+    if form.photos.len() > 1 {
+        ui.checkbox(&mut has_each, "An environment for each photo")
+            .on_hover_text("Each photo under an environment of its own; they share the reflectance");
+        form.lights = if has_each { LightsOf::Each } else { LightsOf::One };
+    } else {
+        has_each = false;
+    }
+    let is_known = !form.light.is_empty();
     ui.label(
-        RichText::new(match is_known {
-            true => "Known: only the reflectance is estimated",
-            false => "Estimated; name an HDRI where it is known",
+        RichText::new(match (is_known, has_each) {
+            (true, false) => "Known: only the reflectance is estimated",
+            (false, false) => "Estimated; name an HDRI where it is known",
+            (true, true) => "Known for the first photo: it fixes the absolute scale",
+            (false, true) => "Estimated; name an HDRI where that of the first photo is known",
         })
         .weak(),
     );

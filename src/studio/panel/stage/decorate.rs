@@ -30,7 +30,7 @@ pub(super) fn decorate(ui: &mut Ui, model: &Model, frame: &StageFrame, rect: Rec
     };
     let shown = model.shown_layer();
     let name = Layer::NAMED.iter().find(|(layer, _)| *layer == shown).map_or("", |(_, name)| name);
-    let lit = shown == Layer::Lit;
+    let lit = model.shows_light();
     let relight = &model.edits.relight;
     let told = frame::told_by(shown);
     caption(

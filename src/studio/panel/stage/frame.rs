@@ -62,7 +62,7 @@ impl FrameCache {
         };
         let cameras = if model.switches.frustums && !through { self.cameras(model, project) } else { Arc::default() };
         let layer = model.shown_layer();
-        let lit = layer == Layer::Lit;
+        let lit = model.shows_light();
         let laid = project.laid.as_ref().filter(|_| layer == Layer::Photos);
         let on_texels = laid.and_then(|laid| laid.texels.clone());
         let on_vertices = laid.filter(|_| on_texels.is_none());
@@ -82,6 +82,7 @@ impl FrameCache {
                     None => self.covered(project),
                 },
                 vertex_colours: on_vertices.and_then(|laid| laid.vertices.clone()),
+                photos: (layer == Layer::Crossfade).then(|| project.laid.as_ref()?.texels.clone()).flatten(),
                 lobe_strength: if model.edits.fit.has_lobe() { 1.0 } else { 0.0 },
                 lobe: model.edits.fit.lobe,
                 light: first,
@@ -96,6 +97,7 @@ impl FrameCache {
                 layer,
                 display: model.edits.display,
                 photo_mode,
+                crossfade: model.edits.crossfade,
                 light_wipe: (lit && relight.second.is_some()).then_some(relight.wipe),
                 backdrop,
                 accent: colours.accent,

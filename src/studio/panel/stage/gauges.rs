@@ -9,7 +9,7 @@ use crate::light::day::Day;
 use crate::scene::Camera;
 use crate::studio::model::{LightName, Model};
 use crate::studio::panel::relight::colour_image;
-use crate::studio::stage::{Layer, StageFrame};
+use crate::studio::stage::StageFrame;
 use egui::{Color32, ColorImage, CursorIcon, Painter, Rect, Sense, Stroke, TextureHandle, TextureOptions, Ui, vec2};
 use glam::{Mat3, Quat, Vec2, Vec3};
 use std::sync::Arc;
@@ -67,7 +67,7 @@ pub(super) fn show(
     (frame, rect, is_settled): (&StageFrame, Rect, bool),
 ) {
     let has_maps = model.project.as_ref().is_some_and(|project| project.maps.is_some());
-    if model.shown_layer() != Layer::Lit || !has_maps || rect.width().min(rect.height()) < 4.0 * INSET {
+    if !model.shows_light() || !has_maps || rect.width().min(rect.height()) < 4.0 * INSET {
         return;
     }
     let name = model.edits.relight.first.clone();

@@ -6,7 +6,7 @@ use crate::image::RgbImage;
 use crate::job::relit::{Relighter, RelitLight, RelitRequest};
 use crate::studio::model::lights::LightName;
 use crate::studio::model::{FitStatus, Model};
-use crate::studio::stage::{Layer, StageFrame};
+use crate::studio::stage::StageFrame;
 use egui::{Ui, Vec2};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
@@ -62,8 +62,7 @@ impl Relit {
         settled: bool,
     ) -> Option<RelitShown> {
         self.take_in(model);
-        let is_wanted =
-            model.switches.traced && !self.failed && model.shown_layer() == Layer::Lit && size.min_elem() >= 16.0;
+        let is_wanted = model.switches.traced && !self.failed && model.shows_light() && size.min_elem() >= 16.0;
         let project = model.project.as_ref()?;
         let cached = project.transport.clone();
         let (Some(cached), Some(maps), Some(surface), true) =

@@ -5,7 +5,7 @@ use crate::image::RgbImage;
 use crate::job::pictures::parameters_with;
 use crate::job::preview::{Preview, PreviewRequest};
 use crate::studio::model::{FitStatus, Model};
-use crate::studio::stage::{Layer, StageFrame};
+use crate::studio::stage::StageFrame;
 use egui::{Ui, Vec2};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
@@ -66,7 +66,7 @@ impl Traced {
         }
         let wanted = model.switches.traced
             && !self.failed
-            && model.shown_layer() == Layer::Lit
+            && model.shows_light()
             && matches!(
                 model.fit.status,
                 FitStatus::Idle | FitStatus::Paused | FitStatus::Stopped | FitStatus::Finished

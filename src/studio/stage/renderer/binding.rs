@@ -17,7 +17,7 @@ impl StageRenderer {
         use wgpu::BindingResource::{Sampler, TextureView};
         let (diffuse, specular) =
             self.maps.shown().map_or((&self.missing.diffuse, &self.missing.specular), |maps| (&maps.0, &maps.1));
-        let quantity = self.quantity.shown().unwrap_or(&self.missing.black);
+        let quantity = self.quantity.shown().or_else(|| self.photos.shown()).unwrap_or(&self.missing.black);
         let resources = [
             Sampler(&self.pipelines.map_sampler),
             TextureView(&diffuse.view),

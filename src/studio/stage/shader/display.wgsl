@@ -9,6 +9,8 @@ override STRIPES: bool = false;
 override PHOTO_MODE: u32 = 0u;
 override PHOTO_IS_EXACT: bool = false;
 override HAS_TRACED: bool = false;
+// The drawn scene shows through it.
+override FADES_TO_TRACED: bool = false;
 override TRACED_IS_EXACT: bool = false;
 override HAS_LIGHT_WIPE: bool = false;
 // The border of the photo is drawn.
@@ -19,7 +21,7 @@ struct Screen {
     photo_rect: vec4<f32>,
     // Two to the power of the exposure, opacity or place of the photo, levels of detail of photo and traced picture.
     numbers: vec4<f32>,
-    // Columns of the wipes of light and photo; pixels a point; padding.
+    // Columns of the wipes of light and photo; pixels a point; opacity of the traced picture.
     marks: vec4<f32>,
     // Width and height in pixels, padding.
     size: vec4<f32>,
@@ -98,6 +100,9 @@ fn colour_of_screen(corner: ScreenCorner) -> @location(0) vec4<f32> {
             pixel = textureSampleLevel(traced, smooth_sampler, of_size, screen.numbers.w);
         }
         colour = shown(of_picture(pixel), place);
+        if FADES_TO_TRACED {
+            colour = over(shown(drawn, place), colour, screen.marks.w);
+        }
     } else {
         colour = shown(drawn, place);
     }

@@ -3,6 +3,7 @@
 @group(1) @binding(0) var map_sampler: sampler;
 @group(1) @binding(1) var diffuse_map: texture_2d<f32>;
 @group(1) @binding(2) var specular_map: texture_2d<f32>;
+// In a crossfade the photos.
 @group(1) @binding(3) var quantity_map: texture_2d<f32>;
 
 @group(2) @binding(0) var light_sampler: sampler;
@@ -18,6 +19,8 @@ override LAYER: u32 = 0u;
 override HAS_LOBE: bool = false;
 override HAS_OTHER_LIGHT: bool = false;
 override HAS_COLOURS: bool = false;
+// The crossfade is that of diffuse map and light, not of photos and diffuse map.
+override FADES_TO_LIT: bool = false;
 // 0 one colour, 1 the light, 2 the light out of focus.
 override BACKDROP: u32 = 0u;
 
@@ -156,6 +159,18 @@ fn colour_of_mesh(corner: Corner, @builtin(front_facing) is_front: bool) -> @loc
                 return vec4(UNKNOWN, READY);
             }
             return vec4(min(corner.colour.rgb / corner.colour.a, vec3(LARGEST)), RADIANCE);
+        }
+        case 16u: {
+            // Radiance is exposed here: reflectance is not, and both are mixed.
+            let diffuse = textureSample(diffuse_map, map_sampler, uv).rgb;
+            var mixed: vec3<f32>;
+            if FADES_TO_LIT {
+                mixed = mix(diffuse, view.crossfade.y * lit(corner.place, normal, uv, column), view.crossfade.x);
+            } else {
+                let photos = textureSample(quantity_map, map_sampler, uv).rgb;
+                mixed = mix(view.crossfade.y * photos, diffuse, view.crossfade.x);
+            }
+            return vec4(min(mixed, vec3(LARGEST)), REFLECTANCE);
         }
         default: {
             let quantity = textureSample(quantity_map, map_sampler, uv).xy;

@@ -15,6 +15,8 @@ struct View {
     shading: vec4<f32>,
     // sRGB of the background, padding.
     backdrop: vec4<f32>,
+    // Share of the second picture of a crossfade, factor of the exposure, padding.
+    crossfade: vec4<f32>,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
