@@ -230,6 +230,16 @@ fn the_timeline_shows_the_fit_as_it_was_while_it_goes_on() {
     let shown = studio.model().project.as_ref().unwrap().maps.clone().unwrap();
     assert!(studio.model().timeline.shown().is_none() && !Arc::ptr_eq(&shown, &first));
     assert!(Arc::ptr_eq(&shown, &newest) || studio.model().timeline.states().len() > count + 1);
+    studio.model().close();
+    assert!(studio.model().timeline.states().is_empty());
+}
+
+#[test]
+#[ignore = "slow: light transport is traced for it"]
+fn a_fit_is_saved_as_a_film_while_it_goes_on() {
+    let mut studio = TestStudio::with_running_fit();
+    studio.show(Panel::Curves);
+    studio.wait("two states", |model| model.timeline.states().len() >= 2);
     let folder = tempfile::tempdir().unwrap();
     studio.click("Film…");
     studio.harness.check_accessibility();
@@ -242,6 +252,4 @@ fn the_timeline_shows_the_fit_as_it_was_while_it_goes_on() {
     let files: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
     let is_film = |path: &&std::path::PathBuf| path.file_stem().is_some_and(|stem| stem == "fit");
     assert_eq!((files.len(), files.iter().filter(is_film).count()), (5, 1), "{files:?}");
-    studio.model().close();
-    assert!(studio.model().timeline.states().is_empty());
 }

@@ -1,7 +1,6 @@
 //! Scenes that are fitted one after the other.
 
 use super::support::{TestStudio, small_scene};
-use patina::fit::Preset;
 use patina::studio::act::Act;
 use patina::studio::model::queue::QueueState;
 use patina::studio::model::{FitStatus, Model};
@@ -35,8 +34,13 @@ fn folders_dropped_together_are_fitted_in_turn_and_one_that_cannot_be_opened_is_
     let folder = studio.folder.path().to_path_buf();
     let [broken, sound] = ["broken", "sound"].map(|name| copied(&folder, name));
     std::fs::write(broken.join("scene.json"), "{").unwrap();
-    studio.model().queue.preset = Preset::Quick;
     studio.model().all_dropped(vec![broken, sound.clone()]);
+    // A scene that is read is not ready yet: what is asked of its fit can still be changed.
+    let own = sound.clone();
+    studio.wait("the sound scene", move |model| {
+        model.project.as_ref().is_some_and(|project| project.path == Some(own.clone()))
+    });
+    studio.ask_for_little();
     studio.wait("the end of the queue", |model| matches!(states(model).last(), Some(QueueState::Done(_))));
     let told = states(studio.model());
     assert!(matches!(&told[0], QueueState::NotDone(why) if why.contains("could not be opened")), "{told:?}");

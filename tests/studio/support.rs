@@ -132,15 +132,20 @@ impl TestStudio {
     /// Waits for the atlas and chooses settings of a fit of some seconds.
     pub fn prepare_fit(&mut self) {
         self.wait("the atlas", |model| model.project.as_ref().is_some_and(|own| own.surface.is_some()));
+        self.ask_for_little();
         let model = self.model();
-        let fit = &mut model.edits.fit;
+        let edits = model.edits.clone();
+        model.history.restart(&edits);
+        self.frames(2);
+    }
+
+    /// Chooses settings of a fit of some seconds.
+    pub fn ask_for_little(&mut self) {
+        let fit = &mut self.model().edits.fit;
         // Many short steps, to be held and stopped between.
         fit.method = Method::Adam;
         (fit.map_size, fit.levels, fit.steps_diffuse, fit.steps_all) = (64, 2, 6, 6);
         (fit.samples, fit.pixels_per_step, fit.views_per_step, fit.environment_height) = (2, 0, 2, 8);
-        let edits = model.edits.clone();
-        model.history.restart(&edits);
-        self.frames(2);
     }
 
     /// A studio in which the small scene was just read, and is about to be checked and prepared.

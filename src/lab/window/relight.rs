@@ -46,8 +46,12 @@ pub struct RelightRow {
     pub scene: String,
     /// The environment.
     pub light: String,
-    /// Seconds from an environment to the whole picture, median.
+    /// Seconds from an environment to the whole picture where the view just came, median.
+    pub first_light_seconds: f64,
+    /// The same once the view has rested: its lobes are kept as rows.
     pub light_seconds: f64,
+    /// Seconds of rest that this takes, once an eye.
+    pub rest_seconds: f64,
     /// Pictures a second of an environment that turns, its rotation included.
     pub turns_per_second: f64,
     /// Error relative to the root mean square of the path tracer's picture.
@@ -147,28 +151,33 @@ pub fn measure(path: Option<&Path>, is_quick: bool, tell: &dyn Fn(&str)) -> Resu
         view.map(|view| (view, began.elapsed().as_secs_f64())).ok_or_else(stopped)
     };
     let (_, view_seconds) = trace(FootprintSettings::COARSE)?;
-    let (view, fine_view_seconds) = trace(FootprintSettings::default())?;
+    let (mut view, fine_view_seconds) = trace(FootprintSettings::default())?;
     let reflectance = transport.reflectance_of_points(&texels, map_size);
     let mut lights = vec![("its own environment".to_owned(), own.environment.clone())];
     for sky in ["noon", "evening", "overcast"] {
         let environment = light_of(sky, LIGHT_HEIGHT)?.environment;
         lights.push((format!("{sky} sky"), matched(&environment, &own.environment).0));
     }
+    let seconds_of = |view: &RelitView, environment: &Environment| {
+        let began = Instant::now();
+        let picture = view.lit(&transport, environment, &reflectance, Some(environment), &stop);
+        picture.map(|_| began.elapsed().as_secs_f64()).ok_or_else(stopped)
+    };
+    let median_of = |view: &RelitView, environment: &Environment| -> Result<f64> {
+        let seconds = (0..TIMES).map(|_| seconds_of(view, environment)).collect::<Result<Vec<f64>>>()?;
+        Ok(crate::math::statistics::quantile(&seconds, 0.5))
+    };
+    let at_first = lights.iter().map(|(_, environment)| median_of(&view, environment)).collect::<Result<Vec<f64>>>()?;
+    let began = Instant::now();
+    view.freeze(&transport, &stop);
+    let rest_seconds = began.elapsed().as_secs_f64();
     let mut rows = Vec::new();
-    for (light, environment) in lights {
+    for ((light, environment), first_light_seconds) in lights.into_iter().zip(at_first) {
         tell(&format!("{}: {light}", own.name));
-        let lit = |environment: &Environment| {
-            let began = Instant::now();
-            let picture = view.lit(&transport, environment, &reflectance, Some(environment), &stop);
-            picture.map(|picture| (picture, began.elapsed().as_secs_f64())).ok_or_else(stopped)
-        };
-        let mut seconds = Vec::new();
-        for _ in 0..TIMES {
-            seconds.push(lit(&environment)?.1);
-        }
+        let light_seconds = median_of(&view, &environment)?;
         let began = Instant::now();
         for step in 0..TIMES {
-            lit(&environment.rotated_about_up((5.0 * step as f32).to_radians()))?;
+            seconds_of(&view, &environment.rotated_about_up((5.0 * step as f32).to_radians()))?;
         }
         let turns_per_second = TIMES as f64 / began.elapsed().as_secs_f64();
         let of_surface = view.lit(&transport, &environment, &reflectance, None, &stop).ok_or_else(stopped)?;
@@ -176,7 +185,9 @@ pub fn measure(path: Option<&Path>, is_quick: bool, tell: &dyn Fn(&str)) -> Resu
         rows.push(RelightRow {
             scene: own.name.clone(),
             light,
-            light_seconds: crate::math::statistics::quantile(&seconds, 0.5),
+            first_light_seconds,
+            light_seconds,
+            rest_seconds,
             turns_per_second,
             relative_error,
             bias,

@@ -172,15 +172,16 @@ impl BenchReport {
         if self.relight.is_empty() {
             return;
         }
-        text.push_str("## A view relit\n\n| scene | environment | new environment [ms] | turning [1/s] | error [%] | bias [%] | lobes | cache [s] | view [s] | fine view [s] |\n");
-        text.push_str("| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n");
+        text.push_str("## A view relit\n\n| scene | environment | new environment [ms] | at first [ms] | turning [1/s] | error [%] | bias [%] | lobes | cache [s] | view [s] | fine view [s] | rest [s] |\n");
+        text.push_str("| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n");
         for row in &self.relight {
             let _ = writeln!(
                 text,
-                "| {} | {} | {} | {:.1} | **{:.2}** | {:+.2} | {} | {:.1} | {:.2} | {:.2} |",
+                "| {} | {} | {} | {} | {:.1} | **{:.2}** | {:+.2} | {} | {:.1} | {:.2} | {:.2} | {:.2} |",
                 row.scene,
                 row.light,
                 milliseconds(row.light_seconds),
+                milliseconds(row.first_light_seconds),
                 row.turns_per_second,
                 100.0 * row.relative_error,
                 100.0 * row.bias,
@@ -188,12 +189,14 @@ impl BenchReport {
                 row.cache_seconds,
                 row.view_seconds,
                 row.fine_view_seconds,
+                row.rest_seconds,
             );
         }
         let [width, height] = super::relight::VIEW;
         let _ = writeln!(
             text,
-            "\nA viewport of {width} x {height} pixels: from the light to the whole picture, medians. The error is that of the \
+            "\nA viewport of {width} x {height} pixels: from the light to the whole picture, medians; at first, before the \
+             view has rested for as long as the last column says. The error is that of the \
              surface against the path tracer under the same environment, relative to the root mean square of its picture, with \
              its noise taken out by two independent pictures. Limits: {} ms and {:.0} %.\n",
             milliseconds(super::relight::MOST_SECONDS),

@@ -27,6 +27,11 @@ impl Vector for Neon {
         Neon(unsafe { vcvtq_f32_u32(vmovl_u16(vget_low_u16(vmovl_u8(vcreate_u8(u64::from(four)))))) })
     }
     #[inline(always)]
+    fn load_upper_halves(values: &[u16]) -> Self {
+        let values = &values[..4];
+        Neon(unsafe { vreinterpretq_f32_u32(vshlq_n_u32::<16>(vmovl_u16(vld1_u16(values.as_ptr())))) })
+    }
+    #[inline(always)]
     fn store(self, values: &mut [f32]) {
         let values = &mut values[..4];
         unsafe { vst1q_f32(values.as_mut_ptr(), self.0) }

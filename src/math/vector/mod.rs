@@ -34,6 +34,8 @@ pub trait Vector: Copy {
     fn load(values: &[f32]) -> Self;
     /// As many bytes as numbers from 0 to 255; the slice must be that long.
     fn load_bytes(values: &[u8]) -> Self;
+    /// As many numbers by the upper halves of their bits (bfloat16); the slice must be that long.
+    fn load_upper_halves(values: &[u16]) -> Self;
     /// Writes its numbers to the start of a slice, which must be that long.
     fn store(self, values: &mut [f32]);
     /// Sum.
@@ -143,6 +145,10 @@ impl Vector for Plain {
     #[inline(always)]
     fn load_bytes(values: &[u8]) -> Self {
         Plain(std::array::from_fn(|k| f32::from(values[k])))
+    }
+    #[inline(always)]
+    fn load_upper_halves(values: &[u16]) -> Self {
+        Plain(std::array::from_fn(|k| f32::from_bits(u32::from(values[k]) << 16)))
     }
     #[inline(always)]
     fn store(self, values: &mut [f32]) {

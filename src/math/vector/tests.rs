@@ -26,10 +26,13 @@ fn operations<V: Vector>(numbers: &[f32]) -> Vec<f32> {
     for at in (0..numbers.len() - V::LANES).step_by(V::LANES) {
         let (a, b) = (V::load(&numbers[at..]), V::load(&numbers[at + 1..]));
         let bytes: Vec<u8> = numbers[at..].iter().map(|&value| (value * 200.0) as u8).take(V::LANES).collect();
+        let halves: Vec<u16> =
+            numbers[at..].iter().map(|&value| (value.to_bits() >> 16) as u16).take(V::LANES).collect();
         let (exponent, mantissa) = a.split();
         let whole = a.mul(b).mul(V::splat(40.0)).round();
         for value in [
             V::load_bytes(&bytes),
+            V::load_upper_halves(&halves),
             a.add(b),
             a.sub(b),
             a.mul(b),
@@ -58,7 +61,7 @@ fn operations<V: Vector>(numbers: &[f32]) -> Vec<f32> {
 
 /// The same in the order of vectors of another width: operation by operation. Sums are of eight at least.
 fn compare<V: Vector>(numbers: &[f32], found: &[f32]) {
-    const OPERATIONS: usize = 16;
+    const OPERATIONS: usize = 17;
     let plain = operations::<Plain>(numbers);
     let of = |made: &[f32], lanes: usize, operation: usize, index: usize| {
         made[(index / lanes * OPERATIONS + operation) * (lanes + 2) + index % lanes]

@@ -27,6 +27,14 @@ impl Vector for Avx2 {
         Avx2(unsafe { _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(values.as_ptr().cast()))) })
     }
     #[inline(always)]
+    fn load_upper_halves(values: &[u16]) -> Self {
+        let values = &values[..8];
+        Avx2(unsafe {
+            let whole = _mm256_cvtepu16_epi32(_mm_loadu_si128(values.as_ptr().cast()));
+            _mm256_castsi256_ps(_mm256_slli_epi32::<16>(whole))
+        })
+    }
+    #[inline(always)]
     fn store(self, values: &mut [f32]) {
         let values = &mut values[..8];
         unsafe { _mm256_storeu_ps(values.as_mut_ptr(), self.0) }
@@ -123,6 +131,14 @@ impl Vector for Avx512 {
     fn load_bytes(values: &[u8]) -> Self {
         let values = &values[..16];
         Avx512(unsafe { _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(_mm_loadu_si128(values.as_ptr().cast()))) })
+    }
+    #[inline(always)]
+    fn load_upper_halves(values: &[u16]) -> Self {
+        let values = &values[..16];
+        Avx512(unsafe {
+            let whole = _mm512_cvtepu16_epi32(_mm256_loadu_si256(values.as_ptr().cast()));
+            _mm512_castsi512_ps(_mm512_slli_epi32::<16>(whole))
+        })
     }
     #[inline(always)]
     fn store(self, values: &mut [f32]) {

@@ -28,6 +28,7 @@ mod half_vector_kernel;
 pub mod half_vector_places;
 pub mod irradiance;
 pub mod light_basis;
+pub mod lobe_frozen;
 mod lobe_kernel;
 pub mod lobe_place;
 pub mod lobe_sum;

@@ -27,13 +27,21 @@ pub struct SeenRows {
     /// By the hats.
     pub fine: SeenLight,
     joined: SeenLight,
+    /// Of each pair the share of the upper hat in its solid angle.
+    upper_shares: Vec<f32>,
 }
 
 impl SeenRows {
     /// By pairs of hats of this basis: for sums over [`LightBasis::with_rows_joined`].
     pub fn joined(&mut self, basis: &LightBasis) -> &SeenLight {
         if self.joined.point != self.fine.point {
-            self.fine.join_rows(basis, &mut self.joined);
+            if self.upper_shares.is_empty() {
+                let rows = basis.solid_angle[..basis.count()].chunks_exact(2 * basis.width);
+                let pairs =
+                    rows.map(|rows| rows.split_at(basis.width)).flat_map(|(upper, lower)| upper.iter().zip(lower));
+                self.upper_shares = pairs.map(|(upper, lower)| upper / (upper + lower)).collect();
+            }
+            self.fine.join_rows(basis, &self.upper_shares, &mut self.joined);
         }
         &self.joined
     }
@@ -95,17 +103,15 @@ impl SeenLight {
 
     /// Fills `joined` with what is seen in pairs of hats, each of a row of `basis` and the one below it: their mean by solid
     /// angle, for sums over [`LightBasis::with_rows_joined`] alone.
-    fn join_rows(&self, basis: &LightBasis, joined: &mut SeenLight) {
+    fn join_rows(&self, basis: &LightBasis, upper_shares: &[f32], joined: &mut SeenLight) {
         joined.point = self.point;
-        let rows = 2 * basis.width;
-        let solid_angles =
-            || basis.solid_angle[..basis.count()].chunks_exact(rows).map(|rows| rows.split_at(basis.width));
         for (plane, made) in self.channels.iter().zip(&mut joined.channels) {
             made.clear();
-            for (seen, (weight, other)) in plane[..basis.count()].chunks_exact(rows).zip(solid_angles()) {
+            let rows = plane[..basis.count()].chunks_exact(2 * basis.width);
+            for (seen, shares) in rows.zip(upper_shares.chunks_exact(basis.width)) {
                 let (upper, lower) = seen.split_at(basis.width);
-                let pairs = upper.iter().zip(lower).zip(weight.iter().zip(other));
-                made.extend(pairs.map(|((a, b), (&weight, &other))| (a * weight + b * other) / (weight + other)));
+                let pairs = upper.iter().zip(lower).zip(shares);
+                made.extend(pairs.map(|((upper, lower), share)| lower + (upper - lower) * share));
             }
             made.resize(made.len().next_multiple_of(WIDEST), 0.0);
         }
@@ -122,7 +128,23 @@ impl SeenLight {
         if self.point == point && self.texels.len() == shares.len() {
             return;
         }
+        self.gather(point, light, shares, (surroundings, leaving));
+        self.interleave();
+    }
+
+    /// The same channel by channel alone, as sums over hats read it.
+    pub(super) fn gather(
+        &mut self,
+        point: u32,
+        light: &LightPlanes,
+        shares: &[u8],
+        (surroundings, leaving): (Option<&Surroundings>, &[[f32; 3]]),
+    ) {
+        if self.point == point && self.channels[0].len() == shares.len() {
+            return;
+        }
         self.point = point;
+        self.texels.clear();
         self.fill(light, shares);
         if let Some(surroundings) = surroundings {
             for &Hiding { cell, point } in surroundings.of(point as usize) {
@@ -134,7 +156,6 @@ impl SeenLight {
                 }
             }
         }
-        self.interleave();
     }
 }
 

@@ -31,6 +31,13 @@ impl CachedTransport {
         shares
     }
 
+    /// Turns `seen` to what a point of the grid sees, for sums over hats alone.
+    #[inline]
+    pub fn gather_seen(&self, grid_point: u32, light: &LightPlanes, at: &PointLight, seen: &mut SeenLight) {
+        let shares = self.visibility.of(grid_point as usize);
+        seen.gather(grid_point, light, shares, (self.surroundings.as_ref(), &at.leaving));
+    }
+
     /// Where the lobe of a shading point is integrated, under a light and among surface that sends this. `seen` is kept from
     /// place to place, as long as `light` and `at` are the same.
     #[inline]

@@ -7,7 +7,10 @@
 //! view that shows about as many points of the grid as shading points. What a light sends is not asked, so that the plan
 //! serves all of them.
 
+mod frozen;
+
 use crate::math::parallel;
+use crate::render::cached::lobe_frozen::FrozenLobes;
 use crate::render::cached::lobe_place::{LobePlace, LobeSums};
 use crate::render::cached::lobe_sum::lobe_sums;
 use crate::render::cached::{CachedTransport, LightPlanes, PointLight, SeenRows, ShadingPoint, ViewFootprints};
@@ -29,6 +32,8 @@ const STEPS: usize = 25;
 const MOST_ALONE: usize = 60_000;
 /// How often they are doubled, at most; then the points of the grid speak for all that is not seen at a grazing angle.
 const MOST_DOUBLINGS: usize = 4;
+/// Groups whose lobes are integrated one after another.
+const GROUPS_AT_ONCE: usize = 16;
 const NO_PLACE: u32 = u32::MAX;
 
 /// A point of the grid as the view shows it.
@@ -63,6 +68,8 @@ pub struct LobePlan {
     /// Shading points with integrals of their own, those of one point of the grid together.
     alone: Vec<u32>,
     is_alone: Vec<bool>,
+    /// Of every [`GROUPS_AT_ONCE`] groups their lobes as rows, as far as there is memory for them.
+    frozen: Vec<FrozenLobes>,
 }
 
 /// Microfacet width of a step.
@@ -128,7 +135,7 @@ impl LobePlan {
                 groups.push(Group { place, alone: begin..end });
             }
         }
-        LobePlan { places, groups, sums, of_grid, widths, alone, is_alone }
+        LobePlan { places, groups, sums, of_grid, widths, alone, is_alone, frozen: Vec::new() }
     }
 
     /// Lobes that are integrated.
@@ -162,7 +169,10 @@ impl LobePlan {
             }
             sums.into_iter().take(count)
         };
-        let of_groups = |_: usize, groups: &[Group]| -> (Vec<LobeSums>, Vec<LobeSums>) {
+        let of_groups = |chunk: usize, groups: &[Group]| -> (Vec<LobeSums>, Vec<LobeSums>) {
+            if let Some(rows) = self.frozen.get(chunk) {
+                return self.frozen_sums((rows, groups), (footprints, transport), (light, at));
+            }
             let (mut seen, mut of_places, mut of_alone) = (SeenRows::default(), Vec::new(), Vec::new());
             for group in groups {
                 if group.place != NO_PLACE {
@@ -176,7 +186,7 @@ impl LobePlan {
             }
             (of_places, of_alone)
         };
-        let parts = parallel::map_chunks(&self.groups, 16, of_groups);
+        let parts = parallel::map_chunks(&self.groups, GROUPS_AT_ONCE, of_groups);
         let (sums, of_alone): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
         let (sums, of_alone) = (sums.concat(), of_alone.concat());
         let between = |index: usize| match self.is_alone[index] {

@@ -85,6 +85,17 @@ impl RelitView {
         self
     }
 
+    /// Makes further lights cheap, for a few times the cost of one: a view that stays, lit by what turns. Where `stop` is raised
+    /// nothing changes.
+    pub fn freeze(&mut self, transport: &CachedTransport, stop: &AtomicBool) {
+        self.lobes.freeze(&self.footprints, transport, stop);
+    }
+
+    /// Whether further lights are cheap already.
+    pub fn is_frozen(&self) -> bool {
+        self.lobes.lobes() == 0 || self.lobes.is_frozen()
+    }
+
     /// The camera.
     pub fn camera(&self) -> &Camera {
         &self.camera
@@ -192,7 +203,7 @@ mod tests {
         let reflectance = transport.reflectance_of_points(&texels, map_size);
         let camera = &scene.views[0].camera;
         let footprints = FootprintSettings { map_size, ..FootprintSettings::default() };
-        let view = RelitView::new(&surface, &transport, camera, &texels, &footprints, &stop).unwrap();
+        let mut view = RelitView::new(&surface, &transport, camera, &texels, &footprints, &stop).unwrap();
         let own = view.lit(&transport, &truth.environment, &reflectance, None, &stop).unwrap();
         let light: Vec<[f32; 3]> = truth.environment.radiance.pixels().iter().map(|rgb| rgb.to_array()).collect();
         let light = transport.basis.planes(&light);
@@ -214,6 +225,14 @@ mod tests {
         let error = relative_error(&own.radiance, &whole);
         println!("{error:.4} off with lobes at {} of {} points", own.lobe_points, traced.points.len());
         assert!(error < 0.015 && own.lobe_points < traced.points.len(), "{error} {}", own.lobe_points);
+        // Kept as rows, lobes give the same picture but for their digits.
+        view.freeze(&transport, &AtomicBool::new(true));
+        assert!(!view.is_frozen(), "stopped");
+        view.freeze(&transport, &stop);
+        let frozen = view.lit(&transport, &truth.environment, &reflectance, None, &stop).unwrap();
+        let apart = relative_error(&frozen.radiance, &own.radiance);
+        println!("{apart:.5} apart from rows");
+        assert!(view.is_frozen() && apart > 0.0 && apart < 0.002, "{apart}");
         // Twice the light is twice the picture.
         let twice = Environment { radiance: truth.environment.radiance.map(|radiance| *radiance * 2.0) };
         let twice = view.lit(&transport, &twice, &reflectance, Some(&twice), &stop).unwrap().radiance;

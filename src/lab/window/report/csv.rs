@@ -69,7 +69,9 @@ impl BenchReport {
         }
         for row in &self.relight {
             let mut own = |measure, unit, value| line("relight", &row.scene, &row.light, measure, unit, value);
+            own("new environment at first", "s", row.first_light_seconds);
             own("new environment", "s", row.light_seconds);
+            own("rest", "s", row.rest_seconds);
             own("turning", "1/s", row.turns_per_second);
             own("relative error", "", row.relative_error);
             own("bias", "", row.bias);

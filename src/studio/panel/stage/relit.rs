@@ -112,6 +112,7 @@ impl Relit {
                     lights: lights?,
                     background_visible: model.edits.relight.as_background,
                     background_blur_degrees: model.edits.relight.background_blur_degrees(),
+                    is_settled: !runs,
                     key,
                     view,
                 };
